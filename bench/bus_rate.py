@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable
 
-from bus_sim.can.faults import Fault, parse_fault
+from bus_sim.can.faults import InjectedFault, parse_fault
 from bus_sim.can.medium import Medium
 from bus_sim.can.node import SimulatedBus
 from bus_sim.virtual_time import VirtualTimeLoop, run
@@ -57,7 +57,7 @@ def _half_load(loop: VirtualTimeLoop, node: SimulatedBus, sender: int) -> None:
 Load = Callable[[VirtualTimeLoop, SimulatedBus, int], None]
 
 
-async def _measure(load: Load, seconds: float, faults: tuple[Fault, ...]) -> tuple[int, float, float]:
+async def _measure(load: Load, seconds: float, faults: tuple[InjectedFault, ...]) -> tuple[int, float, float]:
     """Frames carried, wall seconds, bus load."""
     loop = asyncio.get_running_loop()
     if not isinstance(loop, VirtualTimeLoop):
@@ -76,7 +76,7 @@ def main() -> None:
     """Print a row for each load: frames per wall second on the simulated bus."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else DURATION_S
     fault = parse_fault("omission:receivers=3,probability=0.01,seed=7")
-    rows: tuple[tuple[str, Load, tuple[Fault, ...]], ...] = (
+    rows: tuple[tuple[str, Load, tuple[InjectedFault, ...]], ...] = (
         ("every node always has a frame ready", _saturate, ()),
         ("every node sends each 12.5 ms", _half_load, ()),
         ("saturated, with an omission fault", _saturate, (fault,)),

@@ -11,7 +11,7 @@ from pathlib import Path
 from bus_sim.options import RunOptions
 from bus_sim.session import run_site
 from bus_sim.sites import find_site
-from bus_sim.systems.car_park.day import Day
+from bus_sim.systems.car_park.day import ParkingDay
 from bus_sim.systems.car_park.summary import RunSummary
 
 
@@ -32,14 +32,28 @@ def main() -> None:
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         trace = Path(folder) / "trace.log"
-        row("level1, its real day, no log", "level1", RunOptions(demand=Day(), quiet=True))
-        row("level1, all buses logged", "level1", RunOptions(demand=Day(), trace=trace, devices=True, quiet=True))
-        row("standard, the real day, no log", "standard", RunOptions(demand=Day(), quiet=True))
-        row("standard, all buses logged", "standard", RunOptions(demand=Day(), trace=trace, devices=True, quiet=True))
-        row("standard, its busiest hour, no log", "standard", RunOptions(demand=Day(window="busiest"), quiet=True))
+        row("level1, its real day, no log", "level1", RunOptions(demand=ParkingDay(), quiet=True))
+        row(
+            "level1, all buses logged", "level1", RunOptions(demand=ParkingDay(), trace=trace, devices=True, quiet=True)
+        )
+        row("standard, the real day, no log", "standard", RunOptions(demand=ParkingDay(), quiet=True))
+        row(
+            "standard, all buses logged",
+            "standard",
+            RunOptions(demand=ParkingDay(), trace=trace, devices=True, quiet=True),
+        )
+        row(
+            "standard, its busiest hour, no log",
+            "standard",
+            RunOptions(demand=ParkingDay(window="busiest"), quiet=True),
+        )
         if len(sys.argv) == 3:
             sessions, day = Path(sys.argv[1]), sys.argv[2]
-            row(f"standard, {day}, no log", "standard", RunOptions(demand=Day(sessions=sessions, day=day), quiet=True))
+            row(
+                f"standard, {day}, no log",
+                "standard",
+                RunOptions(demand=ParkingDay(sessions=sessions, day=day), quiet=True),
+            )
 
 
 if __name__ == "__main__":

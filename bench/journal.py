@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bus_sim.campaign.trial import STEP_US
-from bus_sim.faults.scenario import Scenario
+from bus_sim.faults.scenario import FaultScenario
 from bus_sim.options import RunOptions
 from bus_sim.run import run_until
 from bus_sim.sites import find_site
@@ -37,7 +37,7 @@ LIMIT_S = 4_000_000.0
 
 def played(site: Site, name: str, cars: int) -> dict[int, list[Entry]]:
     """The journals of a run, by node-ID."""
-    scenario = Scenario(name, 5, LIMIT_S, Arrivals(cars, MEAN_S, SIGMA_S, STAY_S))
+    scenario = FaultScenario(name, 5, LIMIT_S, Arrivals(cars, MEAN_S, SIGMA_S, STAY_S))
     loop = VirtualTimeLoop()
 
     async def play() -> dict[int, list[Entry]]:

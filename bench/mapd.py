@@ -16,10 +16,10 @@ from bus_sim.options import RunOptions
 from bus_sim.session import play
 from bus_sim.systems.mapd.importers.command import import_files
 from bus_sim.systems.mapd.importers.draft import site_text
-from bus_sim.systems.mapd.importers.mapf import Wanted
+from bus_sim.systems.mapd.importers.mapf import DrawnDemand
 from bus_sim.systems.mapd.plant import UnitPlant
 from bus_sim.systems.mapd.published import TOKEN_PASSING
-from bus_sim.systems.mapd.steps import Day
+from bus_sim.systems.mapd.steps import SteppedDay
 from onboard.config.site import parse_site
 from onboard.contract.mapd import StepRound
 from onboard.systems.mapd.site import Mapd
@@ -27,7 +27,7 @@ from onboard.systems.mapd.site import Mapd
 
 def site_of(robots: int, rate: str) -> Mapd:
     with as_file(files("bus_sim") / "data" / "mapd") as folder:
-        draft = import_files([folder / f"kiva-{robots}-500-5.map", folder / f"kiva-{rate}.task"], Wanted())
+        draft = import_files([folder / f"kiva-{robots}-500-5.map", folder / f"kiva-{rate}.task"], DrawnDemand())
     site = parse_site(site_text(draft), "kiva")
     assert isinstance(site, Mapd)
     return site
@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def _alone(site: Mapd) -> tuple[float, int, int, str]:
-    day = Day(site.floor, list(site.homes.values()), site.rests, site.tasks).run()
+    day = SteppedDay(site.floor, list(site.homes.values()), site.rests, site.tasks).run()
     return day.service_time, day.makespan, len(day.served), ""
 
 
@@ -69,7 +69,7 @@ def _on_the_bus(site: Mapd) -> tuple[float, int, int, str]:
     assert played.is_good, plant.violations
     release = {task.number: task.release for task in site.tasks}
     service = sum(step - release[number] for number, step in plant.served.items()) / len(plant.served)
-    alone = Day(site.floor, list(site.homes.values()), site.rests, site.tasks).run()
+    alone = SteppedDay(site.floor, list(site.homes.values()), site.rests, site.tasks).run()
     begun_us: dict[int, int] = {}
     for time_us, one in played.messages:
         if isinstance(one, StepRound):

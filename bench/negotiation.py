@@ -29,12 +29,12 @@ from onboard.core.effects import Effect, Send
 from onboard.core.frame import Frame
 from onboard.core.negotiation import (
     Awarded,
-    CallTerms,
     Closed,
     DelayRule,
     Negotiation,
     NegotiationEvent,
     Proposal,
+    RequestedTerms,
     beats,
     slot_of,
 )
@@ -278,7 +278,7 @@ async def _call(
 ) -> None:
     loop = asyncio.get_running_loop()
     take, leave = chance.sample(range(1, POSITIONS + 1), 2)
-    terms = CallTerms(
+    terms = RequestedTerms(
         Reference(INITIATOR, number),
         Operation.PARK,
         KindCode.ROBOT,

@@ -22,7 +22,7 @@ from onboard.core.site import Segment, Site
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses, standing_segments, travel_windows
 from onboard.ways.refuges import open_refuges, refuges
-from onboard.ways.reservations import Reservations, Window
+from onboard.ways.reservations import Reservations, SlotWindow
 from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 
 SECOND = 1_000_000
@@ -47,17 +47,17 @@ home = "p(1,2)"
 """
 
 
-def pass_by(site: Site, rng: random.Random) -> list[Window]:
+def pass_by(site: Site, rng: random.Random) -> list[SlotWindow]:
     """Windows of a machine that comes, works for ten seconds and goes on, all within some minutes."""
     length = site.tracks[1].length
     here, begin_us = Segment(1, rng.randint(1, length)), rng.randrange(240) * SECOND
-    windows: list[Window] = []
+    windows: list[SlotWindow] = []
     for _ in range(2):
         there = rng.choice([index for index in range(1, length + 1) if index != here.index])
         run_us = run_duration_us(abs(there - here.index) * site.tracks[1].pitch_mm, site.carrier)
         windows += travel_windows(site, here, there, begin_us, begin_us + run_us)
         here, begin_us = Segment(1, there), begin_us + run_us
-        windows += [Window(one, begin_us, begin_us + 10 * SECOND) for one in standing_segments(site, here)]
+        windows += [SlotWindow(one, begin_us, begin_us + 10 * SECOND) for one in standing_segments(site, here)]
         begin_us += 10 * SECOND
     return windows
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 from bus_sim.options import RunOptions
 from bus_sim.sites import find_site
 from bus_sim.systems.terminal.central import play_auction, play_central
-from bus_sim.systems.terminal.run import Outcome
+from bus_sim.systems.terminal.run import TerminalOutcome
 from onboard.systems.terminal.site import Blockage, Mission, Terminal
 from onboard.systems.terminal.vehicle import terminal
 
@@ -60,7 +60,7 @@ def main() -> None:
     print(f"auction over central: waiting {waiting:.3f}, finishing {finishing:.3f}")
 
 
-def line(seed: int, name: str, found: Outcome) -> str:
+def line(seed: int, name: str, found: TerminalOutcome) -> str:
     waits = [one.waited_us / 1e6 for one in found.deliveries]
     ends = [one.finished_us / 1e6 for one in found.deliveries]
     done = f"{len(found.deliveries)}/{found.ordered}"

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
-from bus_sim.can.faults import Fault
+from bus_sim.can.faults import InjectedFault
 from bus_sim.can.medium import Medium, Tap
 from bus_sim.can.node import SimulatedBus
 from bus_sim.devices.link import BusDeviceLink
@@ -211,7 +211,7 @@ class BusRun(Generic[PlantT]):
         return on_device
 
 
-def buses_of(site: Site, faults: tuple[Fault, ...], loop: VirtualTimeLoop) -> tuple[Medium, dict[int, Medium]]:
+def buses_of(site: Site, faults: tuple[InjectedFault, ...], loop: VirtualTimeLoop) -> tuple[Medium, dict[int, Medium]]:
     """The fleet bus with its faults of single frames, and each machine's device bus by its node-ID."""
     fleet = Medium(loop, bit_rate=site.bitrate, faults=faults)
     return fleet, {node_id: Medium(loop, bit_rate=site.bitrate) for node_id in site.machines}

@@ -22,7 +22,7 @@ from bus_sim.processes.fleet import ProcessFleet
 from bus_sim.publish import Publishing
 from bus_sim.run import BusRun, run_until
 from bus_sim.systems.registry import simulated_of
-from bus_sim.systems.stage import Ended, Hand, Show, Stage, Summary
+from bus_sim.systems.stage import EndedRun, PersonAtKeys, RunFigures, Show, SystemStage
 from bus_sim.systems.system import SimulatedSystem
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.site import Site
@@ -32,7 +32,7 @@ from onboard.io.signals import ended_by
 FOREVER_US = 100 * 366 * 86_400 * 1_000_000
 
 
-def run_site(site: Site, options: RunOptions) -> Summary:
+def run_site(site: Site, options: RunOptions) -> RunFigures:
     """Play a site, show it, and answer with what it came to.
 
     Raises ``DemandError``, ``BusOpenError`` and the like for a person's mistakes, before anything has run.
@@ -45,7 +45,7 @@ def play(
     options: RunOptions,
     prepare: Callable[[Any], None] | None = None,
     system: SimulatedSystem[Any, Any] | None = None,
-) -> Stage[Any]:
+) -> SystemStage[Any]:
     """The same without a word: the stage as it is when all is over. ``prepare`` gets the run before it is switched on.
 
     ``system``: None for that of the site.
@@ -54,7 +54,7 @@ def play(
     return _on_loop(site, quiet, system if system is not None else simulated_of(site))[0]
 
 
-def _on_loop(site: Site, options: RunOptions, system: SimulatedSystem[Any, Any]) -> tuple[Stage[Any], Summary]:
+def _on_loop(site: Site, options: RunOptions, system: SimulatedSystem[Any, Any]) -> tuple[SystemStage[Any], RunFigures]:
     _check(site, options)
     loop = VirtualTimeLoop(pace=options.speed)
     try:
@@ -66,7 +66,7 @@ def _on_loop(site: Site, options: RunOptions, system: SimulatedSystem[Any, Any])
         loop.close()
 
 
-async def _to_its_end(session: "_Session") -> Summary:
+async def _to_its_end(session: "_Session") -> RunFigures:
     """The run, and nothing of it left behind: what machines have begun by then is not waited for."""
     summary = await session.play()
     begun = asyncio.all_tasks() - {asyncio.current_task()}
@@ -101,13 +101,13 @@ class _Session:
         self.stage.listen()
         self._begin_us = 0
         self._begin_s = 0.0
-        self._hand: Hand | None = None
+        self._hand: PersonAtKeys | None = None
         self._is_interrupted = False
         #: Whether what a person asked to see has begun; what is measured is of it alone.
         self._is_warm = False
         self._processes = ProcessFleet(self._run, plan, options.without, self._console) if plan is not None else None
 
-    async def play(self) -> Summary:
+    async def play(self) -> RunFigures:
         """The whole run."""
         run, options, stage = self._run, self._options, self.stage
         self._say(*stage.head())
@@ -146,7 +146,7 @@ class _Session:
                     await self._until(self._limit_us(stage.shown_us[1]), show)
         failures = tuple(self._processes.failures) if self._processes is not None else ()
         wall_s = time.monotonic() - self._begin_s
-        summary = stage.summary(Ended(wall_s, self._begin_us, stage.shown_us is None or self._is_warm, failures))
+        summary = stage.summary(EndedRun(wall_s, self._begin_us, stage.shown_us is None or self._is_warm, failures))
         self._say(*summary.lines(self._console.width if self._console.is_terminal else None))
         return summary
 

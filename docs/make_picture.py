@@ -13,8 +13,8 @@ from rich.console import Console
 
 from bus_sim.options import RunOptions
 from bus_sim.sites import find_site
-from bus_sim.systems.car_park.day import Day, choose_demand
-from bus_sim.systems.car_park.show import Clock, draw
+from bus_sim.systems.car_park.day import ParkingDay, choose_demand
+from bus_sim.systems.car_park.show import DayClock, draw
 from bus_sim.systems.car_park.simulation import build
 from bus_sim.systems.car_park.stage import ORIGIN_US
 from bus_sim.systems.car_park.window import two_way_hour, with_short_eve
@@ -30,7 +30,7 @@ async def _picture() -> str:
     loop = asyncio.get_running_loop()
     assert isinstance(loop, VirtualTimeLoop)
     site = find_site("standard")
-    demand = choose_demand(Day(), site)
+    demand = choose_demand(ParkingDay(), site)
     demand = with_short_eve(demand, two_way_hour(demand), len(site.compartments))
     first_us = demand.stays[0].arrival_us
     simulation = build(site, RunOptions(), loop)
@@ -38,7 +38,7 @@ async def _picture() -> str:
     simulation.start()
     await asyncio.sleep(MOMENT_S - first_us / 1e6 + ORIGIN_US / 1e6)
     assert demand.zero is not None
-    clock = Clock(demand.zero + timedelta(microseconds=first_us - ORIGIN_US))
+    clock = DayClock(demand.zero + timedelta(microseconds=first_us - ORIGIN_US))
     console = Console(record=True, width=COLUMNS, file=StringIO())
     street = simulation.plant.street.summary()
     line = (

@@ -8,10 +8,10 @@ from enum import StrEnum
 from pathlib import Path
 
 from onboard.config.files import read_text, root_table
-from onboard.config.machine import Interface
+from onboard.config.machine import BusInterface
 from onboard.config.machine_text import BusTable
 from onboard.config.problems import ConfigError, Problem, Problems, nearest
-from onboard.config.reader import Table
+from onboard.config.reader import TomlTable
 from onboard.config.site import load_site
 from onboard.core.site import Machine, Site
 
@@ -73,7 +73,7 @@ class Files:
 class Resources:
     """How a board is reached; None where the bench has no such thing."""
 
-    buses: dict[Capability, Interface] = field(default_factory=dict)
+    buses: dict[Capability, BusInterface] = field(default_factory=dict)
     switches: dict[Capability, Switch] = field(default_factory=dict)
     readers: dict[Capability, Command] = field(default_factory=dict)
     files: Files | None = None
@@ -132,7 +132,7 @@ def load_bench(path: Path) -> Bench:
     return Bench(name, site, read_text(site_path, "site"), kept)
 
 
-def _read_target(table: Table, site: Site | None, problems: Problems) -> Target | None:
+def _read_target(table: TomlTable, site: Site | None, problems: Problems) -> Target | None:
     name = table.text("machine")
     kind = TargetKind(table.choice("kind", [str(one) for one in TargetKind]))
     capabilities = _read_capabilities(table)
@@ -146,7 +146,7 @@ def _read_target(table: Table, site: Site | None, problems: Problems) -> Target 
     return Target(machines[name], kind, capabilities, resources) if name in machines else None
 
 
-def _read_capabilities(table: Table) -> frozenset[Capability]:
+def _read_capabilities(table: TomlTable) -> frozenset[Capability]:
     known = [str(one) for one in Capability]
     found = set()
     for number, word in enumerate(table.items("capabilities", "a list of words") or []):
@@ -157,7 +157,7 @@ def _read_capabilities(table: Table) -> frozenset[Capability]:
     return frozenset(found)
 
 
-def _read_resources(table: Table, bitrate: int) -> Resources:
+def _read_resources(table: TomlTable, bitrate: int) -> Resources:
     buses = {one: _read_bus(table.table(one), bitrate) for one in _BUSES if table.has(one)}
     switches = {one: _read_switch(table.table(one)) for one in _SWITCHES if table.has(one)}
     readers = {one: _read_command(table.table(one), "read") for one in _READERS if table.has(one)}
@@ -165,22 +165,22 @@ def _read_resources(table: Table, bitrate: int) -> Resources:
     return Resources(buses, switches, readers, files)
 
 
-def _read_bus(table: Table, bitrate: int) -> Interface:
+def _read_bus(table: TomlTable, bitrate: int) -> BusInterface:
     extra = tuple(sorted(_extra(table).items()))
-    return Interface(table.text("interface"), table.text("channel"), bitrate, extra)
+    return BusInterface(table.text("interface"), table.text("channel"), bitrate, extra)
 
 
-def _extra(table: Table) -> dict[str, str | int | float | bool]:
+def _extra(table: TomlTable) -> dict[str, str | int | float | bool]:
     """Every further key of a bus, as in a machine file."""
     names = table.values.keys() - {"interface", "channel"}
     return {name: table.values[name] for name in sorted(names) if table.has(name)}
 
 
-def _read_switch(table: Table) -> Switch:
+def _read_switch(table: TomlTable) -> Switch:
     return Switch(_read_command(table, "on"), _read_command(table, "off"))
 
 
-def _read_command(table: Table, name: str) -> Command:
+def _read_command(table: TomlTable, name: str) -> Command:
     words = 'a list of words, such as ["ssh", "root@board", "reboot"]'
     value = table.items(name, words)
     if value is None or not value or not all(isinstance(word, str) for word in value):
@@ -189,7 +189,7 @@ def _read_command(table: Table, name: str) -> Command:
     return tuple(value)
 
 
-def _read_files(table: Table) -> Files:
+def _read_files(table: TomlTable) -> Files:
     fleet = table.table("fleet_bus", required=True)
     device = table.table("device_bus") if table.has("device_bus") else None
     return Files(
@@ -199,5 +199,5 @@ def _read_files(table: Table) -> Files:
     )
 
 
-def _bus_table(table: Table) -> BusTable:
+def _bus_table(table: TomlTable) -> BusTable:
     return BusTable(table.text("interface"), table.text("channel"), _extra(table))

@@ -7,7 +7,7 @@ import pytest
 
 from hil.bench import Bench, Target, load_bench
 from hil.scenarios.registry import SCENARIOS
-from hil.scenarios.scenario import Scenario
+from hil.scenarios.scenario import BenchScenario
 from onboard.config.problems import ConfigError
 
 #: Where everything but the controller is simulated.
@@ -78,7 +78,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize(("target", "scenario"), found, ids=names)
 
 
-def _tests(bench: Bench) -> Iterator[tuple[Target, Scenario]]:
+def _tests(bench: Bench) -> Iterator[tuple[Target, BenchScenario]]:
     for target in bench.targets:
         for scenario in SCENARIOS:
             if not scenario.kinds or target.machine.kind in scenario.kinds:

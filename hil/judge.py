@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from hil.scenarios.scenario import Scenario
-from hil.stage import Stage
+from hil.scenarios.scenario import BenchScenario
+from hil.stage import TestBench
 from onboard.contract.codes import Reason
 from onboard.contract.messages import Diagnostic
 from onboard.ports.bus import BusHealth, ErrorState
-from onboard.trace.check.checks import Checks, Verdict
+from onboard.trace.check.checks import Checks, LogVerdict
 
 #: Calls that a device did not heed because bus time reached it a tenth of a second late: a busy host does that to a
 #: process and to a bridge. It is told in the report; the call is opened again.
@@ -24,7 +24,7 @@ class Judgement:
     drops: dict[Reason, int]
 
 
-def judge(stage: Stage, scenario: Scenario, counters: BusHealth | None) -> Judgement:
+def judge(stage: TestBench, scenario: BenchScenario, counters: BusHealth | None) -> Judgement:
     """Look at all that a run has left behind."""
     diagnostics = stage.own(Diagnostic)
     drops = {one.message.reason: one.message.count for one in diagnostics}
@@ -46,7 +46,7 @@ def judge(stage: Stage, scenario: Scenario, counters: BusHealth | None) -> Judge
     return Judgement(tuple(faults), counters, drops)
 
 
-def _of_counters(counters: BusHealth | None, scenario: Scenario) -> Iterator[str]:
+def _of_counters(counters: BusHealth | None, scenario: BenchScenario) -> Iterator[str]:
     if counters is None:
         return
     if counters.state is not ErrorState.ERROR_ACTIVE:
@@ -59,13 +59,13 @@ def _of_counters(counters: BusHealth | None, scenario: Scenario) -> Iterator[str
         yield f"counters: {counters.send_refused} frames refused for want of room"
 
 
-def _of_fleet(stage: Stage) -> Iterator[str]:
+def _of_fleet(stage: TestBench) -> Iterator[str]:
     for controller in stage.simulation.controllers.values():
         if controller.holon.halted is not None:
             yield f"{controller.holon.machine.name} of the simulated fleet halted: {controller.holon.halted}"
 
 
-def _verdict(stage: Stage, scenario: Scenario) -> Verdict:
+def _verdict(stage: TestBench, scenario: BenchScenario) -> LogVerdict:
     checks = Checks(stage.site, disturbed=scenario.is_disturbed)
     for one in stage.said:
         checks.feed_message(one.time_us, one.message, one.bus)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from hil.stage import Said
+from hil.stage import BenchMessage
 from onboard.contract.codes import DriveMode, TokenKind
 from onboard.contract.messages import Bid, CallForProposals, DriveState, Message, TokenGrant
 
@@ -25,7 +25,7 @@ class Latencies:
         return {f"{name}_worst_us": max(values) for name, values in found.items() if values}
 
 
-def latencies_of(said: Iterable[Said[Message]], node_id: int) -> Latencies:
+def latencies_of(said: Iterable[BenchMessage[Message]], node_id: int) -> Latencies:
     """What a run tells of one device."""
     found = Latencies()
     calls: dict[tuple[int, int], int] = {}

@@ -20,17 +20,17 @@ from hil.device import Device
 from hil.judge import Judgement, judge
 from hil.latency import Latencies, latencies_of
 from hil.process_device import ProcessDevice
-from hil.scenarios.scenario import Scenario
+from hil.scenarios.scenario import BenchScenario
 from hil.short_circuit import waiting_fault
 from hil.simulated_device import SimulatedDevice
-from hil.stage import Stage
+from hil.stage import TestBench
 
 #: Journal entries that one machine may have waiting at the end; a bound for a broken one.
 MOST_WRITES = 1_000
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ScenarioOutcome:
     """What came of a scenario. ``failure`` is what the device did otherwise than it should, None where nothing."""
 
     failure: str | None
@@ -55,7 +55,7 @@ class Outcome:
         return found | {f"dropped_{reason.name.lower()}": count for reason, count in self.judgement.drops.items()}
 
 
-def missing(scenario: Scenario, target: Target) -> list[Capability]:
+def missing(scenario: BenchScenario, target: Target) -> list[Capability]:
     """Capabilities that the scenario asks for and the target has not, in order."""
     return sorted(scenario.needs - target.capabilities)
 
@@ -63,10 +63,10 @@ def missing(scenario: Scenario, target: Target) -> list[Capability]:
 def play(
     bench: Bench,
     target: Target,
-    scenario: Scenario,
+    scenario: BenchScenario,
     directory: Path,
     prepare: Callable[[Device], None] | None = None,
-) -> Outcome:
+) -> ScenarioOutcome:
     """Play a scenario; ``directory`` gets the trace and, for a process, its files.
 
     Raises ``BenchError`` and ``BusOpenError`` where the bench itself fails. ``prepare`` is given the device before
@@ -85,11 +85,11 @@ def play(
 async def _play(
     bench: Bench,
     target: Target,
-    scenario: Scenario,
+    scenario: BenchScenario,
     directory: Path,
     prepare: Callable[[Device], None] | None,
     loop: VirtualTimeLoop,
-) -> Outcome:
+) -> ScenarioOutcome:
     options = RunOptions(
         epoch_us=0 if target.kind is TargetKind.SIMULATED else round(time.time() * 1e6),
         trace=directory / "trace.log",
@@ -113,7 +113,7 @@ async def _play(
         stack.push_async_callback(device.close)
         if prepare is not None:
             prepare(device)
-        stage = Stage(world, bench.site, target.machine, device, bench.site_text)
+        stage = TestBench(world, bench.site, target.machine, device, bench.site_text)
         simulation.start()
         failure = None
         try:
@@ -122,7 +122,7 @@ async def _play(
             failure = str(error)
         counters = await device.counters() if Capability.COUNTERS in target.capabilities else None
         judgement = judge(stage, scenario, counters)
-        return Outcome(failure, judgement, latencies_of(stage.said, target.machine.node_id))
+        return ScenarioOutcome(failure, judgement, latencies_of(stage.said, target.machine.node_id))
 
 
 async def stop_fleet(simulation: BusRun[Any]) -> None:

@@ -4,7 +4,7 @@ import asyncio
 from dataclasses import replace
 
 from bus_sim.can.error_frames import CAN_ERR_BUSOFF
-from bus_sim.can.faults import Fault, FaultInjector, FaultKind
+from bus_sim.can.faults import FaultInjector, FaultKind, InjectedFault
 from bus_sim.can.medium import Medium
 from onboard.core.frame import Frame
 
@@ -16,9 +16,9 @@ _SENDER_MASK = 0xFF
 _DEADLINE_S = 20.0
 
 
-def waiting_fault(node_id: int) -> Fault:
+def waiting_fault(node_id: int) -> InjectedFault:
     """To be given to the bus beforehand; ``ShortCircuit`` sets it to work."""
-    return Fault(
+    return InjectedFault(
         FaultKind.CORRUPTION, id_value=node_id, id_mask=_SENDER_MASK, extended=True, from_us=_NEVER_US, seed=node_id
     )
 

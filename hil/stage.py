@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from bus_sim.run import FLEET, BusRun
-from bus_sim.systems.stage import Stage as World
+from bus_sim.systems.stage import SystemStage
 from hil.device import Device
 from hil.notice import Notice
 from onboard.contract.codes import MachineState
@@ -24,7 +24,7 @@ BENCH_NODE = 254
 
 
 @dataclass(frozen=True)
-class Said(Generic[M]):
+class BenchMessage(Generic[M]):
     """One message at the end of its last frame: loop time in us, ``fleet`` or the device's name, and the message."""
 
     time_us: int
@@ -32,10 +32,10 @@ class Said(Generic[M]):
     message: M
 
 
-class Stage:
+class TestBench:
     """One run of one scenario. Times of deadlines are seconds of the run's clock."""
 
-    def __init__(self, world: World[Any], site: Site, machine: Machine, device: Device, site_text: str) -> None:
+    def __init__(self, world: SystemStage[Any], site: Site, machine: Machine, device: Device, site_text: str) -> None:
         """``world`` is the fleet without orders of its own, on ``site`` but for those."""
         self.world = world
         self.simulation: BusRun[Any] = world.run
@@ -43,7 +43,7 @@ class Stage:
         self.machine = machine
         self.device = device
         self.site_text = site_text
-        self.said: list[Said[Message]] = []
+        self.said: list[BenchMessage[Message]] = []
         simulation = self.simulation
         #: The bench's own node on the fleet bus.
         self.node = simulation.fleet.attach("bench", None)
@@ -88,21 +88,21 @@ class Stage:
         """The present: what is said from now on has this place or a later one in ``said``."""
         return len(self.said)
 
-    def heard(self, kind: type[M], since: int = 0) -> list[Said[M]]:
+    def heard(self, kind: type[M], since: int = 0) -> list[BenchMessage[M]]:
         """What anybody has said of one kind, on either bus, since a mark."""
         return self._all(kind, since)
 
-    def own(self, kind: type[M], since: int = 0) -> list[Said[M]]:
+    def own(self, kind: type[M], since: int = 0) -> list[BenchMessage[M]]:
         """What the device has said of one kind, on the fleet bus, since a mark."""
         return [one for one in self._all(kind, since) if one.bus == FLEET and self._is_own(one.message)]
 
     async def first(
         self, kind: type[M], what: str, within_s: float, where: Callable[[M], bool] = lambda _: True, since: int = 0
-    ) -> Said[M]:
+    ) -> BenchMessage[M]:
         """The first message of a kind that fits, said since a mark or coming. Fails the test where none comes."""
         place = since
 
-        def look() -> Said[M] | None:
+        def look() -> BenchMessage[M] | None:
             nonlocal place
             found = next((one for one in self._all(kind, place) if where(one.message)), None)
             place = len(self.said)
@@ -112,7 +112,7 @@ class Stage:
 
     async def first_own(
         self, kind: type[M], what: str, within_s: float, where: Callable[[M], bool] = lambda _: True, since: int = 0
-    ) -> Said[M]:
+    ) -> BenchMessage[M]:
         """The same of what the device says, or its sensors."""
         return await self.first(kind, what, within_s, lambda one: self._is_own(one) and where(one), since)
 
@@ -157,12 +157,12 @@ class Stage:
         self.world.power_up(self.machine.node_id)
 
     def _hear(self, time_us: int, bus: str, message: Message) -> None:
-        self.said.append(Said(time_us, bus, message))
+        self.said.append(BenchMessage(time_us, bus, message))
         self._notice.tell()
 
-    def _all(self, kind: type[M], since: int) -> list[Said[M]]:
+    def _all(self, kind: type[M], since: int) -> list[BenchMessage[M]]:
         said = self.said[since:]
-        return [Said(one.time_us, one.bus, one.message) for one in said if isinstance(one.message, kind)]
+        return [BenchMessage(one.time_us, one.bus, one.message) for one in said if isinstance(one.message, kind)]
 
     def _is_own(self, message: Message) -> bool:
         return message.sender == self.machine.node_id

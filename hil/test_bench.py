@@ -8,12 +8,12 @@ import pytest
 from hil.bench import Bench, Target
 from hil.device import BenchError
 from hil.play import missing, play
-from hil.scenarios.scenario import Scenario
+from hil.scenarios.scenario import BenchScenario
 from onboard.io.settings import BusOpenError
 
 
 def test_scenario(
-    bench: Bench, target: Target, scenario: Scenario, place: Path, record_property: Callable[[str, object], None]
+    bench: Bench, target: Target, scenario: BenchScenario, place: Path, record_property: Callable[[str, object], None]
 ) -> None:
     """The device does what it should, and leaves nothing wrong behind."""
     lacking = missing(scenario, target)

@@ -20,12 +20,12 @@ from onboard.gateway.settings import GatewayError
 from onboard.holon.holon import Holon
 from onboard.io.broker_address import is_mqtt_installed
 from onboard.io.console import ConsoleTelemetry, ManyTelemetry
-from onboard.io.endings import Ending
+from onboard.io.endings import ExitStatus
 from onboard.io.journal import FileJournal
 from onboard.io.networkd import write_network_files
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings
 from onboard.io.signals import terminated_as_interrupted
-from onboard.life import Life
+from onboard.life import ControllerLife
 from onboard.ports.broker import BrokerError
 from onboard.ports.telemetry import Telemetry
 from onboard.systems.contract import codecs_for
@@ -127,7 +127,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:
         where, remedy = args.journal or config.journal, "name another folder with --journal, or mend this one"
         print(f"onboard: journal {where}: {error.strerror or error}; {remedy}", file=sys.stderr)
-        return Ending.MISTAKE if error.errno in _MISTAKES else Ending.COMES_BACK
+        return ExitStatus.MISTAKE if error.errno in _MISTAKES else ExitStatus.COMES_BACK
 
 
 def _beside(args: argparse.Namespace, config: MachineConfig) -> GatewayMaker:
@@ -192,8 +192,8 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
 async def run(
     config: MachineConfig, fleet_settings: BusSettings, journal_directory: Path, gateway: GatewayMaker | None = None
 ) -> int:
-    """Run until stopped; the exit status (``Ending``)."""
-    life = Life(config.machine.name, journal_directory)
+    """Run until stopped; the exit status (``ExitStatus``)."""
+    life = ControllerLife(config.machine.name, journal_directory)
     with life.ended_by_signals():
         journal = FileJournal(journal_directory, journal_owner(config.site, config.machine))
         entries = journal.replay()

@@ -9,9 +9,9 @@ from typing import Any
 
 from onboard.contract.codes import Reason
 from onboard.controller.shell import Controller
-from onboard.io.endings import OWN_FAULTS, Ending, ending_of
+from onboard.io.endings import OWN_FAULTS, ExitStatus, ending_of
 from onboard.io.lasting_bus import LastingBus
-from onboard.io.lives import Lives
+from onboard.io.lives import LifeBook
 from onboard.io.open_bus import BusSettings, OpenBus, open_bus
 from onboard.io.signals import ended_by
 from onboard.io.watchdog import SystemdWatchdog
@@ -21,15 +21,15 @@ ALIVE_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class End:
+class LifeEnd:
     """What ended a life, and who brings the machine back."""
 
-    ending: Ending
+    ending: ExitStatus
     why: str = ""
     own_fault: bool = False
 
 
-class Life:
+class ControllerLife:
     """Made on the running loop. ``begin``, ``open_buses``, ``follow``, ``over``, ``end``, in this order."""
 
     def __init__(self, name: str, journal: Path) -> None:
@@ -38,15 +38,15 @@ class Life:
         self._name = name
         self._loop = asyncio.get_running_loop()
         self._begin_s = self._loop.time()
-        self._lives = Lives(journal)
+        self._lives = LifeBook(journal)
         self._befell = Reason.NONE
-        self._ended: asyncio.Future[End] = self._loop.create_future()
+        self._ended: asyncio.Future[LifeEnd] = self._loop.create_future()
         self._buses: list[OpenBus] = []
         self._watching: list[asyncio.Task[None]] = []
 
     def ended_by_signals(self) -> AbstractContextManager[None]:
         """A signal ends this life as its supervisor asks for: nothing is wrong."""
-        return ended_by(self._loop, lambda _: self._end(End(Ending.STOPPED)))
+        return ended_by(self._loop, lambda _: self._end(LifeEnd(ExitStatus.STOPPED)))
 
     def begin(self) -> None:
         """Tell how the last life ended, where that is worth telling."""
@@ -113,25 +113,25 @@ class Life:
         for task in self._watching:
             task.cancel()
 
-    def end(self) -> Ending:
+    def end(self) -> ExitStatus:
         """Write down and tell how it has ended; the exit status."""
         end = self._ended.result()
         lived_us = round((self._loop.time() - self._begin_s) * 1_000_000)
         ending = self._lives.end(end.ending, lived_us, own_fault=end.own_fault)
         if end.why:
-            after = "it waits for a person" if ending is Ending.WAITS_FOR_PERSON else "it is to be started again"
+            after = "it waits for a person" if ending is ExitStatus.WAITS_FOR_PERSON else "it is to be started again"
             print(f"onboard: {self._name}: {end.why}; {after}", file=sys.stderr, flush=True)
         return ending
 
-    def _end(self, end: End) -> None:
+    def _end(self, end: LifeEnd) -> None:
         if not self._ended.done():
             self._ended.set_result(end)
 
     async def _watch(self, bus: OpenBus) -> None:
-        self._end(End(Ending.COMES_BACK, f"the bus is gone: {await bus.wait_lost()}"))
+        self._end(LifeEnd(ExitStatus.COMES_BACK, f"the bus is gone: {await bus.wait_lost()}"))
 
     def _halted(self, controller: Controller, why: str) -> None:
         reason = controller.halted_for
         # Without a reason of its own it is the journal, whose medium may have room again.
-        ending = Ending.COMES_BACK if reason is None else ending_of(reason)
-        self._end(End(ending, f"halted: {why}", own_fault=reason in OWN_FAULTS))
+        ending = ExitStatus.COMES_BACK if reason is None else ending_of(reason)
+        self._end(LifeEnd(ending, f"halted: {why}", own_fault=reason in OWN_FAULTS))

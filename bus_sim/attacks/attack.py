@@ -19,7 +19,7 @@ TICK_US = 100_000
 
 
 @dataclass
-class Node:
+class AttackerNode:
     """The attacker's node. ``say`` takes a message under any sender, ``put`` any frame; both go out in order."""
 
     site: Site
@@ -34,7 +34,7 @@ class Node:
 class Attack:
     """One attack at work. It listens from power-up on, and nobody hears it before it begins. Times: loop time, us."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: AttackerNode) -> None:
         self.node = node
 
     def begin(self, now_us: int) -> None:

@@ -6,7 +6,7 @@ from bus_sim.attacks import frames, rights, words
 from bus_sim.attacks.attack import Attack
 
 
-class Entry(NamedTuple):
+class CatalogueEntry(NamedTuple):
     """An attack: what it does, and how long it lasts where nothing else is asked for, s."""
 
     attack: type[Attack]
@@ -18,22 +18,22 @@ class Entry(NamedTuple):
         return (self.attack.__doc__ or "").splitlines()[0]
 
 
-ATTACKS: Final[dict[str, Entry]] = {
-    "grant-refused": Entry(rights.GrantRefused, 120.0),
-    "grant-asked": Entry(rights.GrantAsked, 120.0),
-    "grant-away": Entry(rights.GrantAway),
-    "claim": Entry(rights.Claim),
-    "swap-cars": Entry(rights.SwapCars, 120.0),
-    "bit-off": Entry(frames.BitOff, 120.0),
-    "mutated": Entry(frames.Mutated, 120.0),
-    "replay": Entry(frames.Replay),
-    "flood": Entry(frames.Flood, 20.0),
-    "stop": Entry(words.Stop, 20.0),
-    "other-site": Entry(words.OtherSite),
-    "newer-boot": Entry(words.NewerBoot),
-    "block-all": Entry(words.BlockAll),
-    "hold-all": Entry(words.HoldAll),
-    "wrong-time": Entry(words.WrongTime),
-    "orders": Entry(words.Orders, 120.0),
-    "answers": Entry(words.WrongAnswers, 120.0),
+ATTACKS: Final[dict[str, CatalogueEntry]] = {
+    "grant-refused": CatalogueEntry(rights.GrantRefused, 120.0),
+    "grant-asked": CatalogueEntry(rights.GrantAsked, 120.0),
+    "grant-away": CatalogueEntry(rights.GrantAway),
+    "claim": CatalogueEntry(rights.FalseClaim),
+    "swap-cars": CatalogueEntry(rights.SwapCars, 120.0),
+    "bit-off": CatalogueEntry(frames.BitOff, 120.0),
+    "mutated": CatalogueEntry(frames.Mutated, 120.0),
+    "replay": CatalogueEntry(frames.Replay),
+    "flood": CatalogueEntry(frames.Flood, 20.0),
+    "stop": CatalogueEntry(words.ForgedStop, 20.0),
+    "other-site": CatalogueEntry(words.OtherSite),
+    "newer-boot": CatalogueEntry(words.NewerBoot),
+    "block-all": CatalogueEntry(words.BlockAll),
+    "hold-all": CatalogueEntry(words.HoldAll),
+    "wrong-time": CatalogueEntry(words.WrongTime),
+    "orders": CatalogueEntry(words.ForgedOrders, 120.0),
+    "answers": CatalogueEntry(words.WrongAnswers, 120.0),
 }

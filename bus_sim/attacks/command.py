@@ -11,9 +11,9 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from bus_sim.attacks.catalogue import ATTACKS
-from bus_sim.attacks.trials import Plan, Result, run_attacks
+from bus_sim.attacks.trials import AttackResult, TrialSettings, run_attacks
 from bus_sim.campaign.command import read_seeds
-from bus_sim.campaign.report import Verdict
+from bus_sim.campaign.report import RunVerdict
 from bus_sim.demand import DemandError
 from bus_sim.sites import find_site
 from bus_sim.systems.registry import simulated_of
@@ -21,7 +21,7 @@ from bus_sim.systems.system import Occasion
 from onboard.config.problems import nearest
 
 #: In the order of the table's columns.
-_COLUMNS = (*(verdict for verdict in reversed(Verdict)),)
+_COLUMNS = (*(verdict for verdict in reversed(RunVerdict)),)
 
 HELP = """\
 Each attack is played by a node that sees only the bus, under each seed, on a site that runs its usual orders; it is
@@ -65,7 +65,7 @@ def add_attack(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 def run_attack_command(args: argparse.Namespace) -> int:
     """Play them. Raises ``DemandError`` for a mistake in the command line, ``SiteNotFoundError`` for no such site."""
     plan, attacks, seeds = _plan(args), _attacks(args.attacks), read_seeds(args.seeds)
-    console, results = Console(), list[Result]()
+    console, results = Console(), list[AttackResult]()
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("attacks", total=len(attacks) * len(seeds))
@@ -80,7 +80,7 @@ def run_attack_command(args: argparse.Namespace) -> int:
     return 0 if all(result.is_harmless for result in results) else 1
 
 
-def _plan(args: argparse.Namespace) -> Plan:
+def _plan(args: argparse.Namespace) -> TrialSettings:
     site = find_site(args.site)
     if not 1 <= args.node <= 255:
         raise DemandError(f"--node {args.node}: must be from 1 to 255")
@@ -96,7 +96,7 @@ def _plan(args: argparse.Namespace) -> Plan:
     demand = system.on(Occasion.ATTACK, site)
     if args.cars is not None or args.orders is not None:
         demand = system.usual(site, {"cars": args.cars, "orders": args.orders, "apart": demand.apart_s})
-    return Plan(args.site, args.node, args.limit, demand)
+    return TrialSettings(args.site, args.node, args.limit, demand)
 
 
 def _attacks(text: str | None) -> list[str]:
@@ -109,7 +109,7 @@ def _attacks(text: str | None) -> list[str]:
     return list(dict.fromkeys(named))
 
 
-def table(site: str, attacks: Sequence[str], results: Sequence[Result]) -> list[str]:
+def table(site: str, attacks: Sequence[str], results: Sequence[AttackResult]) -> list[str]:
     """A row for each attack, then a line for each run that was not harmless."""
     came = Counter((result.attack, result.report.verdict) for result in results)
     used = [column for column in _COLUMNS if any(verdict is column for _, verdict in came)]
@@ -125,7 +125,7 @@ def table(site: str, attacks: Sequence[str], results: Sequence[Result]) -> list[
     ]
 
 
-def to_json(plan: Plan, results: Sequence[Result]) -> dict[str, object]:
+def to_json(plan: TrialSettings, results: Sequence[AttackResult]) -> dict[str, object]:
     """The plan and one entry a run, as ``json.dump`` takes them; units stand in the keys."""
     return {
         "site": plan.site,

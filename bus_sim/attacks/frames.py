@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from bus_sim.attacks.attack import Attack, Node
+from bus_sim.attacks.attack import Attack, AttackerNode
 from onboard.core.frame import Frame
 
 #: The lowest byte of an identifier is the sender's node-ID.
@@ -48,7 +48,7 @@ class BitOff(_Frames):
 class Mutated(_Frames):
     """Fifty frames a second, each one that was heard with up to three bits off and now and then another identifier."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: AttackerNode) -> None:
         super().__init__(node)
         self._heard: deque[Frame] = deque(maxlen=500)
 
@@ -71,7 +71,7 @@ class Mutated(_Frames):
 class Replay(_Frames):
     """The last minute is said again as it was recorded, at its own pace, over and over."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: AttackerNode) -> None:
         super().__init__(node)
         self._past: deque[tuple[int, Frame]] = deque(maxlen=_MOST)
         self._shift_us: int | None = None

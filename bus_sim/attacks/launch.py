@@ -3,7 +3,7 @@
 import random
 from typing import Any
 
-from bus_sim.attacks.attack import TICK_US, Attack, Node
+from bus_sim.attacks.attack import TICK_US, Attack, AttackerNode
 from bus_sim.attacks.catalogue import ATTACKS
 from bus_sim.can.node import SimulatedBus
 from bus_sim.faults.injection import Injection
@@ -29,7 +29,7 @@ class _Attacker:
         self._bus: SimulatedBus = run.fleet.attach(name, node_id)
         self._decoder = Decoder(run.codecs.fleet)
         chance = random.Random(f"attack:{run.site.name}:{injection}")
-        node = Node(run.site, node_id, chance, self._say, self._put, lambda: self._bus.waiting_to_send)
+        node = AttackerNode(run.site, node_id, chance, self._say, self._put, lambda: self._bus.waiting_to_send)
         self._is_begun = False
         what = injection.text("name")
         own = simulated_of(run.site).attacks.get(what)

@@ -1,6 +1,6 @@
 """Forged words about rights and about cars: who may be where, and what stands where."""
 
-from bus_sim.attacks.attack import Attack, Node, Tokens
+from bus_sim.attacks.attack import Attack, AttackerNode, Tokens
 from onboard.contract.codes import TokenKind
 from onboard.contract.constants import ANY_STATION, OUTSIDE
 from onboard.contract.messages import CarAt, Message, Reference, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
@@ -14,7 +14,7 @@ _AGAIN_US = 2_000_000
 class _AboutTokens(Attack):
     """Follows what the bus tells of tokens."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: AttackerNode) -> None:
         super().__init__(node)
         self.tokens = Tokens()
 
@@ -60,7 +60,7 @@ class GrantAway(_AboutTokens):
             self.grant(TokenKey(message.token_kind, message.token), self.node.node_id, ahead=1_000)
 
 
-class Claim(_AboutTokens):
+class FalseClaim(_AboutTokens):
     """Whatever is granted, the attacker says at once that it holds it, under a newer version."""
 
     def hear(self, message: Message, now_us: int) -> None:
@@ -75,7 +75,7 @@ class Claim(_AboutTokens):
 class SwapCars(Attack):
     """Says of two cars that each stands where the other does; and gives their tokens away after it."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: AttackerNode) -> None:
         super().__init__(node)
         self._cars: dict[Reference, CarAt] = {}
         self._due_us = 0

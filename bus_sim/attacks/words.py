@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 
-from bus_sim.attacks.attack import TICK_US, Attack, Node
+from bus_sim.attacks.attack import TICK_US, Attack, AttackerNode
 from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode, Reason
 from onboard.contract.messages import Blocked, BusTime, EmergencyStop, Heartbeat, ManualOrder, Message, SyncRequest
 from onboard.core.bus_time import BUS_TIME_MODULUS
@@ -18,7 +18,7 @@ class Repeated(Attack, ABC):
 
     every_us = 5 * _SECOND_US
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: AttackerNode) -> None:
         super().__init__(node)
         self._due_us = 0
 
@@ -34,7 +34,7 @@ class Repeated(Attack, ABC):
                 self.node.say(word)
 
 
-class Stop(Repeated):
+class ForgedStop(Repeated):
     """An emergency stop that nobody of the site said."""
 
     every_us = 10 * _SECOND_US
@@ -57,7 +57,7 @@ class OtherSite(Repeated):
 class NewerBoot(Repeated):
     """Tells each machine that it was known under a newer boot counter: as if its journal were old."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: AttackerNode) -> None:
         super().__init__(node)
         self._boots: dict[int, int] = {}
 
@@ -98,7 +98,7 @@ class WrongTime(Repeated):
 
     every_us = _SECOND_US
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: AttackerNode) -> None:
         super().__init__(node)
         self._ahead_us: int | None = None
 
@@ -113,12 +113,12 @@ class WrongTime(Repeated):
             yield BusTime(self.node.node_id, (now_us + self._ahead_us + 3_600 * _SECOND_US) % BUS_TIME_MODULUS)
 
 
-class Orders(Repeated):
+class ForgedOrders(Repeated):
     """What only an operator's station may order, in the words of the site's system."""
 
     every_us = 10 * TICK_US
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: AttackerNode) -> None:
         super().__init__(node)
         self.number = node.chance.randint(1, 10_000)
 

@@ -11,10 +11,10 @@ from typing import Any
 from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.recovery import ADMITTED
 from bus_sim.campaign.trial import STEP_US, stage_of
-from bus_sim.faults.scenario import Scenario
+from bus_sim.faults.scenario import FaultScenario
 from bus_sim.run import run_until
 from bus_sim.systems.registry import simulated_of
-from bus_sim.systems.stage import Stage
+from bus_sim.systems.stage import SystemStage
 from bus_sim.systems.system import Occasion
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.contract.constants import MOBILE_KINDS
@@ -71,7 +71,7 @@ def cold_start(site: Site, name: str, at_s: float, missing: str | None) -> Start
 
 async def _cold_start(site: Site, name: str, at_s: float, missing: str | None, loop: VirtualTimeLoop) -> Start:
     busy = simulated_of(site).on(Occasion.BUSY, site)
-    stage = stage_of(site, Scenario(name, 1, at_s + OFF_S + STARTS_S, busy), loop)
+    stage = stage_of(site, FaultScenario(name, 1, at_s + OFF_S + STARTS_S, busy), loop)
     run = stage.run
     for medium in run.devices.values():
         # A device bus has several nodes, so that a frame is acknowledged though the controller is off.
@@ -104,7 +104,7 @@ async def _cold_start(site: Site, name: str, at_s: float, missing: str | None, l
     return Start(name, at_s, missing, longest_us / 1e6, late, tuple(_wrong(stage, judges)))
 
 
-def _wrong(stage: Stage[Any], judges: Judges) -> Iterator[str]:
+def _wrong(stage: SystemStage[Any], judges: Judges) -> Iterator[str]:
     """What must never happen, and machines that halted."""
     unsafe, _ = judges.finish()
     yield from stage.violations()

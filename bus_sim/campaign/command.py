@@ -16,10 +16,10 @@ from bus_sim.campaign import table
 from bus_sim.campaign.cold_start import cold_starts
 from bus_sim.campaign.engine import on_cores, on_dask
 from bus_sim.campaign.ledger import Ledger
-from bus_sim.campaign.points import Scene, Single, count, points, reference
+from bus_sim.campaign.points import SceneOccasion, Single, count, points, reference
 from bus_sim.campaign.profiles import PROFILES, kinds_for
 from bus_sim.campaign.report import FAILURES
-from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_points, run_seed
+from bus_sim.campaign.runner import CampaignSettings, FaultPoint, TrialResult, run_point, run_points, run_seed
 from bus_sim.campaign.strangers import StrangerPlan, play_pairs
 from bus_sim.campaign.trial import play
 from bus_sim.demand import DemandError
@@ -85,8 +85,8 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
     parser.add_argument(
         "--scene",
-        choices=[str(one) for one in Scene],
-        default=str(Scene.ALONE),
+        choices=[str(one) for one in SceneOccasion],
+        default=str(SceneOccasion.ALONE),
         help="with --exhaustive: one car alone, or three that overlap (default: alone)",
     )
     parser.add_argument(
@@ -159,7 +159,7 @@ def run_campaign_command(args: argparse.Namespace) -> int:
         return _start_cold(args, site, console)
     ledger = _ledger(args, plan)
     trials, total = _trials(args, plan, site, console, ledger)
-    results: list[Result] = []
+    results: list[TrialResult] = []
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("runs", total=total)
@@ -180,7 +180,7 @@ def run_campaign_command(args: argparse.Namespace) -> int:
     return 1 if has_failed or (ledger is not None and ledger.has_failed) else 0
 
 
-def _strangers(args: argparse.Namespace, plan: Plan, site: Site) -> int:
+def _strangers(args: argparse.Namespace, plan: CampaignSettings, site: Site) -> int:
     system, seeds = simulated_of(site), read_seeds(args.seeds)
     if system.worker is None:
         raise DemandError(
@@ -210,7 +210,7 @@ def _start_cold(args: argparse.Namespace, site: Site, console: Console) -> int:
     return 1 if bad else 0
 
 
-def _why(result: Result) -> str:
+def _why(result: TrialResult) -> str:
     """Of a failure, why and with which faults."""
     if result.report.verdict not in FAILURES:
         return ""
@@ -218,7 +218,7 @@ def _why(result: Result) -> str:
     return "; ".join([result.report.why(), *(str(fault) for fault in least.faults)])
 
 
-def _ledger(args: argparse.Namespace, plan: Plan) -> Ledger | None:
+def _ledger(args: argparse.Namespace, plan: CampaignSettings) -> Ledger | None:
     """The results so far, where there is a file for them; it knows a campaign by all that its trials have in common."""
     if args.add_to is None:
         return None
@@ -234,8 +234,8 @@ def _ledger(args: argparse.Namespace, plan: Plan) -> Ledger | None:
 
 
 def _trials(
-    args: argparse.Namespace, plan: Plan, site: Site, console: Console, ledger: Ledger | None
-) -> tuple[Iterator[Result], int]:
+    args: argparse.Namespace, plan: CampaignSettings, site: Site, console: Console, ledger: Ledger | None
+) -> tuple[Iterator[TrialResult], int]:
     """What is to be played, as an iterator over results, and how many they will be."""
     jobs = args.jobs or os.cpu_count() or 1
     play_all = partial(on_dask, args.dask) if args.dask else partial(on_cores, jobs)
@@ -247,7 +247,9 @@ def _trials(
         return play_all(partial(run_seed, plan), left), len(left)
     counts = count(site, reference(plan.site, plan.limit_s, plan.scene))
     plan = replace(plan, usual_wait_s=counts.longest_wait_s)
-    every = [Point(number, one) for number, one in enumerate(points(site, Single(args.exhaustive), counts), start=1)]
+    every = [
+        FaultPoint(number, one) for number, one in enumerate(points(site, Single(args.exhaustive), counts), start=1)
+    ]
     chosen = every if args.sample is None else random.Random(0).sample(every, min(args.sample, len(every)))
     console.print(f"{args.exhaustive}s on {site.name}: {len(chosen)} of {len(every)} points", highlight=False)
     chosen = chosen if ledger is None else [one for one in chosen if one.number not in ledger.done]
@@ -256,20 +258,20 @@ def _trials(
     return run_points(plan, chosen, jobs), len(chosen)
 
 
-def _plan(args: argparse.Namespace, site: Site) -> Plan:
+def _plan(args: argparse.Namespace, site: Site) -> CampaignSettings:
     """A plan, of which the first seed's customers or orders have been drawn once to see that they can be."""
     _check(args)
     system = simulated_of(site)
     if args.exhaustive is not None:
-        scene = Scene(args.scene)
+        scene = SceneOccasion(args.scene)
         demand = system.on(Occasion(scene), site)
         limit_s = args.limit or system.patience_s(site, demand, 1)
-        return Plan(args.site, args.exhaustive, limit_s, demand, out=args.out, scene=scene)
+        return CampaignSettings(args.site, args.exhaustive, limit_s, demand, out=args.out, scene=scene)
     if args.faults != "none" and not kinds_for(args.faults, site):
         raise DemandError(f"--faults {args.faults}: {site.name} is a {site.system}, which has none of these")
     demand = system.usual(site, {"cars": args.cars, "orders": args.orders, "apart": args.apart})
     system.check(site, demand, read_seeds(args.seeds)[0])
-    return Plan(
+    return CampaignSettings(
         args.site,
         args.faults,
         args.limit,
@@ -294,7 +296,7 @@ def _check(args: argparse.Namespace) -> None:
     _check_seconds("limit", args.limit)
     if args.faults_an_hour is not None and not 0 < args.faults_an_hour <= MOST_AN_HOUR:
         raise DemandError(f"--faults-an-hour {args.faults_an_hour:g}: must be above 0, and at most {MOST_AN_HOUR}")
-    if args.scene != str(Scene.ALONE) and args.exhaustive is None:
+    if args.scene != str(SceneOccasion.ALONE) and args.exhaustive is None:
         raise DemandError(f"--scene {args.scene}: goes with --exhaustive; add it, or leave this out")
     if args.sample is not None and (args.sample < 1 or (args.exhaustive is None and not args.cold_start)):
         raise DemandError(f"--sample {args.sample}: must be 1 or more, and goes with --exhaustive or --cold-start")
@@ -342,7 +344,7 @@ def run_scenario(path: Path, trace: Path | None, json_file: Path | None) -> int:
     for line in told:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     if json_file is not None:
-        result = Result(scenario.seed, report)
-        text = json.dumps(table.to_json(Plan(scenario.site, "scenario"), [result]), indent=2)
+        result = TrialResult(scenario.seed, report)
+        text = json.dumps(table.to_json(CampaignSettings(scenario.site, "scenario"), [result]), indent=2)
         json_file.write_text(text + "\n", encoding="utf-8")
     return 1 if report.verdict in FAILURES else 0

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from bus_sim.campaign.trial import stage_of
-from bus_sim.faults.scenario import Scenario
+from bus_sim.faults.scenario import FaultScenario
 from bus_sim.journal import SimulatedJournal
 from bus_sim.run import EventLog, NoWatchdog, run_until
 from bus_sim.systems.registry import simulated_of
@@ -45,7 +45,7 @@ CORPUS_S = 400.0
 
 
 @dataclass
-class Outcome:
+class FuzzOutcome:
     """What came of it. ``reasons`` are drops as the controller counted them, ``halts`` its words, ``sizes`` by time."""
 
     frames: int = 0
@@ -88,7 +88,7 @@ def record(site: Site, seed: int) -> tuple[list[Frame], list[Frame]]:
 
 async def _record(site: Site, seed: int, loop: VirtualTimeLoop) -> tuple[list[Frame], list[Frame]]:
     few = simulated_of(site).on(Occasion.FEW, site)
-    stage = stage_of(site, Scenario(site.name, seed, CORPUS_S, few), loop)
+    stage = stage_of(site, FaultScenario(site.name, seed, CORPUS_S, few), loop)
     fleet: list[Frame] = []
     devices: list[Frame] = []
     stage.run.fleet.tap(lambda frame, _time_us, _sender: fleet.append(frame))
@@ -149,9 +149,9 @@ class Fuzzer:
         others = [frame for frame in fleet if frame.arbitration_id & 0xFF != machine.node_id]
         own = [frame for frame in devices if frame.arbitration_id & 0xFF == machine.node_id] or devices
         self._sources = (_mutations(self._chance, others, machine.node_id), _mutations(self._chance, own, 0))
-        self.outcome = Outcome()
+        self.outcome = FuzzOutcome()
 
-    def run(self, frames: int, looks: int = 4) -> Outcome:
+    def run(self, frames: int, looks: int = 4) -> FuzzOutcome:
         """Feed so many frames; the size of the controller's memory is noted ``looks`` times."""
         loop = VirtualTimeLoop()
         run_on(loop, self._run(frames, max(1, frames // looks), loop))

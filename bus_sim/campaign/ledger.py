@@ -14,7 +14,7 @@ from pathlib import Path
 
 import bus_sim
 import onboard
-from bus_sim.campaign.report import FAILURES, Verdict
+from bus_sim.campaign.report import FAILURES, RunVerdict
 from bus_sim.demand import DemandError
 
 #: Files that a run depends on, beside the interpreter.
@@ -40,7 +40,7 @@ class Ledger:
     path: Path
     campaign: str
     #: Verdicts of this state by the number of the seed or point, with why.
-    done: dict[int, tuple[Verdict, str]] = field(default_factory=dict)
+    done: dict[int, tuple[RunVerdict, str]] = field(default_factory=dict)
     others: int = 0
 
     @classmethod
@@ -57,7 +57,7 @@ class Ledger:
 
     def _take(self, line: dict[str, str | int]) -> None:
         if (line["state"], line["campaign"]) == (state(), self.campaign):
-            self.done[int(line["number"])] = Verdict(str(line["verdict"])), str(line["why"])
+            self.done[int(line["number"])] = RunVerdict(str(line["verdict"])), str(line["why"])
         else:
             self.others += 1
 
@@ -65,7 +65,7 @@ class Ledger:
         """Those that were not played under this state."""
         return [number for number in numbers if number not in self.done]
 
-    def add(self, number: int, verdict: Verdict, why: str) -> None:
+    def add(self, number: int, verdict: RunVerdict, why: str) -> None:
         """One trial more, on disk at once."""
         self.done[number] = verdict, why
         entry = {"state": state(), "campaign": self.campaign, "number": number, "verdict": verdict.value, "why": why}
@@ -80,7 +80,7 @@ class Ledger:
     def lines(self) -> list[str]:
         """What the file has of this state by now."""
         counts = Counter(verdict for verdict, _ in self.done.values())
-        told = ", ".join(f"{verdict.value} {counts[verdict]}" for verdict in Verdict if counts[verdict])
+        told = ", ".join(f"{verdict.value} {counts[verdict]}" for verdict in RunVerdict if counts[verdict])
         failed = [
             f"  {number}: {verdict.value}: {why}"
             for number, (verdict, why) in sorted(self.done.items())

@@ -11,9 +11,9 @@ from functools import partial
 
 from bus_sim.campaign.journal_points import journal_faults
 from bus_sim.campaign.trial import STEP_US
-from bus_sim.can.faults import Fault, FaultKind
+from bus_sim.can.faults import FaultKind, InjectedFault
 from bus_sim.faults.injection import AnyFault, Injection
-from bus_sim.faults.scenario import Scenario
+from bus_sim.faults.scenario import FaultScenario
 from bus_sim.options import RunOptions
 from bus_sim.run import run_until
 from bus_sim.sites import find_site
@@ -38,7 +38,7 @@ class Single(StrEnum):
     JOURNAL = "journal"
 
 
-class Scene(StrEnum):
+class SceneOccasion(StrEnum):
     """Who comes in the reference scene: an occasion (``bus_sim.systems.system``)."""
 
     ALONE = "alone"
@@ -46,7 +46,7 @@ class Scene(StrEnum):
 
 
 @dataclass
-class Counts:
+class SceneCounts:
     """What the scene has: who sent each frame of the fleet bus; by machine, frames queued on any bus and entries."""
 
     fleet_senders: list[str]
@@ -55,24 +55,24 @@ class Counts:
     longest_wait_s: float
 
 
-def reference(site_name: str, limit_s: float | None, scene: Scene = Scene.ALONE) -> Scenario:
+def reference(site_name: str, limit_s: float | None, scene: SceneOccasion = SceneOccasion.ALONE) -> FaultScenario:
     """The scene without a fault; ``limit_s`` is the longest that it may take under one, None: as its system has it."""
     site = find_site(site_name)
     system = simulated_of(site)
     demand = system.on(Occasion(scene), site)
-    return Scenario(site_name, 1, limit_s or system.patience_s(site, demand, 1), demand)
+    return FaultScenario(site_name, 1, limit_s or system.patience_s(site, demand, 1), demand)
 
 
-def count(site: Site, scenario: Scenario) -> Counts:
+def count(site: Site, scenario: FaultScenario) -> SceneCounts:
     """Play the scene without a fault, and count."""
     loop = VirtualTimeLoop()
     return run_on(loop, _count(site, scenario, loop))
 
 
-async def _count(site: Site, scenario: Scenario, loop: VirtualTimeLoop) -> Counts:
+async def _count(site: Site, scenario: FaultScenario, loop: VirtualTimeLoop) -> SceneCounts:
     stage = simulated_of(site).stage(site, RunOptions(seed=scenario.seed, demand=scenario.demand), loop)
     run, machines = stage.run, stage.run.site.machines
-    found = Counts([], dict.fromkeys((one.name for one in machines.values()), 0), {}, 0.0)
+    found = SceneCounts([], dict.fromkeys((one.name for one in machines.values()), 0), {}, 0.0)
 
     def on_fleet(_frame: Frame, _time_us: int, sender: str) -> None:
         found.fleet_senders.append(sender)
@@ -91,22 +91,22 @@ async def _count(site: Site, scenario: Scenario, loop: VirtualTimeLoop) -> Count
     return found
 
 
-def points(site: Site, single: Single, counts: Counts) -> list[AnyFault]:
+def points(site: Site, single: Single, counts: SceneCounts) -> list[AnyFault]:
     """Every point of a kind, in an order that is always the same."""
     return _POINTS[single](site, counts)
 
 
-def _frames(kind: FaultKind, delay_us: int, site: Site, counts: Counts) -> list[AnyFault]:
+def _frames(kind: FaultKind, delay_us: int, site: Site, counts: SceneCounts) -> list[AnyFault]:
     """The n-th frame of the fleet bus, at each of its receivers."""
     return [
-        Fault(kind, receivers=(machine.name,), nth=number, delay_us=delay_us)
+        InjectedFault(kind, receivers=(machine.name,), nth=number, delay_us=delay_us)
         for number, sender in enumerate(counts.fleet_senders, start=1)
         for machine in site.machines.values()
         if machine.name != sender
     ]
 
 
-def _crashes(_: Site, counts: Counts) -> list[AnyFault]:
+def _crashes(_: Site, counts: SceneCounts) -> list[AnyFault]:
     """Before each frame, and before and after each journal write is durable; the power is off short or long."""
     found: list[AnyFault] = []
     for name, frames in counts.sent.items():
@@ -121,7 +121,7 @@ def _crashes(_: Site, counts: Counts) -> list[AnyFault]:
     return found
 
 
-_POINTS: dict[Single, Callable[[Site, Counts], list[AnyFault]]] = {
+_POINTS: dict[Single, Callable[[Site, SceneCounts], list[AnyFault]]] = {
     Single.OMISSION: partial(_frames, FaultKind.OMISSION, 0),
     Single.DUPLICATE: partial(_frames, FaultKind.DUPLICATE, AGAIN_US),
     Single.CRASH: _crashes,

@@ -8,7 +8,7 @@ from enum import StrEnum
 from functools import partial
 from typing import Any, Final
 
-from bus_sim.can.faults import Fault, FaultInjector, FaultKind
+from bus_sim.can.faults import FaultInjector, FaultKind, InjectedFault
 from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.faults.table import KINDS, Group
 from bus_sim.run import BusRun
@@ -46,7 +46,7 @@ def healed_us(faults: Iterable[AnyFault]) -> int:
     """When the last fault that has an end by itself is over, us of loop time; crashes end when power comes back."""
     ends = [0]
     for fault in faults:
-        if isinstance(fault, Fault):
+        if isinstance(fault, InjectedFault):
             ends.append(fault.until_us or fault.from_us)
             continue
         settings = KINDS[fault.kind].settings
@@ -66,7 +66,7 @@ def is_of_clock(fault: AnyFault) -> bool:
     return isinstance(fault, Injection) and KINDS[fault.kind].group is Group.CLOCK
 
 
-class Recovery:
+class RecoveryMeasure:
     """Measures one run; to be made before ``BusRun.start``. ``longest_us`` and ``counts`` are by measure."""
 
     def __init__(self, simulation: BusRun[Any], faults: Iterable[AnyFault]) -> None:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from bus_sim.campaign.recovery import Measure
-from bus_sim.can.faults import Fault
-from bus_sim.faults.scenario import Scenario
+from bus_sim.can.faults import InjectedFault
+from bus_sim.faults.scenario import FaultScenario
 
 #: With all faults over and everybody served, all machines run and all mirrors are equal within this, us: several rounds
 #: of heartbeats and statements.
@@ -15,7 +15,7 @@ CONVERGED_US = 120_000_000
 CLOCKS_SERVED_US = 300_000_000
 
 
-class Verdict(StrEnum):
+class RunVerdict(StrEnum):
     """What came of a run, the worst first."""
 
     VIOLATION = "VIOLATION"
@@ -34,27 +34,27 @@ class Verdict(StrEnum):
 
 #: What makes a campaign look closer: a trace and a shrunk scenario are kept.
 FAILURES = (
-    Verdict.VIOLATION,
-    Verdict.CRASHED,
-    Verdict.HUNG,
-    Verdict.STOPPED,
-    Verdict.NOT_SERVED,
-    Verdict.NOT_LIVE,
-    Verdict.APART,
-    Verdict.LATE,
+    RunVerdict.VIOLATION,
+    RunVerdict.CRASHED,
+    RunVerdict.HUNG,
+    RunVerdict.STOPPED,
+    RunVerdict.NOT_SERVED,
+    RunVerdict.NOT_LIVE,
+    RunVerdict.APART,
+    RunVerdict.LATE,
 )
 
 
 @dataclass(frozen=True)
-class Report:
+class TrialReport:
     """What one trial came to; times in s of simulated time. customers, or orders, are counted.
 
     ``violations``: what the plant's oracle saw happen, and rules of safety that the checkers saw broken on the buses.
     ``stalls``: rules of liveness that were broken in time without faults. ``recovery``: longest time by measure, us.
     """
 
-    scenario: Scenario
-    verdict: Verdict
+    scenario: FaultScenario
+    verdict: RunVerdict
     violations: tuple[str, ...] = ()
     stalls: tuple[str, ...] = ()
     halted: tuple[str, ...] = ()
@@ -75,7 +75,7 @@ class Report:
         """One line for a person."""
         if self.error:
             return self.error
-        if self.verdict is Verdict.LATE:
+        if self.verdict is RunVerdict.LATE:
             took_s, most_s = dict(self.recovery)[Measure.HEAL_SERVED] / 1e6, CLOCKS_SERVED_US / 1e6
             return f"all are served {took_s:.0f} s after the clocks were right, not within {most_s:g} s"
         said = self.violations or self.halted or (() if self.waiting else self.stalls)
@@ -84,6 +84,6 @@ class Report:
         return said[0] if said else f"{self.waiting} still waiting after {self.simulated_s:.0f} s"
 
 
-def kinds_of(scenario: Scenario) -> Counter[str]:
+def kinds_of(scenario: FaultScenario) -> Counter[str]:
     """How many faults of each kind a scenario has."""
-    return Counter(fault.kind.value if isinstance(fault, Fault) else fault.kind for fault in scenario.faults)
+    return Counter(fault.kind.value if isinstance(fault, InjectedFault) else fault.kind for fault in scenario.faults)

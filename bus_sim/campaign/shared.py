@@ -18,12 +18,12 @@ from types import FrameType
 from typing import Any, NamedTuple, NoReturn
 
 from bus_sim.campaign.limits import WallLimitError, end_after, event_limit, wall_limit_s
-from bus_sim.campaign.report import Report, Verdict
+from bus_sim.campaign.report import RunVerdict, TrialReport
 from bus_sim.campaign.trial import HANGS, hung, play_stage
 from bus_sim.faults.arm import actions_for, arm
 from bus_sim.faults.controllers import lose_power
 from bus_sim.faults.injection import Injection
-from bus_sim.faults.scenario import Scenario
+from bus_sim.faults.scenario import FaultScenario
 from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
 from bus_sim.sites import find_site
@@ -39,11 +39,11 @@ class Crash(NamedTuple):
     fault: Injection
 
 
-class Answer(NamedTuple):
+class PointAnswer(NamedTuple):
     """What came of a point."""
 
     number: int
-    report: Report
+    report: TrialReport
 
 
 def can_share() -> bool:
@@ -58,8 +58,8 @@ def is_shared(fault: Injection) -> bool:
 
 
 def play_shared(
-    scenario: Scenario, crashes: Sequence[Crash], usual_wait_s: float | None, jobs: int
-) -> Iterator[Answer]:
+    scenario: FaultScenario, crashes: Sequence[Crash], usual_wait_s: float | None, jobs: int
+) -> Iterator[PointAnswer]:
     """All points of a scene, as they come in, ``jobs`` at a time.
 
     ``scenario``: the scene without a fault. Raises ``RuntimeError`` where the process of the scene failed.
@@ -74,7 +74,7 @@ def play_shared(
     try:
         while open_numbers:
             try:
-                answer: Answer = answers.recv()
+                answer: PointAnswer = answers.recv()
             except EOFError:
                 process.join()
                 said = f"the scene ended with status {process.exitcode}, and {len(open_numbers)} points are open"
@@ -88,7 +88,7 @@ def play_shared(
 
 
 def _play_scene(
-    there: Connection, scenario: Scenario, crashes: Sequence[Crash], usual_wait_s: float | None, jobs: int
+    there: Connection, scenario: FaultScenario, crashes: Sequence[Crash], usual_wait_s: float | None, jobs: int
 ) -> None:
     """The process of the scene; a copy of it never comes back from here."""
     signal.signal(signal.SIGTERM, _end)
@@ -99,7 +99,7 @@ def _play_scene(
             # Those that never came: the power did not fail, and what came of the scene came of them.
             for crash in crashes:
                 if crash.number not in copies.made:
-                    there.send(Answer(crash.number, _of(report, scenario, crash)))
+                    there.send(PointAnswer(crash.number, _of(report, scenario, crash)))
             copies.collect(most=0)
         else:
             copies.answer(_of(report, scenario, copies.mine))
@@ -117,11 +117,13 @@ def _end(_number: int, _frame: FrameType | None) -> None:
     sys.exit(1)
 
 
-def _of(report: Report, scenario: Scenario, crash: Crash) -> Report:
+def _of(report: TrialReport, scenario: FaultScenario, crash: Crash) -> TrialReport:
     return replace(report, scenario=scenario.with_faults([crash.fault]))
 
 
-def _play(scenario: Scenario, crashes: Sequence[Crash], usual_wait_s: float | None, copies: "Copies") -> Report:
+def _play(
+    scenario: FaultScenario, crashes: Sequence[Crash], usual_wait_s: float | None, copies: "Copies"
+) -> TrialReport:
     """The scene, or in a copy the point; set up as ``trial.play`` does for one of them."""
     site = find_site(scenario.site)
     # Any of them: until it strikes all are the same, and none has an end by itself.
@@ -129,7 +131,7 @@ def _play(scenario: Scenario, crashes: Sequence[Crash], usual_wait_s: float | No
     loop = VirtualTimeLoop()
     loop.event_limit = event_limit(scenario.limit_s)
 
-    async def main() -> Report:
+    async def main() -> TrialReport:
         stage = simulated_of(site).stage(site, RunOptions(seed=scenario.seed, demand=scenario.demand), loop)
         actions = {**actions_for(site), "crash": lambda run, _: Moments(run, crashes, copies).watch()}
         arm(stage.run, scenario.faults, actions)
@@ -181,7 +183,7 @@ class Moments:
 class Copies:
     """Processes that go on from here, ``jobs`` of them at a time; ``to`` is told their answers."""
 
-    def __init__(self, scenario: Scenario, jobs: int, to: Connection) -> None:
+    def __init__(self, scenario: FaultScenario, jobs: int, to: Connection) -> None:
         #: In a copy: the point that it plays.
         self.mine: Crash | None = None
         self.made: set[int] = set()
@@ -211,7 +213,7 @@ class Copies:
         end_after(wall_limit_s(self._scenario.limit_s))
         return True
 
-    def answer(self, report: Report) -> NoReturn:
+    def answer(self, report: TrialReport) -> NoReturn:
         """End the copy with this."""
         self._to.send(report)
         os._exit(0)
@@ -228,12 +230,12 @@ class Copies:
                     report = None
                 here.close()
                 _, status = os.waitpid(process, 0)
-                self._to.send(Answer(crash.number, report or self._without_answer(crash, status)))
+                self._to.send(PointAnswer(crash.number, report or self._without_answer(crash, status)))
 
-    def _without_answer(self, crash: Crash, status: int) -> Report:
+    def _without_answer(self, crash: Crash, status: int) -> TrialReport:
         """A program error in a point must not end the campaign: it is a result."""
         error = f"its process ended with status {os.waitstatus_to_exitcode(status)} and no answer"
-        return Report(self._scenario.with_faults([crash.fault]), Verdict.CRASHED, error=error)
+        return TrialReport(self._scenario.with_faults([crash.fault]), RunVerdict.CRASHED, error=error)
 
     def end(self) -> None:
         """Whatever still runs is not wanted any more."""

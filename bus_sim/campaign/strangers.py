@@ -34,7 +34,7 @@ class StrangerPlan:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class StrangerOutcome:
     """What came of one run."""
 
     served: int
@@ -52,8 +52,8 @@ class Pair:
     """One seed: with the stranger, and without that machine."""
 
     seed: int
-    strange: Outcome
-    without: Outcome
+    strange: StrangerOutcome
+    without: StrangerOutcome
 
     @property
     def longer_s(self) -> float:
@@ -89,12 +89,12 @@ def play_pair(plan: StrangerPlan, seed: int) -> Pair:
     return Pair(seed, _play(plan, site, seed, strange=True), _play(plan, site, seed, strange=False))
 
 
-def _play(plan: StrangerPlan, site: Site, seed: int, *, strange: bool) -> Outcome:
+def _play(plan: StrangerPlan, site: Site, seed: int, *, strange: bool) -> StrangerOutcome:
     loop = VirtualTimeLoop()
     return run_on(loop, _run(plan, site, seed, loop, strange=strange))
 
 
-async def _run(plan: StrangerPlan, site: Site, seed: int, loop: VirtualTimeLoop, *, strange: bool) -> Outcome:
+async def _run(plan: StrangerPlan, site: Site, seed: int, loop: VirtualTimeLoop, *, strange: bool) -> StrangerOutcome:
     system = simulated_of(site)
     target = next(one for one in site.machines.values() if one.kind is system.worker)
     without = frozenset() if strange else frozenset({target.name})
@@ -118,7 +118,7 @@ async def _run(plan: StrangerPlan, site: Site, seed: int, loop: VirtualTimeLoop,
     tally = stage.tally()
     waits = stage.waits_s()
     broken = (*stage.violations(), *(judges.finish()[0]))
-    return Outcome(tally.served, tally.told, tally.waiting, waits, broken, _asks(asked, target.node_id))
+    return StrangerOutcome(tally.served, tally.told, tally.waiting, waits, broken, _asks(asked, target.node_id))
 
 
 def _asks(words: list[Halted], node: int) -> bool:

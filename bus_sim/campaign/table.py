@@ -3,30 +3,30 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from bus_sim.campaign.report import Report, Verdict, kinds_of
-from bus_sim.campaign.runner import Plan, Result
+from bus_sim.campaign.report import RunVerdict, TrialReport, kinds_of
+from bus_sim.campaign.runner import CampaignSettings, TrialResult
 
 #: In the order of the table's columns.
 COLUMNS = (
-    Verdict.SERVED,
-    Verdict.TOLD,
-    Verdict.HELD,
-    Verdict.DELAYED,
-    Verdict.LATE,
-    Verdict.STOPPED,
-    Verdict.APART,
-    Verdict.NOT_LIVE,
-    Verdict.NOT_SERVED,
-    Verdict.HUNG,
-    Verdict.CRASHED,
-    Verdict.VIOLATION,
+    RunVerdict.SERVED,
+    RunVerdict.TOLD,
+    RunVerdict.HELD,
+    RunVerdict.DELAYED,
+    RunVerdict.LATE,
+    RunVerdict.STOPPED,
+    RunVerdict.APART,
+    RunVerdict.NOT_LIVE,
+    RunVerdict.NOT_SERVED,
+    RunVerdict.HUNG,
+    RunVerdict.CRASHED,
+    RunVerdict.VIOLATION,
 )
 
 
-def lines(results: Sequence[Result]) -> list[str]:
+def lines(results: Sequence[TrialResult]) -> list[str]:
     """The table, then a line for every failure. A run counts in the row of every kind that it had."""
     injected: Counter[str] = Counter()
-    came: Counter[tuple[str, Verdict]] = Counter()
+    came: Counter[tuple[str, RunVerdict]] = Counter()
     for result in results:
         kinds = kinds_of(result.report.scenario) or Counter({"(no fault)": 0})
         injected += kinds
@@ -43,12 +43,12 @@ def lines(results: Sequence[Result]) -> list[str]:
     return text + _customers(results) + _recovery(results) + _failures(results)
 
 
-def who(reports: Sequence[Report]) -> str:
+def who(reports: Sequence[TrialReport]) -> str:
     """Whom the reports count: customers, or what a system calls its orders."""
-    return reports[0].who if reports else Report.who
+    return reports[0].who if reports else TrialReport.who
 
 
-def _customers(results: Sequence[Result]) -> list[str]:
+def _customers(results: Sequence[TrialResult]) -> list[str]:
     reports = [result.report for result in results]
     served, told = sum(one.served for one in reports), sum(one.told for one in reports)
     full, waiting = sum(one.full for one in reports), sum(one.waiting for one in reports)
@@ -64,7 +64,7 @@ def _customers(results: Sequence[Result]) -> list[str]:
     ]
 
 
-def longest_recovery(results: Sequence[Result]) -> dict[str, tuple[int, int]]:
+def longest_recovery(results: Sequence[TrialResult]) -> dict[str, tuple[int, int]]:
     """By measure: the longest time of all runs, us, and in how many runs it was seen."""
     found: dict[str, tuple[int, int]] = {}
     for result in results:
@@ -74,14 +74,14 @@ def longest_recovery(results: Sequence[Result]) -> dict[str, tuple[int, int]]:
     return dict(sorted(found.items()))
 
 
-def _recovery(results: Sequence[Result]) -> list[str]:
+def _recovery(results: Sequence[TrialResult]) -> list[str]:
     return [
         f"  {measure:<22} at most {us / 1e6:8.3f} s (seen in {runs} runs)"
         for measure, (us, runs) in longest_recovery(results).items()
     ]
 
 
-def _failures(results: Sequence[Result]) -> list[str]:
+def _failures(results: Sequence[TrialResult]) -> list[str]:
     text = []
     for result in results:
         if result.shrunk is None:
@@ -93,7 +93,7 @@ def _failures(results: Sequence[Result]) -> list[str]:
     return text
 
 
-def to_json(plan: Plan, results: Sequence[Result]) -> dict[str, object]:
+def to_json(plan: CampaignSettings, results: Sequence[TrialResult]) -> dict[str, object]:
     """The plan and one entry a run, as ``json.dump`` takes them; units stand in the keys."""
     return {
         "site": plan.site,

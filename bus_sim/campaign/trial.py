@@ -7,14 +7,14 @@ from typing import Any
 from bus_sim.campaign.journal_points import Held
 from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.limits import WallLimitError, event_limit, wall_limit, wall_limit_s
-from bus_sim.campaign.recovery import Measure, Recovery, clocks_right_us, is_of_clock
-from bus_sim.campaign.report import CLOCKS_SERVED_US, CONVERGED_US, Report, Verdict
+from bus_sim.campaign.recovery import Measure, RecoveryMeasure, clocks_right_us, is_of_clock
+from bus_sim.campaign.report import CLOCKS_SERVED_US, CONVERGED_US, RunVerdict, TrialReport
 from bus_sim.faults.arm import arm, check_faults
-from bus_sim.faults.scenario import Scenario
+from bus_sim.faults.scenario import FaultScenario
 from bus_sim.options import RunOptions
 from bus_sim.run import BusRun, run_until
 from bus_sim.systems.registry import simulated_of
-from bus_sim.systems.stage import Stage
+from bus_sim.systems.stage import SystemStage
 from bus_sim.virtual_time import EventLimitError, StandstillError, VirtualTimeLoop, run_on
 from onboard.core.site import Site
 
@@ -27,7 +27,7 @@ HANGS = (StandstillError, EventLimitError)
 DELAY_US = 60_000_000
 
 
-def stage_of(site: Site, scenario: Scenario, loop: VirtualTimeLoop, trace: Path | None = None) -> Stage[Any]:
+def stage_of(site: Site, scenario: FaultScenario, loop: VirtualTimeLoop, trace: Path | None = None) -> SystemStage[Any]:
     """A scenario's run, connected and not switched on; only faults of single frames are there.
 
     Raises ``DemandError`` for orders that the site cannot be brought, and for faults that it cannot have.
@@ -37,7 +37,9 @@ def stage_of(site: Site, scenario: Scenario, loop: VirtualTimeLoop, trace: Path 
     return simulated_of(site).stage(site, options, loop)
 
 
-def play(site: Site, scenario: Scenario, *, usual_wait_s: float | None = None, trace: Path | None = None) -> Report:
+def play(
+    site: Site, scenario: FaultScenario, *, usual_wait_s: float | None = None, trace: Path | None = None
+) -> TrialReport:
     """Play a scenario; ``usual_wait_s`` is the longest wait without its faults, where it is known."""
     loop = VirtualTimeLoop()
     loop.event_limit = event_limit(scenario.limit_s)
@@ -48,25 +50,25 @@ def play(site: Site, scenario: Scenario, *, usual_wait_s: float | None = None, t
         return hung(scenario, loop, hang)
 
 
-def hung(scenario: Scenario, loop: VirtualTimeLoop, why: BaseException) -> Report:
+def hung(scenario: FaultScenario, loop: VirtualTimeLoop, why: BaseException) -> TrialReport:
     """What ran was torn out of the run: nothing more can be asked of it."""
-    return Report(scenario, Verdict.HUNG, simulated_s=loop.now_us() / 1e6, error=str(why))
+    return TrialReport(scenario, RunVerdict.HUNG, simulated_s=loop.now_us() / 1e6, error=str(why))
 
 
 async def _play(
-    site: Site, scenario: Scenario, usual_wait_s: float | None, trace: Path | None, loop: VirtualTimeLoop
-) -> Report:
+    site: Site, scenario: FaultScenario, usual_wait_s: float | None, trace: Path | None, loop: VirtualTimeLoop
+) -> TrialReport:
     stage = stage_of(site, scenario, loop, trace)
     arm(stage.run, scenario.faults)
     return await play_stage(stage, scenario, usual_wait_s, loop)
 
 
 async def play_stage(
-    stage: Stage[Any], scenario: Scenario, usual_wait_s: float | None, loop: VirtualTimeLoop
-) -> Report:
+    stage: SystemStage[Any], scenario: FaultScenario, usual_wait_s: float | None, loop: VirtualTimeLoop
+) -> TrialReport:
     """The same of a stage whose faults are armed."""
     judges = Judges(stage.run, disturbed=bool(scenario.faults))
-    recovery = Recovery(stage.run, scenario.faults)
+    recovery = RecoveryMeasure(stage.run, scenario.faults)
     right_us = clocks_right_us(scenario.faults)
     if right_us is not None:
         judges.excuse_clocks(right_us)
@@ -94,7 +96,7 @@ async def play_stage(
 class _End:
     """When a trial is over: safety comes first, then all heals, then everything must converge."""
 
-    def __init__(self, stage: Stage[Any], recovery: Recovery) -> None:
+    def __init__(self, stage: SystemStage[Any], recovery: RecoveryMeasure) -> None:
         self._stage = stage
         self._recovery = recovery
         self._over_us: int | None = None
@@ -111,14 +113,14 @@ class _End:
 
 
 def _judge(
-    stage: Stage[Any],
-    scenario: Scenario,
+    stage: SystemStage[Any],
+    scenario: FaultScenario,
     usual_wait_s: float | None,
     errors: tuple[str, str],
     judges: Judges,
-    recovery: Recovery,
+    recovery: RecoveryMeasure,
     held: Held,
-) -> Report:
+) -> TrialReport:
     (error, hang), tally = errors, stage.tally()
     unsafe, stalls = judges.finish()
     violations = (*stage.violations(), *unsafe)
@@ -130,21 +132,21 @@ def _judge(
     )
     is_late = usual_wait_s is not None and tally.longest_wait_s > usual_wait_s + DELAY_US / 1e6
     verdicts = (
-        (bool(violations), Verdict.VIOLATION),
-        (bool(error), Verdict.CRASHED),
-        (bool(hang or stage.run.restless), Verdict.HUNG),
+        (bool(violations), RunVerdict.VIOLATION),
+        (bool(error), RunVerdict.CRASHED),
+        (bool(hang or stage.run.restless), RunVerdict.HUNG),
         # Whoever waits for it now waits for a person, and has been told so.
-        (bool(held.since_us), Verdict.HELD),
-        (bool(tally.waiting and halted), Verdict.STOPPED),
-        (bool(tally.waiting), Verdict.NOT_SERVED),
-        (bool(stalls), Verdict.NOT_LIVE),
-        (is_apart, Verdict.APART),
-        (_heals_late(scenario, recovery), Verdict.LATE),
-        (is_late, Verdict.DELAYED),
-        (bool(tally.told), Verdict.TOLD),
-        (True, Verdict.SERVED),
+        (bool(held.since_us), RunVerdict.HELD),
+        (bool(tally.waiting and halted), RunVerdict.STOPPED),
+        (bool(tally.waiting), RunVerdict.NOT_SERVED),
+        (bool(stalls), RunVerdict.NOT_LIVE),
+        (is_apart, RunVerdict.APART),
+        (_heals_late(scenario, recovery), RunVerdict.LATE),
+        (is_late, RunVerdict.DELAYED),
+        (bool(tally.told), RunVerdict.TOLD),
+        (True, RunVerdict.SERVED),
     )
-    return Report(
+    return TrialReport(
         scenario,
         next(verdict for holds, verdict in verdicts if holds),
         violations,
@@ -164,7 +166,7 @@ def _judge(
     )
 
 
-def _heals_late(scenario: Scenario, recovery: Recovery) -> bool:
+def _heals_late(scenario: FaultScenario, recovery: RecoveryMeasure) -> bool:
     """Whether clocks were all that was wrong, and who waited when they were right again was served too late."""
     took_us = recovery.longest_us.get(Measure.HEAL_SERVED, 0)
     return took_us > CLOCKS_SERVED_US and all(is_of_clock(fault) for fault in scenario.faults)

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Final
 
 from bus_sim.can.faults import FaultInjector, FaultKind
-from bus_sim.can.node import Route, SimulatedBus
+from bus_sim.can.node import FrameRoute, SimulatedBus
 from bus_sim.virtual_time import Clock
 from onboard.core.frame import Frame
 
@@ -21,7 +21,7 @@ def _deaf(_frame: Frame, _time_us: int) -> None:
     """Stand in for the handler of a node that left while a frame was being handed round."""
 
 
-class Delivery:
+class FrameDelivery:
     """Hands frames to the nodes that hear the bus."""
 
     def __init__(self, clock: Clock, injectors: Sequence[FaultInjector]) -> None:
@@ -29,9 +29,9 @@ class Delivery:
         self.listeners: list[SimulatedBus] = []
         self._clock = clock
         self._injectors = [i for i in injectors if i.fault.kind is not FaultKind.CORRUPTION]
-        self._routed: list[Route] = []
+        self._routed: list[FrameRoute] = []
         self._senders: list[SimulatedBus] = []
-        self._under_way: Route | None = None
+        self._under_way: FrameRoute | None = None
 
     def add(self, injector: FaultInjector) -> None:
         """One more fault at work from now on; not a corruption, which strikes on the wire."""
@@ -72,21 +72,21 @@ class Delivery:
         for node in route.slow:
             node.receive(frame, now_us)
 
-    def _route(self, frame: Frame, key: int, excepted: Sequence[SimulatedBus]) -> Route:
+    def _route(self, frame: Frame, key: int, excepted: Sequence[SimulatedBus]) -> FrameRoute:
         sender = excepted[0]
         usual = len(excepted) == 1
         route = sender.routes.get(key) if usual else None
         if route is None:
             if len(self._routed) >= _ROUTES_LIMIT:
                 self.forget_routes()
-            route = Route(node for node in self.listeners if node not in excepted and node.accepts(frame))
+            route = FrameRoute(node for node in self.listeners if node not in excepted and node.accepts(frame))
             self._routed.append(route)
             if usual:
                 self._senders.append(sender)
                 sender.routes[key] = route
         return route
 
-    def _strike(self, route: Route, frame: Frame, now_us: int) -> dict[SimulatedBus, list[int]]:
+    def _strike(self, route: FrameRoute, frame: Frame, now_us: int) -> dict[SimulatedBus, list[int]]:
         """Let the faults strike: the delays, in microseconds, of each copy that a struck node hears, perhaps none."""
         copies: dict[SimulatedBus, list[int]] = {}
         for injector in self._injectors:
@@ -96,7 +96,9 @@ class Delivery:
                         _change(copies.setdefault(node, [0]), injector)
         return copies
 
-    def _deliver_copies(self, route: Route, frame: Frame, now_us: int, copies: dict[SimulatedBus, list[int]]) -> None:
+    def _deliver_copies(
+        self, route: FrameRoute, frame: Frame, now_us: int, copies: dict[SimulatedBus, list[int]]
+    ) -> None:
         for node in route.everybody:
             for delay_us in copies.get(node, (0,)):
                 if delay_us:

@@ -23,7 +23,7 @@ class FaultKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class InjectedFault:
     """One fault.
 
     *omission*: the chosen receivers do not hear the frame, everybody else does, nobody notices. *duplicate*: they hear
@@ -132,10 +132,10 @@ _READERS: Final[dict[str, tuple[Callable[[str], object], str]]] = {
 _KEYS: Final = ("id", *_READERS)
 
 
-def parse_fault(text: str) -> Fault:
+def parse_fault(text: str) -> InjectedFault:
     """Read one fault from ``kind:key=value,key=value``.
 
-    Such as ``omission:receivers=3|4,probability=0.01,id=0x100:0x7F0,seed=7``. Keys: those of ``Fault``, with
+    Such as ``omission:receivers=3|4,probability=0.01,id=0x100:0x7F0,seed=7``. Keys: those of ``InjectedFault``, with
     ``id=VALUE[:MASK]`` (no mask: exactly this identifier) and ``format=standard|extended|any``. Raises ``ValueError``.
     """
     kind_text, _, settings = text.strip().partition(":")
@@ -154,7 +154,7 @@ def parse_fault(text: str) -> Fault:
         if key in values or (key == "id" and "id_mask" in values):
             raise ValueError(f"fault {text!r}: {key} is given twice")
         values |= _read_id(text, value) if key == "id" else {_field(key): _read(text, key, value)}
-    return Fault(kind, **values)  # type: ignore[arg-type]  # each reader answers its field's type
+    return InjectedFault(kind, **values)  # type: ignore[arg-type]  # each reader answers its field's type
 
 
 def _field(key: str) -> str:
@@ -185,7 +185,7 @@ def _read_id(text: str, value: str) -> dict[str, object]:
 class FaultInjector:
     """A fault at work: its generator, how many frames matched and how often it struck."""
 
-    def __init__(self, fault: Fault) -> None:
+    def __init__(self, fault: InjectedFault) -> None:
         self.fault = fault
         self.matched = 0
         self.struck = 0

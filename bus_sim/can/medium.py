@@ -16,13 +16,13 @@ from typing import Final
 from bus_sim.can import failures
 from bus_sim.can.arbitration import arbitration_key, first_difference
 from bus_sim.can.bitstream import INTERMISSION_BITS, SUSPEND_BITS, TAIL_BITS, frame_length_bits
-from bus_sim.can.delivery import Delivery
+from bus_sim.can.delivery import FrameDelivery
 from bus_sim.can.error_counters import ErrorCounters
 from bus_sim.can.error_frames import BusError, error_frame, restarted_frame
 from bus_sim.can.failures import Failure
-from bus_sim.can.faults import Fault, FaultInjector, FaultKind
+from bus_sim.can.faults import FaultInjector, FaultKind, InjectedFault
 from bus_sim.can.node import AcceptanceFilter, NodeOptions, SimulatedBus
-from bus_sim.can.recovery import TICKS_PER_BIT, Recovery
+from bus_sim.can.recovery import TICKS_PER_BIT, BusOffRecovery
 from bus_sim.can.statistics import BusStatistics, LoadMeter
 from bus_sim.virtual_time import Clock
 from onboard.core.frame import Frame
@@ -54,7 +54,12 @@ class Medium:
     """
 
     def __init__(
-        self, clock: Clock, *, bit_rate: int = DEFAULT_BIT_RATE, name: str = "can0", faults: Sequence[Fault] = ()
+        self,
+        clock: Clock,
+        *,
+        bit_rate: int = DEFAULT_BIT_RATE,
+        name: str = "can0",
+        faults: Sequence[InjectedFault] = (),
     ) -> None:
         if not _BIT_RATES[0] <= bit_rate <= _BIT_RATES[1]:
             raise ValueError(f"bit rate {bit_rate}: classic CAN runs at {_BIT_RATES[0]} to {_BIT_RATES[1]} bit/s")
@@ -63,8 +68,8 @@ class Medium:
         self.name = name
         #: The faults at work, with what each has done so far.
         self.injectors = [FaultInjector(fault) for fault in faults]
-        self.delivery = Delivery(clock, self.injectors)
-        self.recovery = Recovery(self)
+        self.delivery = FrameDelivery(clock, self.injectors)
+        self.recovery = BusOffRecovery(self)
         self._corrupters = tuple(i for i in self.injectors if i.fault.kind is FaultKind.CORRUPTION)
         self._meter = LoadMeter(bit_rate, clock.now_us())
         self._taps: list[Tap] = []
@@ -108,7 +113,7 @@ class Medium:
         self._members_changed()
         return node
 
-    def add_fault(self, fault: Fault) -> None:
+    def add_fault(self, fault: InjectedFault) -> None:
         """One more fault, while the bus is at work. Raises ``ValueError`` for a corruption, which is set beforehand."""
         if fault.kind is FaultKind.CORRUPTION:
             raise ValueError(f"fault {fault}: a corruption is set before the bus is at work")

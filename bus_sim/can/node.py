@@ -87,7 +87,7 @@ class NodeOptions:
             raise ValueError("processing_us and restart_after_us must not be negative")
 
 
-class Route:
+class FrameRoute:
     """Handlers that hear one identifier of one sender, in order of attachment, and how many frames went this way."""
 
     __slots__ = ("_victims", "everybody", "frames", "handlers", "owners", "prompt", "slow")
@@ -137,7 +137,7 @@ class SimulatedBus:
         #: Frames that were in mailboxes when the node went off the bus; kept by the medium.
         self.held: list[Frame] = []
         #: Where its frames go, by arbitration field; kept by the delivery.
-        self.routes: dict[int, Route] = {}
+        self.routes: dict[int, FrameRoute] = {}
         #: Handlers of received frames; read by the delivery.
         self.frame_handlers: list[FrameHandler] = []
         self.is_open = True

@@ -25,7 +25,7 @@ class Idle(Protocol):
         """A node has recovered."""
 
 
-class Recovery:
+class BusOffRecovery:
     """Counts sequences of eleven recessive bits for every node in bus-off; each frame ends with one of them.
 
     ACK delimiter, end of frame and intermission are eleven recessive bits, as are error delimiter and intermission.

@@ -13,7 +13,7 @@ MessageHandler = Callable[[Message, int], None]
 MessageFilter = Callable[[Message], Message | None]
 
 
-class DeviceLink(Protocol):
+class DeviceBusLink(Protocol):
     """A device's connection to its machine's device bus."""
 
     def send(self, message: Message) -> None:
@@ -38,7 +38,7 @@ class Feed(Protocol):
 
 
 class BusDeviceLink:
-    """A ``DeviceLink`` over any CAN bus.
+    """A ``DeviceBusLink`` over any CAN bus.
 
     A bus that carries several machines' devices hands every device every order; messages of node-IDs other than
     ``node_id`` are passed over, as an acceptance filter on the identifier's low byte would. Faults put filters into

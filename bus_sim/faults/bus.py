@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
-from bus_sim.can.faults import Fault, FaultKind
+from bus_sim.can.faults import FaultKind, InjectedFault
 from bus_sim.can.node import SimulatedBus
 from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.journal import SimulatedJournal
@@ -19,15 +19,15 @@ from onboard.ports.bus import BusHealth, ErrorState, FrameHandler
 SENDER_MASK = 0xFF
 
 
-def frame_faults(faults: Iterable[AnyFault], site: Site) -> tuple[Fault, ...]:
+def frame_faults(faults: Iterable[AnyFault], site: Site) -> tuple[InjectedFault, ...]:
     """Those faults that act on single frames of the fleet bus, and what others come down to."""
-    found: list[Fault] = []
+    found: list[InjectedFault] = []
     for fault in faults:
-        found += [fault] if isinstance(fault, Fault) else _as_frame_faults(fault, site)
+        found += [fault] if isinstance(fault, InjectedFault) else _as_frame_faults(fault, site)
     return tuple(found)
 
 
-def _as_frame_faults(injection: Injection, site: Site) -> list[Fault]:
+def _as_frame_faults(injection: Injection, site: Site) -> list[InjectedFault]:
     """The faults of single frames that an injection comes down to; none where it is another thing."""
     make = _AS_FRAME_FAULTS.get(injection.kind)
     if make is None or injection.until_us <= injection.at_us:
@@ -35,13 +35,15 @@ def _as_frame_faults(injection: Injection, site: Site) -> list[Fault]:
     return make(injection, site)
 
 
-def _burst(injection: Injection, _: Site) -> list[Fault]:
-    return [Fault(FaultKind.CORRUPTION, from_us=injection.at_us, until_us=injection.until_us, seed=_seed(injection))]
-
-
-def _bit_errors(injection: Injection, _: Site) -> list[Fault]:
+def _burst(injection: Injection, _: Site) -> list[InjectedFault]:
     return [
-        Fault(
+        InjectedFault(FaultKind.CORRUPTION, from_us=injection.at_us, until_us=injection.until_us, seed=_seed(injection))
+    ]
+
+
+def _bit_errors(injection: Injection, _: Site) -> list[InjectedFault]:
+    return [
+        InjectedFault(
             FaultKind.CORRUPTION,
             probability=injection.number("probability"),
             from_us=injection.at_us,
@@ -51,9 +53,9 @@ def _bit_errors(injection: Injection, _: Site) -> list[Fault]:
     ]
 
 
-def _lossy(injection: Injection, _: Site) -> list[Fault]:
+def _lossy(injection: Injection, _: Site) -> list[InjectedFault]:
     return [
-        Fault(
+        InjectedFault(
             FaultKind.OMISSION,
             receivers=tuple(injection.text("receivers").split("|")),
             probability=injection.number("probability"),
@@ -64,9 +66,9 @@ def _lossy(injection: Injection, _: Site) -> list[Fault]:
     ]
 
 
-def _reorder(injection: Injection, _: Site) -> list[Fault]:
+def _reorder(injection: Injection, _: Site) -> list[InjectedFault]:
     return [
-        Fault(
+        InjectedFault(
             FaultKind.DELAY,
             receivers=tuple(injection.text("receivers").split("|")),
             probability=injection.number("probability"),
@@ -78,11 +80,11 @@ def _reorder(injection: Injection, _: Site) -> list[Fault]:
     ]
 
 
-def _bus_off(injection: Injection, site: Site) -> list[Fault]:
+def _bus_off(injection: Injection, site: Site) -> list[InjectedFault]:
     """Every frame of this sender is destroyed: eight more on TEC each time, off the bus above 255 (ISO 11898-1)."""
     node = _node(site, injection.target)
     return [
-        Fault(
+        InjectedFault(
             FaultKind.CORRUPTION,
             id_value=node,
             id_mask=SENDER_MASK,
@@ -94,14 +96,14 @@ def _bus_off(injection: Injection, site: Site) -> list[Fault]:
     ]
 
 
-def _partition(injection: Injection, site: Site) -> list[Fault]:
+def _partition(injection: Injection, site: Site) -> list[InjectedFault]:
     """What one side sends the other does not hear; a fault for each sender, as senders are in the identifier."""
     inside = injection.text("members").split("|")
     outside = [machine.name for machine in site.machines.values() if machine.name not in inside]
     way = injection.text("way")
     ways = ([(inside, outside)] if way != "in" else []) + ([(outside, inside)] if way != "out" else [])
     return [
-        Fault(
+        InjectedFault(
             FaultKind.OMISSION,
             receivers=tuple(deaf),
             id_value=_node(site, sender),

@@ -8,8 +8,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from bus_sim.can.faults import Fault, FaultKind, parse_fault
-from bus_sim.faults.table import KINDS, Setting, Value
+from bus_sim.can.faults import FaultKind, InjectedFault, parse_fault
+from bus_sim.faults.table import KINDS, FaultSetting, Value
 from onboard.config.problems import nearest
 
 
@@ -78,7 +78,7 @@ class Injection:
 
 
 #: Anything that ``--fault`` may name.
-AnyFault = Fault | Injection
+AnyFault = InjectedFault | Injection
 
 
 def parse_injection(text: str) -> AnyFault:
@@ -100,7 +100,7 @@ def parse_injection(text: str) -> AnyFault:
     return Injection(kind, given)
 
 
-def _read(text: str, key: str, value: str, setting: Setting) -> Value:
+def _read(text: str, key: str, value: str, setting: FaultSetting) -> Value:
     try:
         read = setting.reader(value)
     except ValueError:
@@ -112,7 +112,7 @@ def _read(text: str, key: str, value: str, setting: Setting) -> Value:
     return read
 
 
-def _settings(kind: str) -> Mapping[str, Setting]:
+def _settings(kind: str) -> Mapping[str, FaultSetting]:
     found = KINDS.get(kind)
     if found is None:
         known = [*FaultKind, *KINDS]

@@ -8,10 +8,10 @@ from bus_sim.run import BusRun
 from onboard.contract.codes import Reason
 from onboard.contract.messages import Blocked, Clear, EmergencyStop, Message
 from onboard.core.site import Segment
+from onboard.operate.commands import CommandRequest, maker_of
 from onboard.operate.names import OperateError
-from onboard.operate.order import Order
-from onboard.operate.station import Station
-from onboard.operate.wishes import Wish, maker_of
+from onboard.operate.order import OperatorCommand
+from onboard.operate.station import OperatorStation
 
 #: The station's node-ID: 251 to 255 are kept for gateways and tools (dbc/fleet.dbc).
 STATION = 251
@@ -46,7 +46,7 @@ async def _operate(simulation: BusRun[Any], injection: Injection) -> None:
     def tell(line: str) -> None:
         simulation.log.event(loop.now_us(), "operator", line)
 
-    station = Station(site, simulation.codecs.fleet, bus, tell)
+    station = OperatorStation(site, simulation.codecs.fleet, bus, tell)
     try:
         make = maker_of(site, wish_of(injection), seed=loop.now_us() // 1_000_000)
         await station.operate(make, None, _agrees)
@@ -56,16 +56,16 @@ async def _operate(simulation: BusRun[Any], injection: Injection) -> None:
         await bus.close()
 
 
-async def _agrees(_: Order) -> bool:
+async def _agrees(_: OperatorCommand) -> bool:
     return True
 
 
-def wish_of(injection: Injection) -> Wish:
+def wish_of(injection: Injection) -> CommandRequest:
     """The command that a fault of kind ``operate`` means."""
     do, seconds = injection.text("do"), injection.number("for_s")
     segment = f"p({injection.count('track')},{injection.count('index')})"
     is_absent = injection.text("absent") == "yes"
-    return Wish(
+    return CommandRequest(
         do,
         machine=injection.text("target"),
         segment=segment,

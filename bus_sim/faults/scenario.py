@@ -39,7 +39,7 @@ from onboard.core.site import Site
 
 
 @dataclass(frozen=True)
-class Scenario:
+class FaultScenario:
     """See the module. ``site`` is a name or a path as ``bus-sim run`` takes it."""
 
     site: str
@@ -49,7 +49,7 @@ class Scenario:
     demand: Coming | None = None
     faults: tuple[AnyFault, ...] = ()
 
-    def with_faults(self, faults: Iterable[AnyFault]) -> "Scenario":
+    def with_faults(self, faults: Iterable[AnyFault]) -> "FaultScenario":
         """The same with other faults."""
         return replace(self, faults=tuple(faults))
 
@@ -81,7 +81,7 @@ _HEAD: Mapping[str, type] = {"site": str, "seed": int, "limit_s": float}
 _WORDS = {str: "a text in quotes", int: "a whole number from 0", float: "a number above 0"}
 
 
-def load_scenario(path: Path) -> tuple[Scenario, Site]:
+def load_scenario(path: Path) -> tuple[FaultScenario, Site]:
     """Read a scenario and its site. Raises ``ConfigError`` with one line for each mistake."""
     problems = Problems(str(path))
     try:
@@ -94,10 +94,10 @@ def load_scenario(path: Path) -> tuple[Scenario, Site]:
     except tomllib.TOMLDecodeError as error:
         problems.add(0, "", None, f"is no TOML ({error})", "correct it there")
         raise ConfigError(problems.in_order()) from error
-    return _Reader(problems, text, table).read()
+    return _ScenarioReader(problems, text, table).read()
 
 
-class _Reader:
+class _ScenarioReader:
     """One file; all of its mistakes are told at once."""
 
     def __init__(self, problems: Problems, text: str, table: dict[str, object]) -> None:
@@ -105,7 +105,7 @@ class _Reader:
         self._lines = text.splitlines()
         self._table = table
 
-    def read(self) -> tuple[Scenario, Site]:
+    def read(self) -> tuple[FaultScenario, Site]:
         """Scenario and site, or ``ConfigError``."""
         sections = {one.section: one.settings for one in map(simulated, simulated_names())}
         for key in self._table:
@@ -116,7 +116,7 @@ class _Reader:
         given = {name: self._section(name, sections[name]) for name in self._table if name in sections}
         faults, site = self._faults(), self._site(head.pop("site", None))
         demand = self._demand(site, given, int(str(head.get("seed", 1)))) if site is not None else None
-        scenario = Scenario("", demand=demand, faults=tuple(faults), **head)  # type: ignore[arg-type]  # _section checked each value's type
+        scenario = FaultScenario("", demand=demand, faults=tuple(faults), **head)  # type: ignore[arg-type]  # _section checked each value's type
         if site is not None:
             try:
                 check_faults(faults, site)

@@ -21,7 +21,7 @@ class Group(StrEnum):
     PEOPLE = "people"
 
 
-class Setting(NamedTuple):
+class FaultSetting(NamedTuple):
     """How one setting is read, what it must be in words, its default (None: it must be given) and its range."""
 
     reader: Callable[[str], Value]
@@ -36,44 +36,44 @@ class Kind(NamedTuple):
 
     group: Group
     summary: str
-    settings: Mapping[str, Setting]
+    settings: Mapping[str, FaultSetting]
 
 
 def _whole(text: str) -> int:
     return int(text, 0)
 
 
-def _seconds(default: float | None, low: float = 0.0) -> Setting:
-    return Setting(float, f"seconds from {low:g} to 1000000", default, low, 1e6)
+def _seconds(default: float | None, low: float = 0.0) -> FaultSetting:
+    return FaultSetting(float, f"seconds from {low:g} to 1000000", default, low, 1e6)
 
 
-def _count(wanted: str, default: int | None, low: int = 0, high: int = 10**9) -> Setting:
-    return Setting(_whole, wanted, default, low, high)
+def _count(wanted: str, default: int | None, low: int = 0, high: int = 10**9) -> FaultSetting:
+    return FaultSetting(_whole, wanted, default, low, high)
 
 
-def _one_of(*words: str) -> Setting:
+def _one_of(*words: str) -> FaultSetting:
     def read(text: str) -> str:
         return text if text in words else ""
 
-    return Setting(read, " or ".join(words), words[0])
+    return FaultSetting(read, " or ".join(words), words[0])
 
 
 #: The farthest that a clock jumps.
 TEN_YEARS_MS: Final = 3_653 * 86_400_000
-_MACHINE: Final = Setting(str, "the name of a machine, such as MR1", None)
-_MACHINES: Final = Setting(str, "names of machines joined by |, such as MR1|ER1", None)
+_MACHINE: Final = FaultSetting(str, "the name of a machine, such as MR1", None)
+_MACHINES: Final = FaultSetting(str, "names of machines joined by |, such as MR1|ER1", None)
 _SEED: Final = _count("a whole number", 0, low=-(2**63), high=2**63)
-_CHANCE: Final = Setting(float, "a number from 0 to 1", 0.3, 0.0, 1.0)
+_CHANCE: Final = FaultSetting(float, "a number from 0 to 1", 0.3, 0.0, 1.0)
 _AT: Final = _seconds(None)
 _CAR: Final = _count("the number of a car in the order of arrival, from 1", None, low=1)
 
 
-def _one(**more: Setting) -> dict[str, Setting]:
+def _one(**more: FaultSetting) -> dict[str, FaultSetting]:
     """Settings of a fault that strikes one machine at a time."""
     return {"target": _MACHINE, "at_s": _AT, **more}
 
 
-def _clocks(**more: Setting) -> dict[str, Setting]:
+def _clocks(**more: FaultSetting) -> dict[str, FaultSetting]:
     """Settings of a fault that strikes the clocks of any machines."""
     return {"target": _MACHINES, "at_s": _AT, **more}
 
@@ -224,7 +224,7 @@ KINDS: Final[Mapping[str, Kind]] = {
     "actuator_slow": Kind(
         Group.ACTUATOR,
         "a drive that moves slowly",
-        _one(for_s=_seconds(120.0), factor=Setting(float, "a number from 0.05 to 1", 0.3, 0.05, 1.0)),
+        _one(for_s=_seconds(120.0), factor=FaultSetting(float, "a number from 0.05 to 1", 0.3, 0.05, 1.0)),
     ),
     "actuator_halfway": Kind(
         Group.ACTUATOR,
@@ -275,7 +275,7 @@ KINDS: Final[Mapping[str, Kind]] = {
             "track": _count("the number of a track, for block, clear and an absent body", 1, 1, 254),
             "index": _count("the index of a segment, for block, clear and an absent body", 1, 1, 255),
             "absent": _one_of("no", "yes"),
-            "body": Setting(str, "a slot such as p(1;5), or gone, for regenerate", ""),
+            "body": FaultSetting(str, "a slot such as p(1;5), or gone, for regenerate", ""),
             "for_s": _seconds(10.0),
         },
     ),

@@ -11,7 +11,7 @@ from typing import Any
 
 from rich.console import Console
 
-from bus_sim.processes.plan import ProcessPlan, Span, machine_file, spans_of
+from bus_sim.processes.plan import PowerSpan, ProcessPlan, machine_file, spans_of
 from bus_sim.processes.spawn import log_of, start_machine
 from bus_sim.run import BusRun
 
@@ -88,7 +88,7 @@ class ProcessFleet:
 
     # --- one machine -------------------------------------------------------------------------------------------
 
-    async def _live(self, name: str, spans: list[Span]) -> None:
+    async def _live(self, name: str, spans: list[PowerSpan]) -> None:
         for span in spans:
             await asyncio.sleep(self._left_s(span.begin_s))
             running = await self._start(name)

@@ -7,16 +7,16 @@ from pathlib import Path
 from bus_sim.faults import controllers
 from bus_sim.faults.arm import ACTIONS
 from bus_sim.faults.injection import AnyFault, Injection
-from bus_sim.processes.plan import Change, ProcessPlan, parse_moments, spans_of
+from bus_sim.processes.plan import PowerChange, ProcessPlan, parse_moments, spans_of
 from bus_sim.sites import site_text
 from onboard.core.site import Site
 
 #: Where the buses are served unless ``--serve`` says so: a free port of this host.
 ANY_PORT = "127.0.0.1:0"
 _HELP = {
-    Change.JOIN: "start this machine so many seconds after the run began; where it left before, with its journal",
-    Change.LEAVE: "end this machine's process then (SIGTERM)",
-    Change.KILL: "kill it then (SIGKILL), as a power cut does",
+    PowerChange.JOIN: "start this machine so many seconds after the run began; where it left before, with its journal",
+    PowerChange.LEAVE: "end this machine's process then (SIGTERM)",
+    PowerChange.KILL: "kill it then (SIGKILL), as a power cut does",
 }
 
 
@@ -28,7 +28,7 @@ def add_processes(group: argparse._ArgumentGroup) -> None:
         help="simulate buses, plant and customers, and run `onboard --machine FILE` as a process for every machine, at "
         "the pace of the clock",
     )
-    for change in (Change.JOIN, Change.LEAVE, Change.KILL):
+    for change in (PowerChange.JOIN, PowerChange.LEAVE, PowerChange.KILL):
         group.add_argument(
             f"--{change.value}", action="append", default=[], metavar="MACHINE=SECONDS", help=_HELP[change]
         )
@@ -42,7 +42,7 @@ def add_processes(group: argparse._ArgumentGroup) -> None:
 
 def process_plan(args: argparse.Namespace, site: Site, name: str, faults: Sequence[AnyFault]) -> ProcessPlan | None:
     """What the options ask for; None for all controllers in one process. Raises ``ValueError`` with one line."""
-    moments = [moment for change in Change for moment in parse_moments(change, getattr(args, change.value))]
+    moments = [moment for change in PowerChange for moment in parse_moments(change, getattr(args, change.value))]
     if not args.processes:
         if moments or args.process_dir is not None:
             given = str(moments[0]) if moments else f"--process-dir {args.process_dir}"

@@ -14,7 +14,7 @@ from onboard.config.problems import nearest
 GIVE_UP_S = 5
 
 
-class Change(Enum):
+class PowerChange(Enum):
     """What happens to a machine while the site runs; endings stand first, so that both may fall on one moment."""
 
     LEAVE = "leave"
@@ -24,7 +24,7 @@ class Change(Enum):
     @property
     def signal(self) -> signal.Signals:
         """How the process is told to end: politely, or without warning as by a power cut."""
-        return signal.SIGKILL if self is Change.KILL else signal.SIGTERM
+        return signal.SIGKILL if self is PowerChange.KILL else signal.SIGTERM
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Moment:
     """One change of one machine, in seconds of the run."""
 
     at_s: float
-    change: Change
+    change: PowerChange
     machine: str
 
     def __str__(self) -> str:
@@ -40,7 +40,7 @@ class Moment:
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class PowerSpan:
     """A machine is on from ``begin_s`` until ``end``, or until the run ends where that is None."""
 
     begin_s: float
@@ -56,7 +56,7 @@ class ProcessPlan:
     directory: Path | None = None
 
 
-def parse_moments(change: Change, texts: Sequence[str]) -> list[Moment]:
+def parse_moments(change: PowerChange, texts: Sequence[str]) -> list[Moment]:
     """``MACHINE=SECONDS`` options. Raises ``ValueError`` with one line for a person."""
     found = []
     for text in texts:
@@ -71,12 +71,12 @@ def parse_moments(change: Change, texts: Sequence[str]) -> list[Moment]:
     return found
 
 
-def spans_of(moments: Iterable[Moment], machines: Sequence[str]) -> dict[str, list[Span]]:
+def spans_of(moments: Iterable[Moment], machines: Sequence[str]) -> dict[str, list[PowerSpan]]:
     """When each machine is on. One whose first change is a join is off until then, any other on from the beginning.
 
     Raises ``ValueError`` with one line for a machine that is not there, or is told to join or leave twice.
     """
-    order = list(Change)
+    order = list(PowerChange)
     by_machine: dict[str, list[Moment]] = {name: [] for name in machines}
     for moment in sorted(moments, key=lambda one: (one.at_s, order.index(one.change))):
         if moment.machine not in by_machine:
@@ -85,20 +85,20 @@ def spans_of(moments: Iterable[Moment], machines: Sequence[str]) -> dict[str, li
     return {name: _spans(found) for name, found in by_machine.items()}
 
 
-def _spans(moments: list[Moment]) -> list[Span]:
-    begin_s: float | None = None if moments and moments[0].change is Change.JOIN else 0.0
+def _spans(moments: list[Moment]) -> list[PowerSpan]:
+    begin_s: float | None = None if moments and moments[0].change is PowerChange.JOIN else 0.0
     spans = []
     for moment in moments:
-        if moment.change is Change.JOIN:
+        if moment.change is PowerChange.JOIN:
             if begin_s is not None:
                 raise ValueError(f"{moment}: it is on at that time; let it leave before, or choose another time")
             begin_s = moment.at_s
         elif begin_s is None:
             raise ValueError(f"{moment}: it is off at that time; let it join before, or choose another time")
         else:
-            spans.append(Span(begin_s, moment))
+            spans.append(PowerSpan(begin_s, moment))
             begin_s = None
-    return spans if begin_s is None else [*spans, Span(begin_s, None)]
+    return spans if begin_s is None else [*spans, PowerSpan(begin_s, None)]
 
 
 def machine_file(name: str, host: str, port: int) -> str:

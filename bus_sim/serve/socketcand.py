@@ -8,7 +8,7 @@ import asyncio
 from collections import Counter
 from collections.abc import Callable
 
-from bus_sim.serve.socketcand_session import Session
+from bus_sim.serve.socketcand_session import SocketcandSession
 from onboard.io.socketcand_protocol import DEFAULT_PORT
 from onboard.ports.bus import Bus
 
@@ -23,7 +23,7 @@ class ServeError(Exception):
 
 
 class SocketcandServer:
-    """Serves on one address. ``counts`` says what clients did, in words; see ``Session`` for its keys.
+    """Serves on one address. ``counts`` says what clients did, in words; see ``SocketcandSession`` for its keys.
 
     Only loopback is meant to be served: the protocol knows no password.
     """
@@ -35,7 +35,7 @@ class SocketcandServer:
         self._stamp = stamp
         self._address = (host, port)
         self._server: asyncio.Server | None = None
-        self._sessions: set[Session] = set()
+        self._sessions: set[SocketcandSession] = set()
         self._leaving: set[asyncio.Task[None]] = set()
         self._clients = 0
         self._all_gone: asyncio.Future[None] | None = None
@@ -63,13 +63,13 @@ class SocketcandServer:
             self._all_gone = asyncio.get_running_loop().create_future()
             await self._all_gone
 
-    def _session(self) -> Session:
+    def _session(self) -> SocketcandSession:
         self._clients += 1
-        session = Session(f"socketcand-{self._clients}", self._join, self._stamp, self.counts, self._on_end)
+        session = SocketcandSession(f"socketcand-{self._clients}", self._join, self._stamp, self.counts, self._on_end)
         self._sessions.add(session)
         return session
 
-    def _on_end(self, session: Session, bus: Bus | None) -> None:
+    def _on_end(self, session: SocketcandSession, bus: Bus | None) -> None:
         self._sessions.discard(session)
         if bus is not None:
             task = asyncio.get_running_loop().create_task(bus.close())

@@ -26,7 +26,7 @@ class Mode(Enum):
     RAW = auto()
 
 
-class Session(asyncio.Protocol):
+class SocketcandSession(asyncio.Protocol):
     """A client's connection.
 
     Keys that it counts: ``clients``, ``opened``, ``refused`` (no such channel), ``listening`` (raw mode was entered),
@@ -40,7 +40,7 @@ class Session(asyncio.Protocol):
         join: Callable[[str, str], Bus | None],
         stamp: Callable[[int], int],
         counts: Counter[str],
-        on_end: Callable[["Session", Bus | None], None],
+        on_end: Callable[["SocketcandSession", Bus | None], None],
     ) -> None:
         self.name = name
         self._join = join

@@ -13,7 +13,7 @@ from bus_sim.devices.timers import LoopTimers, Timers
 from bus_sim.faults.bus import frame_faults
 from bus_sim.options import RunOptions
 from bus_sim.run import BusRun, buses_of, links_of
-from bus_sim.systems.stage import Stage, Tally
+from bus_sim.systems.stage import SystemStage, Tally
 from bus_sim.systems.system import HAND_SPEED, Faulted, Occasion, PlantT, SimulatedSystem, SiteT
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.contract.codes import KindCode
@@ -32,7 +32,7 @@ DRAWN = frozenset(
 
 
 @dataclass(frozen=True)
-class Orders:
+class OrderArrivals:
     """So many orders at normal intervals of mean ``apart_s`` and half of it as deviation; 0: the site's own ones."""
 
     count: int
@@ -67,13 +67,13 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
     #: The plant from the site, its timers, each machine's link to its device bus, and the seed.
     plant: Callable[[SiteT, Timers, dict[int, BusDeviceLink], int], PlantT]
     #: A run that is connected, and what came of it.
-    staged: Callable[[BusRun[PlantT]], Stage[PlantT]]
+    staged: Callable[[BusRun[PlantT]], SystemStage[PlantT]]
     #: The site with orders that a seed draws. Raises ``DemandError`` for orders that it cannot have.
-    draw: Callable[[SiteT, Orders, int], SiteT]
+    draw: Callable[[SiteT, OrderArrivals, int], SiteT]
     #: When the last of the site's orders comes, s after power-up.
     last_s: Callable[[SiteT], float]
     order_s: Callable[[SiteT], float]
-    most: Callable[[SiteT], Orders]
+    most: Callable[[SiteT], OrderArrivals]
     worker: KindCode | None = None
     #: The parts of a run, connected.
     connected: Callable[..., BusRun[PlantT]] = BusRun
@@ -86,7 +86,7 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
     settings: ClassVar[Mapping[str, type]] = {"count": int, "apart_s": float}
     needed: ClassVar[Mapping[str, str]] = {"count": "12, or 0"}
 
-    def stage(self, site: SiteT, options: RunOptions, loop: VirtualTimeLoop) -> Stage[PlantT]:
+    def stage(self, site: SiteT, options: RunOptions, loop: VirtualTimeLoop) -> SystemStage[PlantT]:
         """See ``SimulatedSystem``."""
         drawn = self.with_orders(site, options.demand, options.seed)
         fleet, devices = buses_of(drawn, frame_faults(options.faults, drawn), loop)
@@ -94,7 +94,7 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
         plant = self.plant(drawn, LoopTimers(loop), links, options.seed)
         return self.staged(self.connected(drawn, options, loop, fleet, devices, plant, links))
 
-    def asked(self, site: SiteT, args: Namespace, given: Mapping[str, object], *, live: bool) -> Orders | None:
+    def asked(self, site: SiteT, args: Namespace, given: Mapping[str, object], *, live: bool) -> OrderArrivals | None:
         """The site's own; no option says another thing."""
         for name in given:
             option = f"--{name.removesuffix('_s').replace('_', '-')}"
@@ -108,34 +108,36 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
         """See ``SimulatedSystem``."""
         return HAND_SPEED if web else self.look_speed if terminal else None
 
-    def with_orders(self, site: SiteT, orders: Orders | None, seed: int) -> SiteT:
+    def with_orders(self, site: SiteT, orders: OrderArrivals | None, seed: int) -> SiteT:
         """The site with what a seed brings. Raises ``DemandError`` for orders that it cannot bring."""
         return site if orders is None or not orders.count else self.draw(site, orders, seed)
 
-    def read(self, given: Mapping[str, object]) -> Orders:
+    def read(self, given: Mapping[str, object]) -> OrderArrivals:
         """See ``SimulatedSystem``."""
-        return Orders(**{"apart_s": 1.0, **given})  # type: ignore[arg-type]  # the reader checked each value's type
+        return OrderArrivals(**{"apart_s": 1.0, **given})  # type: ignore[arg-type]  # the reader checked each value's type
 
-    def usual(self, site: SiteT, args: Mapping[str, float | None]) -> Orders:
+    def usual(self, site: SiteT, args: Mapping[str, float | None]) -> OrderArrivals:
         """Of what is not asked for, what is usual on the system."""
         if args.get("cars") is not None:
             raise DemandError(
                 f"--cars {args['cars']}: {site.name} is a {site.system}, to which no cars come; write --orders"
             )
         usual, count, apart_s = self.most(site), args.get("orders"), args.get("apart")
-        return Orders(usual.count if count is None else int(count), usual.apart_s if apart_s is None else apart_s)
+        return OrderArrivals(
+            usual.count if count is None else int(count), usual.apart_s if apart_s is None else apart_s
+        )
 
-    def on(self, occasion: Occasion, site: SiteT) -> Orders:
+    def on(self, occasion: Occasion, site: SiteT) -> OrderArrivals:
         """One, three that overlap, the site's own where it has none, or what is usual."""
         if occasion in (Occasion.ALONE, Occasion.NOBODY):
-            return Orders(int(occasion is Occasion.ALONE), 1.0)
-        return Orders(3, self.order_s(site) / 4) if occasion is Occasion.OVERLAP else self.most(site)
+            return OrderArrivals(int(occasion is Occasion.ALONE), 1.0)
+        return OrderArrivals(3, self.order_s(site) / 4) if occasion is Occasion.OVERLAP else self.most(site)
 
-    def count(self, demand: Orders | None) -> str:
+    def count(self, demand: OrderArrivals | None) -> str:
         """See ``SimulatedSystem``."""
         return f"{demand.count} orders" if demand is not None and demand.count else "the site's own orders"
 
-    def check(self, site: SiteT, demand: Orders | None, seed: int) -> None:
+    def check(self, site: SiteT, demand: OrderArrivals | None, seed: int) -> None:
         """They are drawn once."""
         self.with_orders(site, demand, seed)
 
@@ -143,16 +145,16 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
         """When faults may begin, s after power-up: from the first order to where the last should be done."""
         return BEGIN_S, max(BEGIN_S, self.last_s(site)) + self.order_s(site)
 
-    def faulted(self, site: SiteT, demand: Orders | None, seed: int, limit_s: float) -> Faulted:
+    def faulted(self, site: SiteT, demand: OrderArrivals | None, seed: int, limit_s: float) -> Faulted:
         """Until the last order should be done."""
         span = self.span_s(self.with_orders(site, demand, seed))
         return Faulted(span, span[1])
 
-    def attacked_s(self, site: SiteT, demand: Orders | None, seed: int) -> tuple[float, float]:
+    def attacked_s(self, site: SiteT, demand: OrderArrivals | None, seed: int) -> tuple[float, float]:
         """While orders come and are carried out."""
         return self.span_s(self.with_orders(site, demand, seed))
 
-    def patience_s(self, site: SiteT, demand: Orders | None, seed: int) -> float:
+    def patience_s(self, site: SiteT, demand: OrderArrivals | None, seed: int) -> float:
         """See ``SimulatedSystem``."""
         drawn = self.with_orders(site, demand, seed)
         return self.span_s(drawn)[1] + (PATIENCE + self.most(drawn).count) * self.order_s(drawn)
@@ -174,7 +176,7 @@ class Answered(Protocol):
         """When it was over, loop time in us; None while it is not."""
 
 
-class Ended(NamedTuple):
+class EndedOrder(NamedTuple):
     """One order at the end: whether it was carried out, or refused, or neither; its times, us."""
 
     done: bool
@@ -183,7 +185,7 @@ class Ended(NamedTuple):
     ended_us: int | None
 
 
-def tally(entries: list[Ended], expected: int, now_us: int) -> Tally:
+def tally(entries: list[EndedOrder], expected: int, now_us: int) -> Tally:
     """Count orders; ``expected`` are all that the run brings, also those that have not come yet."""
     served, told = sum(one.done for one in entries), sum(one.refused for one in entries)
     waits_us = [(now_us if one.ended_us is None else one.ended_us) - one.begun_us for one in entries]
@@ -202,5 +204,5 @@ def last_of(moments_ms: Iterable[int], origin_us: int) -> float:
 
 def tally_of(entries: Iterable[Answered], done: Enum, refused: Enum, expected: int, now_us: int) -> Tally:
     """What became of orders that a counter answers: the last word of each is ``done``, ``refused`` or another."""
-    ended = [Ended(one.result is done, one.result is refused, one.begun_us, one.ended_us) for one in entries]
+    ended = [EndedOrder(one.result is done, one.result is refused, one.begun_us, one.ended_us) for one in entries]
     return tally(ended, expected, now_us)

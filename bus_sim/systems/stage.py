@@ -53,7 +53,7 @@ class Tally(NamedTuple):
     full: int = 0
 
 
-class Summary(Protocol):
+class RunFigures(Protocol):
     """What a run came to."""
 
     @property
@@ -85,7 +85,7 @@ class Show(Protocol):
         """Show the site as it is now, if it is time to."""
 
 
-class Hand(Protocol):
+class PersonAtKeys(Protocol):
     """A person who has a hand in the run by keys; entered and left with it."""
 
     @property
@@ -101,7 +101,7 @@ class Hand(Protocol):
         """No longer."""
 
 
-class Ended(NamedTuple):
+class EndedRun(NamedTuple):
     """How a run ended: wall time in s, what it measured from loop time ``begin_us`` on, and processes that failed.
 
     ``is_warm``: what a person asked to see has begun; a run may be ended before.
@@ -120,15 +120,15 @@ class Figures:
     figures: dict[str, object]
     is_good: bool
     wall_s: float
-    told: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def lines(self, width: int | None = None) -> list[str]:
-        """See ``Summary``."""
+        """See ``RunFigures``."""
         figures = (f"{name.replace('_', ' ')}: {_shown(value)}" for name, value in self.figures.items())
-        return [*self.told, *figures, f"wall time: {self.wall_s:.1f} s"]
+        return [*self.remarks, *figures, f"wall time: {self.wall_s:.1f} s"]
 
     def to_json(self) -> dict[str, object]:
-        """See ``Summary``."""
+        """See ``RunFigures``."""
         return self.figures
 
 
@@ -143,7 +143,7 @@ PlantT = TypeVar("PlantT", bound=SystemPlant)
 Act = Callable[[Any], str]
 
 
-class Stage(ABC, Generic[PlantT]):
+class SystemStage(ABC, Generic[PlantT]):
     """See the module. A system says what came of its orders, and how a person sees them."""
 
     #: Whom the report counts.
@@ -253,7 +253,7 @@ class Stage(ABC, Generic[PlantT]):
         """The site as it is now, for a terminal; empty where there is none."""
         return ""
 
-    def told(self) -> list[str]:
+    def remarks(self) -> list[str]:
         """Lines about what was done, before the figures."""
         last = self.picture()
         return ["", last, ""] if last else []
@@ -266,7 +266,7 @@ class Stage(ABC, Generic[PlantT]):
         """What a person sees while it goes on."""
         return LiveText(self.picture, console, wanted=self.run.options.speed is not None)
 
-    def hand(self, console: Console) -> Hand | None:
+    def hand(self, console: Console) -> PersonAtKeys | None:
         """The person at the keys, where one was asked for."""
         return None
 
@@ -276,7 +276,7 @@ class Stage(ABC, Generic[PlantT]):
 
         return RunSource(self.run)
 
-    def summary(self, ended: Ended) -> Summary:
+    def summary(self, ended: EndedRun) -> RunFigures:
         """What it came to; asked once, when it is over."""
         run, halted, violations = self.run, [*self.halted, *ended.failures], self.violations()
         whole: dict[str, object] = {
@@ -289,4 +289,4 @@ class Stage(ABC, Generic[PlantT]):
             "halted": halted,
             "over": self.is_over,
         }
-        return Figures(whole, self.is_over and not violations and not halted, ended.wall_s, tuple(self.told()))
+        return Figures(whole, self.is_over and not violations and not halted, ended.wall_s, tuple(self.remarks()))

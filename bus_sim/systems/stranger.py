@@ -13,7 +13,7 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.effects import Effect, Send
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Answer, Awarded, Estimator, Needs, NegotiationEvent, Proposal
+from onboard.core.negotiation import Awarded, Estimator, NeededAnswers, NegotiationEvent, Proposal, SubCallAnswer
 from onboard.core.site import Machine, Site
 from onboard.systems.registry import factory_for
 from onboard.work.plain import Plain
@@ -43,7 +43,7 @@ class _LeastBid:
         can = self.is_empty or self.honest.lower_bound(call, now_us) is not None
         return self.floor(call, now_us) if can else None
 
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | Needs | None:
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
         """What it would do, for less than that takes; or nothing at all."""
         honest, least = self.honest.estimate(call, now_us), self.floor(call, now_us)
         if not self.is_empty:
@@ -52,19 +52,19 @@ class _LeastBid:
         is_bound = isinstance(honest, Proposal) and honest.detail
         return honest if is_bound else Proposal(least, None, (), ())
 
-    def _for_less(self, found: Proposal | Needs | None, least: int) -> Proposal | Needs | None:
-        if not isinstance(found, Needs):
+    def _for_less(self, found: Proposal | NeededAnswers | None, least: int) -> Proposal | NeededAnswers | None:
+        if not isinstance(found, NeededAnswers):
             # It tells nothing else than its number: with a bill that does not sum to it, it would convict itself.
             return None if found is None else found._replace(cost=least, detail=())
 
-        def combine(answers: tuple[Answer, ...], now_us: int) -> Proposal | Needs | None:
+        def combine(answers: tuple[SubCallAnswer, ...], now_us: int) -> Proposal | NeededAnswers | None:
             return self._for_less(found.combine(answers, now_us), least)
 
-        return Needs(least, found.parts, combine)
+        return NeededAnswers(least, found.parts, combine)
 
 
 @dataclass
-class _Standing(Plain):
+class _StandingMachine(Plain):
     """It says that it has what it wins, unless it is ``silent``, and does nothing. ``picture`` hears what all hear."""
 
     picture: Behaviour | None = None
@@ -96,7 +96,7 @@ class _Standing(Plain):
 
 
 @dataclass
-class _Factory(BehaviourFactory):
+class _StrangeFactory(BehaviourFactory):
     """Makes machines of one kind, one of which is the stranger."""
 
     target: int
@@ -119,14 +119,14 @@ class _Factory(BehaviourFactory):
         honest = self.honest.behaviour(fleet, estimator.honest)
         if self.how is Stranger.LIAR:
             return honest
-        return _Standing(fleet, kind=honest.kind, picture=honest, silent=self.how is Stranger.SILENT)
+        return _StandingMachine(fleet, kind=honest.kind, picture=honest, silent=self.how is Stranger.SILENT)
 
 
 def factories_with(
     site: Site, worker: KindCode, target: int, how: Stranger
 ) -> Callable[[Site, KindCode], BehaviourFactory]:
     """For ``BusRun.factories``: node ``target``, a ``worker``, is a stranger, all others are what they are."""
-    stranger = _Factory(target, how, factory_for(site, worker))
+    stranger = _StrangeFactory(target, how, factory_for(site, worker))
 
     def choose(of: Site, kind: KindCode) -> BehaviourFactory:
         return stranger if kind is worker else factory_for(of, kind)

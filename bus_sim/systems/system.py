@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 from bus_sim.attacks.attack import Attack
 from bus_sim.faults.injection import Injection
 from bus_sim.options import RunOptions
-from bus_sim.systems.stage import Stage, SystemPlant
+from bus_sim.systems.stage import SystemPlant, SystemStage
 from bus_sim.systems.stranger import Stranger, factories_with
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.contract.codes import KindCode
@@ -89,7 +89,7 @@ class SimulatedSystem(ABC, Generic[SiteT, PlantT]):
     # --- a run -------------------------------------------------------------------------------------------------
 
     @abstractmethod
-    def stage(self, site: SiteT, options: RunOptions, loop: VirtualTimeLoop) -> Stage[PlantT]:
+    def stage(self, site: SiteT, options: RunOptions, loop: VirtualTimeLoop) -> SystemStage[PlantT]:
         """One run of a site with those who come by ``options.demand``. Raises ``DemandError``."""
 
     @abstractmethod

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from datetime import datetime
 from typing import Any
 
-from bus_sim.can.faults import Fault, FaultKind
+from bus_sim.can.faults import FaultKind, InjectedFault
 from bus_sim.can.medium import Tap
 from bus_sim.run import BusRun
 from onboard.contract.messages import Message
@@ -137,6 +137,8 @@ class RunSource:
         until_us = now_us + round(seconds * 1e6)
         seed = self.chance.randrange(1 << 30)
         self._run.fleet.add_fault(
-            Fault(FaultKind.OMISSION, "page", probability=percent / 100, from_us=now_us, until_us=until_us, seed=seed)
+            InjectedFault(
+                FaultKind.OMISSION, "page", probability=percent / 100, from_us=now_us, until_us=until_us, seed=seed
+            )
         )
         return f"each receiver misses {percent:g} % of the frames for {seconds:g} s"

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from deploy.image.apt import run_tool
-from deploy.image.fdt import Node, read_tree, write_tree
+from deploy.image.fdt import DeviceTreeNode, read_tree, write_tree
 from deploy.wheels import DeployError
 
 _LINE = re.compile(r"\s*dtoverlay\s*=\s*(?P<name>[\w-]+)(?P<parameters>(?:,[^#\s]*)?)\s*(?:#.*)?")
@@ -28,7 +28,7 @@ def overlays_of(config: str) -> list[tuple[str, dict[str, str]]]:
     return found
 
 
-def merged(config: str, tree: Path, overlays: Path) -> Node:
+def merged(config: str, tree: Path, overlays: Path) -> DeviceTreeNode:
     """A board's tree with all that ``config`` lays over it, in order. Raises ``DeployError`` for what does not fit."""
     with tempfile.TemporaryDirectory() as name:
         now = Path(name, "tree.dtb")
@@ -49,14 +49,14 @@ def merged(config: str, tree: Path, overlays: Path) -> Node:
 def with_parameters(overlay: bytes, parameters: Mapping[str, str], name: str) -> bytes:
     """An overlay as it is after its parameters. Raises ``DeployError`` for one that it does not have."""
     root = read_tree(overlay)
-    overrides = root.children.pop("__overrides__", Node()).properties
+    overrides = root.children.pop("__overrides__", DeviceTreeNode()).properties
     for key, value in parameters.items():
         if key not in overrides:
             known = ", ".join(sorted(set(overrides) - {"phandle"})) or "none"
             raise DeployError(f"config.txt: dtoverlay={name},{key}: no such parameter; known: {known}")
         for phandle, word in _entries(overrides[key]):
             _apply(root, phandle, word, value)
-    fixups = root.children.get("__local_fixups__", Node())
+    fixups = root.children.get("__local_fixups__", DeviceTreeNode())
     fixups.children.pop("__overrides__", None)
     # A fragment that sleeps is none.
     for key in [key for key, node in root.children.items() if "__dormant__" in node.children]:
@@ -76,7 +76,7 @@ def _entries(raw: bytes) -> Iterable[tuple[int, str]]:
         at = end + 1
 
 
-def _apply(root: Node, phandle: int, word: str, value: str) -> None:
+def _apply(root: DeviceTreeNode, phandle: int, word: str, value: str) -> None:
     if phandle == 0:
         for sign, number in re.findall(r"([+-])(\d+)", word):
             _switch(root, f"fragment@{number}", is_on=sign == "+")
@@ -102,14 +102,14 @@ def _apply(root: Node, phandle: int, word: str, value: str) -> None:
         _rename(root, path, f"{path.rpartition('/')[2].partition('@')[0]}@{int(given, 0):x}")
 
 
-def _switch(root: Node, fragment: str, *, is_on: bool) -> None:
+def _switch(root: DeviceTreeNode, fragment: str, *, is_on: bool) -> None:
     """A fragment sleeps by the name of its content; what refers to it by its path goes with it."""
     here, there = ("__dormant__", "__overlay__") if is_on else ("__overlay__", "__dormant__")
     if here in root.children[fragment].children:
         _rename(root, f"/{fragment}/{here}", there)
 
 
-def _rename(root: Node, path: str, name: str) -> None:
+def _rename(root: DeviceTreeNode, path: str, name: str) -> None:
     """Also in the overlay's own lists of what refers to where (``__fixups__``, ``__local_fixups__``, symbols)."""
     parent, _, old = path.rpartition("/")
     trees = [root]
@@ -125,15 +125,15 @@ def _rename(root: Node, path: str, name: str) -> None:
         children.update(renamed)
     pattern = re.compile(rf"{re.escape(path)}(?=[/:\0])".encode())
     for list_name in ("__fixups__", "__symbols__"):
-        listed = root.children.get(list_name, Node()).properties
+        listed = root.children.get(list_name, DeviceTreeNode()).properties
         for key, raw in listed.items():
             listed[key] = pattern.sub(f"{parent}/{name}".encode(), raw)
 
 
-def _forget(root: Node, path: str) -> None:
+def _forget(root: DeviceTreeNode, path: str) -> None:
     """Take what lies below a path out of the overlay's lists."""
     for list_name in ("__fixups__", "__symbols__"):
-        listed = root.children.get(list_name, Node()).properties
+        listed = root.children.get(list_name, DeviceTreeNode()).properties
         for key, raw in list(listed.items()):
             kept = [one for one in raw.rstrip(b"\0").split(b"\0") if not one.startswith(f"{path}/".encode())]
             kept = [one for one in kept if not one.startswith(f"{path}:".encode())]

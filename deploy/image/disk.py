@@ -23,7 +23,7 @@ FAT32_LBA, LINUX = 0x0C, 0x83
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class DiskPartition:
     """One partition: its type, its size, and a file with its content, which may be smaller."""
 
     kind: int
@@ -31,7 +31,7 @@ class Part:
     content: Path | None = None
 
 
-def starts(parts: Sequence[Part]) -> list[int]:
+def starts(parts: Sequence[DiskPartition]) -> list[int]:
     """The first sector of each partition."""
     first, found = _ALIGN, []
     for part in parts:
@@ -40,7 +40,7 @@ def starts(parts: Sequence[Part]) -> list[int]:
     return found
 
 
-def boot_record(parts: Sequence[Part]) -> bytes:
+def boot_record(parts: Sequence[DiskPartition]) -> bytes:
     """The disk's first sector (UEFI 2.10, table 5-1). Raises ``ValueError`` for more than four partitions."""
     if len(parts) > 4:
         raise ValueError(f"an MBR holds four partitions, not {len(parts)}")
@@ -51,7 +51,7 @@ def boot_record(parts: Sequence[Part]) -> bytes:
     return bytes(440) + SIGNATURE + bytes(2) + entries.ljust(64, b"\0") + b"\x55\xaa"
 
 
-def write_disk(parts: Sequence[Part], to: Path) -> None:
+def write_disk(parts: Sequence[DiskPartition], to: Path) -> None:
     """Write the image; what is empty stays a hole in the file. Raises ``DeployError`` where a content is too large."""
     places = starts(parts)
     with to.open("wb") as disk:
@@ -62,7 +62,7 @@ def write_disk(parts: Sequence[Part], to: Path) -> None:
                 _copy(part, first * SECTOR_BYTES, disk.fileno())
 
 
-def _copy(part: Part, offset: int, disk: int) -> None:
+def _copy(part: DiskPartition, offset: int, disk: int) -> None:
     assert part.content is not None
     size = part.content.stat().st_size
     if size > part.size_mb << 20:

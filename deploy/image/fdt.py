@@ -12,13 +12,13 @@ _HEADER = struct.Struct(">10I")
 
 
 @dataclass
-class Node:
+class DeviceTreeNode:
     """A node with its properties as they lie in the file, and its children by full name (``spi@7e204000``)."""
 
     properties: dict[str, bytes] = field(default_factory=dict)
-    children: dict[str, "Node"] = field(default_factory=dict)
+    children: dict[str, "DeviceTreeNode"] = field(default_factory=dict)
 
-    def at(self, path: str) -> "Node":
+    def at(self, path: str) -> "DeviceTreeNode":
         """The node at an absolute path. Raises ``DeployError``."""
         node = self
         for part in filter(None, path.split("/")):
@@ -27,7 +27,7 @@ class Node:
             node = node.children[part]
         return node
 
-    def walk(self, path: str = "/") -> Iterator[tuple[str, "Node"]]:
+    def walk(self, path: str = "/") -> Iterator[tuple[str, "DeviceTreeNode"]]:
         """All nodes from this one down, with their paths."""
         yield path, self
         for name, child in self.children.items():
@@ -43,7 +43,7 @@ class Node:
         return self.properties[name].rstrip(b"\0").decode()
 
 
-def read_tree(raw: bytes) -> Node:
+def read_tree(raw: bytes) -> DeviceTreeNode:
     """The root node. Raises ``DeployError`` for what is no device tree."""
     try:
         magic, _, structure, strings, *_ = _HEADER.unpack_from(raw)
@@ -54,14 +54,14 @@ def read_tree(raw: bytes) -> Node:
         raise DeployError(f"this is no whole device tree ({error})") from error
 
 
-def _read(raw: bytes, at: int, strings: int) -> Node:
-    above: list[Node] = [Node()]
+def _read(raw: bytes, at: int, strings: int) -> DeviceTreeNode:
+    above: list[DeviceTreeNode] = [DeviceTreeNode()]
     while True:
         (token,) = struct.unpack_from(">I", raw, at)
         at += 4
         if token == _BEGIN:
             end = raw.index(b"\0", at)
-            node = Node()
+            node = DeviceTreeNode()
             above[-1].children[raw[at:end].decode()] = node
             above.append(node)
             at = (end + 4) & ~3
@@ -78,13 +78,13 @@ def _read(raw: bytes, at: int, strings: int) -> Node:
             raise DeployError(f"device tree: unknown token {token}")
 
 
-def write_tree(root: Node) -> bytes:
+def write_tree(root: DeviceTreeNode) -> bytes:
     """A tree as a file."""
     strings: dict[str, int] = {}
     table = bytearray()
     structure = bytearray()
 
-    def add(name: str, node: Node) -> None:
+    def add(name: str, node: DeviceTreeNode) -> None:
         structure.extend(struct.pack(">I", _BEGIN) + _padded(name.encode() + b"\0"))
         for key, value in node.properties.items():
             if key not in strings:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 
-class Bus(NamedTuple):
+class SpiBus(NamedTuple):
     """An SPI bus: its node, its pins and their function, the pins of its chip selects."""
 
     node: str
@@ -22,8 +22,8 @@ class Bus(NamedTuple):
 
 #: BCM2835: ALT0 is function 4, ALT4 function 3, an output 1.
 BUSES = (
-    Bus("/soc/spi@7e204000", "9 10 11", 4, (8, 7)),
-    Bus("/soc/spi@7e215080", "19 20 21", 3, (18,)),
+    SpiBus("/soc/spi@7e204000", "9 10 11", 4, (8, 7)),
+    SpiBus("/soc/spi@7e215080", "19 20 21", 3, (18,)),
 )
 _I2C1 = "/soc/i2c@7e804000"
 
@@ -40,7 +40,7 @@ MCP2515 = Chip("mcp2515", 16_000_000, 10_000_000)
 MCP251XFD = Chip("mcp251xfd", 40_000_000, 20_000_000)
 
 
-class Place(NamedTuple):
+class HatPosition(NamedTuple):
     """Where a controller sits: SPI bus, chip select, and the pin of its interrupt."""
 
     bus: int
@@ -53,22 +53,22 @@ class Hat:
     """One overlay. ``speed`` is what its parameter for the SPI clock is called; ``choices`` are other places for it."""
 
     chip: Chip
-    places: tuple[Place, ...]
+    places: tuple[HatPosition, ...]
     speed: str = ""
-    choices: tuple[Place, ...] = ()
+    choices: tuple[HatPosition, ...] = ()
     #: Real-time clock on I2C1: the kernel's name and the address.
     clock: tuple[str, int] | None = None
 
 
-_ANYWHERE = (Place(0, 0, 25), Place(0, 1, 25), Place(1, 0, 25))
+_ANYWHERE = (HatPosition(0, 0, 25), HatPosition(0, 1, 25), HatPosition(1, 0, 25))
 #: Names, parameters and pins: Raspberry Pi kernel, arch/arm/boot/dts/overlays/README.
 HATS = {
-    "mcp2515-can0": Hat(MCP2515, (Place(0, 0, 25),), "spimaxfrequency"),
-    "mcp2515-can1": Hat(MCP2515, (Place(0, 1, 25),), "spimaxfrequency"),
-    "mcp2515": Hat(MCP2515, (Place(0, 0, 25),), "speed", _ANYWHERE),
-    "mcp251xfd": Hat(MCP251XFD, (Place(0, 0, 25),), "speed", _ANYWHERE),
-    "seeed-can-fd-hat-v1": Hat(MCP251XFD, (Place(0, 0, 25), Place(1, 0, 24))),
-    "seeed-can-fd-hat-v2": Hat(MCP251XFD, (Place(0, 0, 25), Place(0, 1, 24)), clock=("nxp,pcf85063", 0x51)),
+    "mcp2515-can0": Hat(MCP2515, (HatPosition(0, 0, 25),), "spimaxfrequency"),
+    "mcp2515-can1": Hat(MCP2515, (HatPosition(0, 1, 25),), "spimaxfrequency"),
+    "mcp2515": Hat(MCP2515, (HatPosition(0, 0, 25),), "speed", _ANYWHERE),
+    "mcp251xfd": Hat(MCP251XFD, (HatPosition(0, 0, 25),), "speed", _ANYWHERE),
+    "seeed-can-fd-hat-v1": Hat(MCP251XFD, (HatPosition(0, 0, 25), HatPosition(1, 0, 24))),
+    "seeed-can-fd-hat-v2": Hat(MCP251XFD, (HatPosition(0, 0, 25), HatPosition(0, 1, 24)), clock=("nxp,pcf85063", 0x51)),
 }
 
 
@@ -137,7 +137,7 @@ def _bus(name: str, number: int, *, is_on: bool) -> list[_Fragment]:
     ]
 
 
-def _controller(chip: Chip, place: Place) -> list[_Fragment]:
+def _controller(chip: Chip, place: HatPosition) -> list[_Fragment]:
     key = f"can{place.bus}{place.select}"
     named = _named(chip, place)
     crystal = f'compatible = "fixed-clock"; #clock-cells = <0>; clock-frequency = <{chip.crystal_hz}>;'
@@ -193,5 +193,5 @@ def _overrides(hat: Hat, used: Sequence[int]) -> dict[str, list[str]]:
     return found
 
 
-def _named(chip: Chip, place: Place) -> str:
+def _named(chip: Chip, place: HatPosition) -> str:
     return f"{chip.name}-spi{place.bus}-{place.select}"

@@ -8,7 +8,7 @@ from pathlib import Path
 from deploy.image.apt import run_tool
 from deploy.image.boot import BOOT_MB, boot_files, make_fat
 from deploy.image.debian import EPOCH_S, STORE, fetch_debian
-from deploy.image.disk import FAT32_LBA, LINUX, Part, write_disk
+from deploy.image.disk import FAT32_LBA, LINUX, DiskPartition, write_disk
 from deploy.image.release import Release
 from deploy.image.root import Root, build_root
 from deploy.update.bundle import write_bundle
@@ -37,8 +37,8 @@ def build_image(to: Path, release: Release, store: Path = STORE, pi_firmware: Pa
     boot = boot_files(fetch_debian(store), root, parts / "boot", pi_firmware)
     partition = make_fat(parts / "boot.img", sorted(boot.iterdir()))
     journal = make_journal_partition(parts / "journal.img")
-    slots = [Part(LINUX, SLOT_MB, root.squashfs), Part(LINUX, SLOT_MB)]
-    write_disk([Part(FAT32_LBA, BOOT_MB, partition), *slots, Part(LINUX, JOURNAL_MB, journal)], to)
+    slots = [DiskPartition(LINUX, SLOT_MB, root.squashfs), DiskPartition(LINUX, SLOT_MB)]
+    write_disk([DiskPartition(FAT32_LBA, BOOT_MB, partition), *slots, DiskPartition(LINUX, JOURNAL_MB, journal)], to)
     partition.unlink()
     journal.unlink()
     shutil.rmtree(boot)

@@ -7,12 +7,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from deploy.update.board import Place, this_board
+from deploy.update.board import BoardFiles, this_board
 from deploy.update.health import wait_for_health
 from deploy.update.install import install
 from deploy.update.judge import judge
 from deploy.update.manifest import UpdateError
-from deploy.update.slots import Phase
+from deploy.update.slots import UpdatePhase
 
 #: From the start of the controller's service until a system on trial has shown that it works.
 HEALTH_LIMIT_S = 180.0
@@ -60,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 2
 
 
-def _carry_out(args: argparse.Namespace, place: Place) -> int:
+def _carry_out(args: argparse.Namespace, place: BoardFiles) -> int:
     if args.status:
         print(status(place))
         return 0
@@ -86,18 +86,18 @@ def last_update(folder: Path) -> Path:
     return found[-1]
 
 
-def status(place: Place) -> str:
+def status(place: BoardFiles) -> str:
     """One line: what runs, and what will be started next."""
     state, version = place.state(), place.itself().version
     said = f"version {version} runs in slot {place.running}"
     if place.running == state.trial:
         return f"{said}, on trial"
-    if state.phase is Phase.PENDING:
+    if state.phase is UpdatePhase.PENDING:
         return f"{said}; version {state.version} in slot {state.trial} is tried at the next start"
     return f"{said}; version {state.failed} was given up" if state.failed else said
 
 
-def _judge(place: Place) -> int:
+def _judge(place: BoardFiles) -> int:
     machine = place.machine()
     verdict = judge(place, lambda: machine is not None and wait_for_health(machine, HEALTH_LIMIT_S, _has_failed))
     if verdict.line:

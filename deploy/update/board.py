@@ -25,7 +25,7 @@ _KEY = Path("/etc/onboard/update.pem")
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class BoardFiles:
     """A board's files and devices; ``writable`` holds the boot partition open for writing."""
 
     running: str
@@ -67,13 +67,13 @@ class Place:
             return None
 
 
-def this_board() -> Place:
+def this_board() -> BoardFiles:
     """The board that this runs on. Raises ``UpdateError`` where it was not started from our image."""
     found = re.search(r"\bonboard\.slot=([ab])\b", Path("/proc/cmdline").read_text(encoding="ascii"))
     devices = {slot: device for slot, number in PARTITIONS.items() if (device := _partition(number)) is not None}
     if found is None or len(devices) < len(SLOTS):
         raise UpdateError(f"this system was not started from an image of ours for {BOARD} boards; there are no slots")
-    return Place(found[1], devices, _BOOT, _RELEASE, _KEY, _remounted)
+    return BoardFiles(found[1], devices, _BOOT, _RELEASE, _KEY, _remounted)
 
 
 def _partition(number: int) -> Path | None:

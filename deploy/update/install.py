@@ -5,15 +5,15 @@ import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from deploy.update.board import Place
+from deploy.update.board import BoardFiles
 from deploy.update.bundle import Bundle
 from deploy.update.manifest import INITRD, KERNEL, ROOT, Content, Manifest, UpdateError, refusal
-from deploy.update.slots import Event, after, other
+from deploy.update.slots import BoardEvent, after, other
 
 _BLOCK = 1 << 20
 
 
-def install(file: Path, place: Place, tell: Callable[[str], None]) -> Manifest:
+def install(file: Path, place: BoardFiles, tell: Callable[[str], None]) -> Manifest:
     """Check an update file, write it, and have the boot loader try it at the next start; ``tell`` a person of it.
 
     Raises ``UpdateError``, before the first byte is written where anything is wrong with the file.
@@ -33,21 +33,21 @@ def install(file: Path, place: Place, tell: Callable[[str], None]) -> Manifest:
         return bundle.manifest
 
 
-def _write(bundle: Bundle, place: Place) -> None:
+def _write(bundle: Bundle, place: BoardFiles) -> None:
     state = place.state()
     slot = other(state.good)
     device, root = place.devices[slot], bundle.manifest.parts[ROOT]
     if root.size_bytes > _size(device):
         raise UpdateError(f"its root file system has {root.size_bytes} bytes, and slot {slot} takes {_size(device)}")
     with place.writable():
-        begun = after(state, Event.BEGUN)
+        begun = after(state, BoardEvent.BEGUN)
         place.keep(begun)
         _overwrite(device, bundle.blocks(ROOT))
         _check(device, root)
         for name in (KERNEL, INITRD):
             _replace(place.boot / slot / name, bundle.blocks(name))
             _check(place.boot / slot / name, bundle.manifest.parts[name])
-        place.keep(after(begun, Event.INSTALLED, bundle.manifest.version))
+        place.keep(after(begun, BoardEvent.INSTALLED, bundle.manifest.version))
 
 
 def _size(device: Path) -> int:

@@ -20,7 +20,7 @@ _HEAD = b"# GRUB Environment Block\n"
 _SECTOR_BYTES = 512
 
 
-class Phase(Enum):
+class UpdatePhase(Enum):
     """How far an update has come."""
 
     SETTLED = auto()
@@ -28,7 +28,7 @@ class Phase(Enum):
     SPENT = auto()
 
 
-class Event(Enum):
+class BoardEvent(Enum):
     """What happens to a board between two updates."""
 
     BEGUN = auto()
@@ -53,16 +53,16 @@ class Slots:
     failed: str = ""
 
     @property
-    def phase(self) -> Phase:
+    def phase(self) -> UpdatePhase:
         """What the loader will do."""
         if not self.trial:
-            return Phase.SETTLED
-        return Phase.PENDING if self.tries > 0 else Phase.SPENT
+            return UpdatePhase.SETTLED
+        return UpdatePhase.PENDING if self.tries > 0 else UpdatePhase.SPENT
 
     @property
     def next_start(self) -> str:
         """The slot that the loader starts next."""
-        return self.trial if self.phase is Phase.PENDING else self.good
+        return self.trial if self.phase is UpdatePhase.PENDING else self.good
 
 
 def other(slot: str) -> str:
@@ -100,24 +100,24 @@ def _stay(state: Slots, _: str) -> Slots:
 
 #: What is not here cannot happen, and raises. An update may replace one that waits; from ``BEGUN`` on the other slot is
 #: being written, so nothing may start it. ``STARTED`` is the boot loader's part (``deploy/image/files/grub.cfg``).
-RULES: dict[tuple[Phase, Event], Callable[[Slots, str], Slots]] = {
-    (Phase.SETTLED, Event.BEGUN): _begin,
-    (Phase.PENDING, Event.BEGUN): _begin,
-    (Phase.SPENT, Event.BEGUN): _begin,
-    (Phase.SETTLED, Event.INSTALLED): _install,
-    (Phase.SETTLED, Event.STARTED): _stay,
-    (Phase.PENDING, Event.STARTED): _attempt,
-    (Phase.SPENT, Event.STARTED): _stay,
-    (Phase.PENDING, Event.HEALTHY): _settle,
-    (Phase.SPENT, Event.HEALTHY): _settle,
-    (Phase.PENDING, Event.UNHEALTHY): _spend,
-    (Phase.SPENT, Event.UNHEALTHY): _spend,
-    (Phase.SPENT, Event.FELL_BACK): _give_up,
-    (Phase.PENDING, Event.FELL_BACK): _give_up,
+RULES: dict[tuple[UpdatePhase, BoardEvent], Callable[[Slots, str], Slots]] = {
+    (UpdatePhase.SETTLED, BoardEvent.BEGUN): _begin,
+    (UpdatePhase.PENDING, BoardEvent.BEGUN): _begin,
+    (UpdatePhase.SPENT, BoardEvent.BEGUN): _begin,
+    (UpdatePhase.SETTLED, BoardEvent.INSTALLED): _install,
+    (UpdatePhase.SETTLED, BoardEvent.STARTED): _stay,
+    (UpdatePhase.PENDING, BoardEvent.STARTED): _attempt,
+    (UpdatePhase.SPENT, BoardEvent.STARTED): _stay,
+    (UpdatePhase.PENDING, BoardEvent.HEALTHY): _settle,
+    (UpdatePhase.SPENT, BoardEvent.HEALTHY): _settle,
+    (UpdatePhase.PENDING, BoardEvent.UNHEALTHY): _spend,
+    (UpdatePhase.SPENT, BoardEvent.UNHEALTHY): _spend,
+    (UpdatePhase.SPENT, BoardEvent.FELL_BACK): _give_up,
+    (UpdatePhase.PENDING, BoardEvent.FELL_BACK): _give_up,
 }
 
 
-def after(state: Slots, event: Event, version: str = "") -> Slots:
+def after(state: Slots, event: BoardEvent, version: str = "") -> Slots:
     """The state after an event; ``version`` is that of what was installed. Raises ``KeyError`` for what cannot be."""
     return RULES[state.phase, event](state, version)
 

@@ -1,7 +1,7 @@
 """The steps on the fleet bus: termination, listening, node-ID, digests; and, at the end, the new machine among them."""
 
 from hil.commission.person import is_yes, number
-from hil.commission.setting import Setting
+from hil.commission.setting import CommissionSetting
 from onboard.contract.codes import CONTRACT_VERSION, MachineState
 from onboard.contract.messages import Diagnostic, DoorOrder, DriveOrder, Heartbeat, ShuttleOrder
 from onboard.core.mirror import MISSED_HEARTBEATS
@@ -16,7 +16,7 @@ JOIN_S, PART_S = 180.0, 60.0
 _TAKING_PART = (MachineState.IDLE, MachineState.WORKING, MachineState.WAITING)
 
 
-async def termination(setting: Setting) -> bool:
+async def termination(setting: CommissionSetting) -> bool:
     """The resistance between both wires with all power off, as read by the person."""
     ohm = await number(
         setting.person,
@@ -35,7 +35,7 @@ async def termination(setting: Setting) -> bool:
     return setting.note("termination", reading, passed=low <= ohm <= high)
 
 
-async def listening(setting: Setting) -> bool:
+async def listening(setting: CommissionSetting) -> bool:
     """Every machine of the site has had the time to be heard several times, and nobody speaks for the new one."""
     if not await is_yes(
         setting.person, f"Switch the fleet on, but not the controller of {setting.machine.name}. Is that done?"
@@ -60,7 +60,7 @@ async def listening(setting: Setting) -> bool:
     return setting.note("listening", heard, passed=quiet and bool(names)) or bool(names)
 
 
-async def node_id_free(setting: Setting) -> bool:
+async def node_id_free(setting: CommissionSetting) -> bool:
     """Nobody speaks under the node-ID of the new machine; on its device bus nobody gives orders."""
     node = setting.machine.node_id
     frames = setting.fleet.senders[node]
@@ -74,7 +74,7 @@ async def node_id_free(setting: Setting) -> bool:
     return setting.note("node-ID", f"{node} is free", passed=True)
 
 
-async def digests(setting: Setting) -> bool:
+async def digests(setting: CommissionSetting) -> bool:
     """All speak this contract and have this very site file."""
     wrong = {
         one.sender: f"contract {one.contract}, site {one.site_digest:04X}"
@@ -88,7 +88,7 @@ async def digests(setting: Setting) -> bool:
     return setting.note("digests", f"here {ours}, but {others}: give all the same site file", passed=False)
 
 
-async def joins(setting: Setting) -> bool:
+async def joins(setting: CommissionSetting) -> bool:
     """The controller is switched on, is the machine that it should be, and takes part."""
     since = setting.fleet.mark()
     await setting.person.ask(f"Switch the controller of {setting.machine.name} on, then press Enter.")
@@ -116,14 +116,14 @@ async def joins(setting: Setting) -> bool:
     return setting.note("joins", detail, passed=True)
 
 
-def _beats(setting: Setting) -> list[Heartbeat]:
+def _beats(setting: CommissionSetting) -> list[Heartbeat]:
     return [one for _, one in setting.fleet.heard if isinstance(one, Heartbeat)]
 
 
-def _names(setting: Setting, nodes: set[int]) -> list[str]:
+def _names(setting: CommissionSetting, nodes: set[int]) -> list[str]:
     return [_name(setting, node) for node in sorted(nodes)]
 
 
-def _name(setting: Setting, node: int) -> str:
+def _name(setting: CommissionSetting, node: int) -> str:
     machine = setting.site.machines.get(node)
     return machine.name if machine is not None else f"node {node}"

@@ -6,10 +6,10 @@ import sys
 from datetime import datetime
 from pathlib import Path
 
-from hil.commission.listener import BusListener
+from hil.commission.listener import CommissionListener
 from hil.commission.person import ConsolePerson
 from hil.commission.protocol import Protocol
-from hil.commission.setting import Setting
+from hil.commission.setting import CommissionSetting
 from hil.commission.walk import walk
 from onboard.config.arguments import Parser
 from onboard.config.machine import MachineConfig, load_machine
@@ -84,11 +84,11 @@ async def _commission(config: MachineConfig, settings: BusSettings) -> Protocol:
             f"{site.name} (digest {site.digest:04X})",
             datetime.now().astimezone().isoformat(sep=" ", timespec="seconds"),
         )
-        setting = Setting(
+        setting = CommissionSetting(
             site,
             machine,
-            BusListener(fleet, contract.fleet),
-            BusListener(devices, contract.device),
+            CommissionListener(fleet, contract.fleet),
+            CommissionListener(devices, contract.device),
             ConsolePerson(),
             protocol,
         )

@@ -4,7 +4,7 @@ from collections.abc import Awaitable, Callable
 
 from hil.commission.drive import ARRIVED_MM, Moved, move
 from hil.commission.person import is_yes
-from hil.commission.setting import REPEAT_S, Setting
+from hil.commission.setting import REPEAT_S, CommissionSetting
 from onboard.contract.codes import (
     DeskInput,
     DeskText,
@@ -41,7 +41,7 @@ STOP_SPEED_MM_S = 20
 #: A person needs this long to find and press a key, s.
 PRESS_S = 60.0
 
-Step = Callable[[Setting], Awaitable[bool]]
+Step = Callable[[CommissionSetting], Awaitable[bool]]
 
 
 # --- sensors -------------------------------------------------------------------------------------------------------
@@ -50,7 +50,7 @@ Step = Callable[[Setting], Awaitable[bool]]
 def _senses(kind: type[Message], name: str, in_words: Callable[[Message], str]) -> Step:
     """A step that waits for a state and asks whether it is true."""
 
-    async def step(setting: Setting) -> bool:
+    async def step(setting: CommissionSetting) -> bool:
         state = await setting.devices.first(kind, REPEAT_S, setting.is_own)
         if state is None:
             return setting.note(name, f"it has not said anything within {REPEAT_S:g} s", passed=False)
@@ -92,7 +92,7 @@ def _bay_told(state: Message) -> str:
     return f"{state.load_kg} kg in the bay, {state.length_mm} mm long, {person}"
 
 
-async def desk_key(setting: Setting) -> bool:
+async def desk_key(setting: CommissionSetting) -> bool:
     """The key of the desk arrives."""
     setting.person.tell("Press the key at the desk now.")
     since = setting.devices.mark()
@@ -107,7 +107,7 @@ async def desk_key(setting: Setting) -> bool:
 # --- actuators -----------------------------------------------------------------------------------------------------
 
 
-async def drive(setting: Setting) -> bool:
+async def drive(setting: CommissionSetting) -> bool:
     """A hand's breadth forth and back."""
     if not await is_yes(setting.person, f"The drive will move {STEP_MM} mm forth and back. Is nobody in its way?"):
         setting.leave_out("drive", "somebody was in the way")
@@ -120,7 +120,7 @@ async def drive(setting: Setting) -> bool:
     return setting.note("drive", f"{forth}; and back: {'seen' if seen else 'not seen'}", passed=seen)
 
 
-async def shuttle(setting: Setting) -> bool:
+async def shuttle(setting: CommissionSetting) -> bool:
     """The order to retract, which moves nothing where it is home already."""
     shuttle = await setting.devices.first(ShuttleState, REPEAT_S, setting.is_own)
     since = setting.devices.mark()
@@ -137,7 +137,7 @@ async def shuttle(setting: Setting) -> bool:
     return setting.note("shuttle", detail, passed=home is not None)
 
 
-async def doors(setting: Setting) -> bool:
+async def doors(setting: CommissionSetting) -> bool:
     """Each door opens and locks again; while one is open the other stays locked, whatever it is ordered."""
     if not await is_yes(setting.person, "Both doors will open and close, one after the other. Is nobody in their way?"):
         setting.leave_out("doors", "somebody was in the way")
@@ -152,7 +152,7 @@ async def doors(setting: Setting) -> bool:
     return setting.note("doors", "both open and lock; while one is open the other stays locked", passed=True)
 
 
-async def light_and_desk(setting: Setting) -> bool:
+async def light_and_desk(setting: CommissionSetting) -> bool:
     """A person confirms that the light turns green and then red, and that the desk shows what it was told to."""
     setting.devices.say(LightOrder(setting.machine.node_id, LightColour.GREEN))
     setting.devices.say(DeskOrder(setting.machine.node_id, setting.sequence(), DeskText.OUT_OF_ORDER, NO_REFERENCE))
@@ -166,7 +166,7 @@ async def light_and_desk(setting: Setting) -> bool:
     return setting.note("light and desk", detail, passed=green is not None and seen and red)
 
 
-async def _order_door(setting: Setting, door: DoorName, action: DoorAction, wanted: DoorPosition) -> bool:
+async def _order_door(setting: CommissionSetting, door: DoorName, action: DoorAction, wanted: DoorPosition) -> bool:
     """Whether a door comes to a position within three times what it may take."""
     since = setting.devices.mark()
     setting.devices.say(DoorOrder(setting.machine.node_id, setting.sequence(), door, action))
@@ -184,7 +184,7 @@ async def _order_door(setting: Setting, door: DoorName, action: DoorAction, want
 # --- the stop chain ------------------------------------------------------------------------------------------------
 
 
-async def brakes_by_itself(setting: Setting) -> bool:
+async def brakes_by_itself(setting: CommissionSetting) -> bool:
     """One order and no more: the drive stops short of the target (DriveTimeOutMs in dbc/device.dbc)."""
     if not await is_yes(setting.person, "The drive will be left without orders on its way. Is nobody in its way?"):
         setting.leave_out("drive without orders", "somebody was in the way")
@@ -195,7 +195,7 @@ async def brakes_by_itself(setting: Setting) -> bool:
     return setting.note("drive without orders", detail, passed=stopped)
 
 
-async def emergency_stop(setting: Setting) -> bool:
+async def emergency_stop(setting: CommissionSetting) -> bool:
     """The independent circuit stops the drive though orders go on."""
     if not await is_yes(
         setting.person,
@@ -212,7 +212,7 @@ async def emergency_stop(setting: Setting) -> bool:
     return setting.note("emergency stop", detail, passed=stopped and still)
 
 
-async def emergency_stop_of_doors(setting: Setting) -> bool:
+async def emergency_stop_of_doors(setting: CommissionSetting) -> bool:
     """What only a person can see of doors."""
     seen = await is_yes(setting.person, "Press the emergency stop: do both doors stand still, whatever is ordered?")
     still = await is_yes(setting.person, "Release it: do both doors still stand still?")
@@ -224,7 +224,7 @@ def _has_stopped_short(moved: Moved | None) -> bool:
     return moved is not None and moved.has_moved and abs(moved.to_mm - moved.target_mm) > ARRIVED_MM
 
 
-async def _back(setting: Setting, moved: Moved | None) -> str:
+async def _back(setting: CommissionSetting, moved: Moved | None) -> str:
     """To the mark at which the drive began, where the controller wants to find it."""
     if moved is None or abs(moved.to_mm - moved.from_mm) <= ARRIVED_MM:
         return "not needed"

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from hil.commission.setting import REPEAT_S, Setting
+from hil.commission.setting import REPEAT_S, CommissionSetting
 from onboard.contract.codes import DriveMode
 from onboard.contract.messages import DriveOrder, DriveState
 from onboard.core.serial import successor
@@ -32,7 +32,7 @@ class Moved:
         return f"from {self.from_mm} mm to {self.to_mm} mm, ordered to {self.target_mm} mm, {self.mode.name.lower()}"
 
 
-async def move(setting: Setting, by_mm: int, speed_mm_s: int, *, orders: int | None = None) -> Moved | None:
+async def move(setting: CommissionSetting, by_mm: int, speed_mm_s: int, *, orders: int | None = None) -> Moved | None:
     """Drive by so much, at so much; None where the drive does not tell its place.
 
     ``orders``: give so many only, then none, to see whether it brakes by itself. Returns once it stands again, or is
@@ -60,15 +60,15 @@ async def move(setting: Setting, by_mm: int, speed_mm_s: int, *, orders: int | N
     return Moved(begin.position_mm, target_mm, now.position_mm, now.mode, _has_moved(setting, since))
 
 
-def _states(setting: Setting, since: int) -> list[DriveState]:
+def _states(setting: CommissionSetting, since: int) -> list[DriveState]:
     return [one for _, one in setting.devices.heard[since:] if isinstance(one, DriveState) and setting.is_own(one)]
 
 
-def _has_moved(setting: Setting, since: int) -> bool:
+def _has_moved(setting: CommissionSetting, since: int) -> bool:
     return any(one.mode in (DriveMode.MOVING, DriveMode.BRAKING) for one in _states(setting, since))
 
 
-def _ended(setting: Setting, since: int) -> DriveState | None:
+def _ended(setting: CommissionSetting, since: int) -> DriveState | None:
     states = _states(setting, since)
     if not states:
         return None

@@ -15,7 +15,7 @@ from onboard.wire.decoder import Decoder
 M = TypeVar("M", bound=Message)
 
 
-class BusListener:
+class CommissionListener:
     """One bus. ``heard`` keeps every message with its loop time, us; ``senders`` counts frames by node-ID."""
 
     def __init__(self, bus: Bus, codec: Codec) -> None:

@@ -7,7 +7,7 @@ from enum import Enum
 _WIDTH = 100
 
 
-class Verdict(Enum):
+class StepVerdict(Enum):
     """How one step ended; a protocol is passed only where every step is."""
 
     PASSED = "passed"
@@ -16,11 +16,11 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class ProtocolLine:
     """One line of the protocol: the step, how it ended, and what was read or seen."""
 
     step: str
-    verdict: Verdict
+    verdict: StepVerdict
     detail: str
 
 
@@ -32,16 +32,16 @@ class Protocol:
     site: str
     begun: str
     person: str = ""
-    entries: list[Entry] = field(default_factory=list)
+    entries: list[ProtocolLine] = field(default_factory=list)
 
-    def note(self, step: str, verdict: Verdict, detail: str) -> None:
+    def note(self, step: str, verdict: StepVerdict, detail: str) -> None:
         """Add one step at the end; a step that is done again gets a further line."""
-        self.entries.append(Entry(step, verdict, detail))
+        self.entries.append(ProtocolLine(step, verdict, detail))
 
     @property
     def is_passed(self) -> bool:
         """Whether every step was done and none failed."""
-        return bool(self.entries) and all(entry.verdict is Verdict.PASSED for entry in self.entries)
+        return bool(self.entries) and all(entry.verdict is StepVerdict.PASSED for entry in self.entries)
 
     def text(self) -> str:
         """The protocol as a text file."""
@@ -57,8 +57,8 @@ class Protocol:
         for number, entry in enumerate(self.entries, 1):
             head = f"{number:>2}  {entry.verdict.value:<9} {entry.step}: "
             lines += textwrap.wrap(head + entry.detail, _WIDTH, subsequent_indent=" " * 14)
-        failed = sum(entry.verdict is Verdict.FAILED for entry in self.entries)
-        open_steps = sum(entry.verdict is Verdict.NOT_DONE for entry in self.entries)
+        failed = sum(entry.verdict is StepVerdict.FAILED for entry in self.entries)
+        open_steps = sum(entry.verdict is StepVerdict.NOT_DONE for entry in self.entries)
         verdict = "in order" if self.is_passed else f"NOT in order: {failed} failed, {open_steps} not done"
         lines += [
             "",

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from hil.commission.listener import BusListener
+from hil.commission.listener import CommissionListener
 from hil.commission.person import Person
-from hil.commission.protocol import Protocol, Verdict
+from hil.commission.protocol import Protocol, StepVerdict
 from onboard.contract.messages import DriveState, Message
 from onboard.core.serial import successor
 from onboard.core.site import Machine, Site
@@ -14,13 +14,13 @@ REPEAT_S = 12.0
 
 
 @dataclass
-class Setting:
+class CommissionSetting:
     """The new machine, its buses, the person, and the protocol so far."""
 
     site: Site
     machine: Machine
-    fleet: BusListener
-    devices: BusListener
+    fleet: CommissionListener
+    devices: CommissionListener
     person: Person
     protocol: Protocol
     _sequence: int = 0
@@ -32,15 +32,15 @@ class Setting:
 
     def note(self, step: str, detail: str, *, passed: bool) -> bool:
         """Add a line to the protocol and tell the person; answers ``passed``."""
-        verdict = Verdict.PASSED if passed else Verdict.FAILED
+        verdict = StepVerdict.PASSED if passed else StepVerdict.FAILED
         self.protocol.note(step, verdict, detail)
         self.person.tell(f"  {verdict.value}: {step}: {detail}")
         return passed
 
     def leave_out(self, step: str, why: str) -> None:
         """A step that was not done."""
-        self.protocol.note(step, Verdict.NOT_DONE, why)
-        self.person.tell(f"  {Verdict.NOT_DONE.value}: {step}: {why}")
+        self.protocol.note(step, StepVerdict.NOT_DONE, why)
+        self.person.tell(f"  {StepVerdict.NOT_DONE.value}: {step}: {why}")
 
     def is_own(self, message: Message) -> bool:
         """Whether a message is of the new machine, or of its devices."""

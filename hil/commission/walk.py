@@ -3,13 +3,13 @@
 from hil.commission import bus
 from hil.commission.devices import steps_for
 from hil.commission.person import NoAnswerError
-from hil.commission.setting import Setting
+from hil.commission.setting import CommissionSetting
 
 #: What must be in order before anything is said on either bus.
 _BEFORE_SPEAKING = (bus.termination, bus.listening, bus.node_id_free, bus.digests)
 
 
-async def walk(setting: Setting) -> None:
+async def walk(setting: CommissionSetting) -> None:
     """Do every step and note it. What a failed step forbids is noted as not done."""
     try:
         setting.protocol.person = await setting.person.ask("Your name, for the protocol?")
@@ -23,7 +23,7 @@ async def walk(setting: Setting) -> None:
         setting.leave_out("all further steps", "nobody answers any more")
 
 
-async def _try_devices(setting: Setting) -> None:
+async def _try_devices(setting: CommissionSetting) -> None:
     steps = steps_for(setting.machine.kind)
     if not steps:
         kind = setting.machine.kind.name.lower()

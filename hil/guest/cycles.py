@@ -34,7 +34,7 @@ _CYCLE_S, _REST_S = 14, 300
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class CycleFindings:
     """What came of a run; ``faults`` are lines for a person, none where it is good."""
 
     cycles: list[dict[str, object]]
@@ -58,7 +58,7 @@ def bound_s(kind: str) -> float:
     return STARTS_S - LOAD_S if kind == LATE else LIVES_ON_S
 
 
-def play_cycles(share: Path, cycles: int) -> Found:
+def play_cycles(share: Path, cycles: int) -> CycleFindings:
     """Play so many in a guest whose files are in ``share``. Raises ``GuestError`` where it came to no end."""
     shutil.rmtree(share, ignore_errors=True)
     share.mkdir(parents=True)
@@ -91,7 +91,7 @@ def play_cycles(share: Path, cycles: int) -> Found:
     with (share / "fleet.log").open("rb") as lines:
         verdict = check_records(CandumpReader(lines), Checks(site, disturbed=True))
     faults += [] if verdict.is_good else list(verdict.lines())
-    return Found(found["cycles"], faults)
+    return CycleFindings(found["cycles"], faults)
 
 
 def main(words: Sequence[str] | None = None) -> int:

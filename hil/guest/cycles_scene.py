@@ -4,7 +4,7 @@ import json
 import socket
 import sys
 
-from hil.guest.listener import BusListener
+from hil.guest.listener import CandumpListener
 from hil.guest.mesh import bring_up, run
 from hil.guest.site_run import TOOLS, SiteRun, play
 from onboard.contract.codes import MachineState, TaskPhase
@@ -28,7 +28,7 @@ _TAKING_PART = (MachineState.IDLE, MachineState.WORKING, MachineState.WAITING)
 class Watch:
     """What the heartbeats of a site say, as they come."""
 
-    def __init__(self, listener: BusListener, nodes: set[int]) -> None:
+    def __init__(self, listener: CandumpListener, nodes: set[int]) -> None:
         self.listener = listener
         self._nodes = nodes
         self._decoder = Decoder(fleet_codec())
@@ -126,7 +126,7 @@ def scene(site: SiteRun) -> dict[str, object]:
     site.connect()
     run("ip", "netns", "add", DRAWER)
     site.record()
-    watch = Watch(BusListener(TOOLS), set(nodes.values()))
+    watch = Watch(CandumpListener(TOOLS), set(nodes.values()))
     cycles = Cycles(site, nodes, watch)
     site.start_machines()
     here, keys = socket.socketpair()

@@ -20,7 +20,7 @@ class NotHeardError(Exception):
     """What was waited for did not come in time; ``str`` says what."""
 
 
-class BusListener:
+class CandumpListener:
     """Every frame of one node's bus in candump's words (``ID#DATA``), own ones of the same interface included."""
 
     def __init__(self, namespace: str, channel: str = "can0") -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from bus_sim.cli import main as bus_sim
 from hil.guest.forked import Forked, Main
 from hil.guest.initrd import WORK
-from hil.guest.listener import BusListener, NotHeardError
+from hil.guest.listener import CandumpListener, NotHeardError
 from hil.guest.mesh import Mesh, hand_out_boards, inside, join_pair, run
 from onboard.cli import main as onboard
 from onboard.config.site import parse_site
@@ -32,14 +32,14 @@ _CANDUMP = ("candump", "-L", "-r", "8388608")
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class RunRequest:
     """What the host asks for: ``order.json`` of the share. ``begin`` are the plant's words after its buses."""
 
     machines: list[str]
     begin: list[str]
 
     @classmethod
-    def read(cls, share: Path) -> "Order":
+    def read(cls, share: Path) -> "RunRequest":
         """The host's order. Raises ``OSError``, ``KeyError``."""
         words = json.loads((share / "order.json").read_text(encoding="utf-8"))
         return cls(words["machines"], words["begin"])
@@ -48,7 +48,7 @@ class Order:
 class SiteRun:
     """All processes of one run; their output lies in ``share``."""
 
-    def __init__(self, share: Path, order: Order) -> None:
+    def __init__(self, share: Path, order: RunRequest) -> None:
         self.share = share
         self.order = order
         self.begin_s = time.monotonic()
@@ -121,7 +121,7 @@ class SiteRun:
         """Run a person's program on the fleet bus to its end."""
         return run(*inside(TOOLS), *words)
 
-    def wait(self, listener: BusListener, what: str, is_there: Callable[[], bool], limit_s: float) -> None:
+    def wait(self, listener: CandumpListener, what: str, is_there: Callable[[], bool], limit_s: float) -> None:
         """Wait for something that the bus tells, and put it into the story. Raises ``NotHeardError``."""
         listener.wait(what, is_there, limit_s)
         self.tell(what)
@@ -169,7 +169,7 @@ def _machine_file(name: str) -> str:
 def play(scene: Callable[[SiteRun], dict[str, object]]) -> int:
     """Run a scene on the folder that the command line names, and leave what it found as ``found.json``."""
     share = Path(sys.argv[1])
-    one = SiteRun(share, Order.read(share))
+    one = SiteRun(share, RunRequest.read(share))
     try:
         found = scene(one)
     except (NotHeardError, RuntimeError) as error:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from hil.scenarios.recovery import BEATS_S
 from hil.scenarios.work import AWARD_S, CALL_S, JOIN_S, is_awarded
-from hil.stage import Said, Stage
+from hil.stage import BenchMessage, TestBench
 from onboard.contract.codes import DriveMode, MachineState, Reason
 from onboard.contract.messages import (
     Award,
@@ -32,7 +32,7 @@ FLOOD_ID = 0x00FF_00FD
 _OF_WHO_HOLDS = Heartbeat | Halted | Diagnostic | BusTime
 
 
-async def refuses_duplicate_node_id(stage: Stage) -> None:
+async def refuses_duplicate_node_id(stage: TestBench) -> None:
     """Another node speaks under its node-ID: it holds, and says so in each beat and on its console; it does no more."""
     await stage.power_on()
     own = await stage.takes_part(JOIN_S)
@@ -47,7 +47,7 @@ async def refuses_duplicate_node_id(stage: Stage) -> None:
     assert "held: DUPLICATE_NODE_ID" in said, f"its console does not tell why: {said[-300:]!r}"
 
 
-async def refuses_wrong_site(stage: Stage) -> None:
+async def refuses_wrong_site(stage: TestBench) -> None:
     """With another site's file it joins as an obstacle: it neither bids nor moves, and the others tell why."""
     await stage.device.power_on(wrong_site(stage.site_text))
     beat = await stage.first_own(Heartbeat, "heartbeat of the device", JOIN_S)
@@ -65,7 +65,7 @@ async def refuses_wrong_site(stage: Stage) -> None:
     assert not moved, f"it has moved: {moved[0].message}"
 
 
-async def survives_flood(stage: Stage) -> None:
+async def survives_flood(stage: TestBench) -> None:
     """A babbling node takes the whole bus: afterwards it takes part in the same life, and wins as ever."""
     await stage.power_on()
     boot = (await stage.takes_part(JOIN_S)).boot
@@ -85,12 +85,12 @@ def wrong_site(text: str) -> str:
     return changed
 
 
-def _is_motion(one: Said[Message], node_id: int) -> bool:
+def _is_motion(one: BenchMessage[Message], node_id: int) -> bool:
     message = one.message
     return isinstance(message, DriveState) and message.sender == node_id and message.mode is not DriveMode.STANDING
 
 
-async def _flood(stage: Stage) -> None:
+async def _flood(stage: TestBench) -> None:
     """Frames as fast as the bus takes them: one more is queued for each that has left."""
     frame, left, gone = Frame(FLOOD_ID, b"\xff" * 8), [FLOOD_FRAMES], [0]
 

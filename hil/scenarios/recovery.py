@@ -1,7 +1,7 @@
 """Scenarios of trouble that a machine must survive: a reset on the way, bus-off, a plug that is pulled."""
 
 from hil.scenarios.work import JOIN_S, MOTION_S, moves
-from hil.stage import Stage
+from hil.stage import TestBench
 from onboard.contract.codes import DriveMode
 from onboard.contract.messages import DriveState, Heartbeat
 from onboard.core.mirror import MISSED_HEARTBEATS
@@ -10,7 +10,7 @@ from onboard.core.mirror import MISSED_HEARTBEATS
 BEATS_S = 60.0
 
 
-async def survives_reset(stage: Stage) -> None:
+async def survives_reset(stage: TestBench) -> None:
     """Its power is cut while it drives: it brakes, comes back under the next boot counter, and goes on."""
     await moves(stage)
     before = stage.own(Heartbeat)[-1].message.boot
@@ -31,7 +31,7 @@ async def survives_reset(stage: Stage) -> None:
     )
 
 
-async def leaves_bus_off(stage: Stage) -> None:
+async def leaves_bus_off(stage: TestBench) -> None:
     """Its frames are destroyed until it is off the bus: it comes back by itself, in the same life."""
     await stage.power_on()
     boot = (await stage.takes_part(JOIN_S)).boot
@@ -40,7 +40,7 @@ async def leaves_bus_off(stage: Stage) -> None:
     assert beat.boot == boot, f"boot counter {beat.boot} after {boot}: it was started again"
 
 
-async def survives_unplugging(stage: Stage) -> None:
+async def survives_unplugging(stage: TestBench) -> None:
     """Its plug is pulled until the others take it for silent, and put back: it takes part again, in the same life."""
     await stage.power_on()
     boot = (await stage.takes_part(JOIN_S)).boot

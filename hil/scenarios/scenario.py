@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 from bus_sim.systems.registry import simulated_of
 from hil.bench import Capability
-from hil.stage import Stage
+from hil.stage import TestBench
 from onboard.contract.codes import KindCode, Reason
 from onboard.contract.constants import MOBILE_KINDS
 from onboard.core.site import Machine, Site
 
 
 @dataclass(frozen=True, slots=True)
-class Scenario:
+class BenchScenario:
     """``play`` raises ``AssertionError`` where the device does something else than it should.
 
     ``needs``: capabilities of the bench. ``kinds``: kinds of machine that can do this; none for all. ``rivals``:
@@ -21,7 +21,7 @@ class Scenario:
     """
 
     name: str
-    play: Callable[[Stage], Awaitable[None]]
+    play: Callable[[TestBench], Awaitable[None]]
     needs: frozenset[Capability]
     kinds: frozenset[KindCode] = frozenset()
     rivals: bool = False

@@ -1,6 +1,6 @@
 """Scenarios of ordinary work: the device joins, bids, wins, moves under authority, and gives way."""
 
-from hil.stage import Stage
+from hil.stage import TestBench
 from onboard.contract.codes import (
     CONTRACT_VERSION,
     CallResult,
@@ -41,7 +41,7 @@ MOTION_S = 30.0
 LEG_MS = 8_000
 
 
-async def joins(stage: Stage) -> None:
+async def joins(stage: TestBench) -> None:
     """The first heartbeat tells contract, site and kind; then all mirrors agree and the device is ready to work."""
     await stage.power_on()
     first = (await stage.first_own(Heartbeat, "heartbeat of the device", JOIN_S)).message
@@ -50,7 +50,7 @@ async def joins(stage: Stage) -> None:
     await stage.takes_part(JOIN_S)
 
 
-async def bids(stage: Stage) -> Reference:
+async def bids(stage: TestBench) -> Reference:
     """A car or an order comes, and the device bids in time; the task that is called for."""
     await stage.power_on()
     await stage.takes_part(JOIN_S)
@@ -71,7 +71,7 @@ async def bids(stage: Stage) -> Reference:
     return task
 
 
-async def is_awarded(stage: Stage, task: Reference) -> None:
+async def is_awarded(stage: TestBench, task: Reference) -> None:
     """The device, which has no rival, is awarded a task, at the first call for it or at a later one."""
     award = await stage.first(
         Award, "award", AWARD_S, lambda one: one.task == task and one.result is CallResult.AWARDED
@@ -79,14 +79,14 @@ async def is_awarded(stage: Stage, task: Reference) -> None:
     assert award.message.winner == stage.machine.node_id, f"node {award.message.winner} has won"
 
 
-async def takes(stage: Stage) -> None:
+async def takes(stage: TestBench) -> None:
     """With no rival the device is awarded the task, and reports it as its own."""
     task = await bids(stage)
     await is_awarded(stage, task)
     await stage.first_own(TaskReport, "report", MOTION_S, lambda one: one.task == task)
 
 
-async def wins(stage: Stage) -> None:
+async def wins(stage: TestBench) -> None:
     """With no rival the device is awarded the task, tells a firm plan and reports the task as its own."""
     task = await bids(stage)
     await is_awarded(stage, task)
@@ -96,7 +96,7 @@ async def wins(stage: Stage) -> None:
     )
 
 
-async def moves(stage: Stage) -> None:
+async def moves(stage: TestBench) -> None:
     """The device holds a token, then drives off its home; the judge looks at every step."""
     home = stage.machine.home
     await wins(stage)
@@ -109,7 +109,7 @@ async def moves(stage: Stage) -> None:
     )
 
 
-async def yields(stage: Stage) -> None:
+async def yields(stage: TestBench) -> None:
     """Another robot's firm plan leads through where the device stands idle: it leaves, and nobody collides.
 
     The bench speaks for the other robot, which nobody runs here, so that the plan surely leads there.
@@ -134,7 +134,7 @@ def _is_firm_journey(plan: Itinerary) -> bool:
     return plan.grade is Grade.FIRM and any(leg.action is not LegAction.STAND for leg in plan.legs)
 
 
-def _another_robot(stage: Stage) -> Machine:
+def _another_robot(stage: TestBench) -> Machine:
     others = [
         one
         for one in stage.site.machines.values()
@@ -144,7 +144,7 @@ def _another_robot(stage: Stage) -> Machine:
     return others[0]
 
 
-def _tell_plan_through(stage: Stage, other: Machine, own: Heartbeat) -> None:
+def _tell_plan_through(stage: TestBench, other: Machine, own: Heartbeat) -> None:
     """What the other robot would say: that it lives, where it stands, and that it works one segment behind the device.
 
     It comes back to where it was, so that the end of the alley is free for whoever gives way.

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from onboard.config.problems import ConfigError, Problem, Problems
-from onboard.config.reader import Table
+from onboard.config.reader import TomlTable
 from onboard.config.toml_lines import parse
 
 
@@ -20,8 +20,8 @@ def read_text(path: Path, what: str) -> str:
     raise ConfigError([Problem(str(path), 0, "", None, why, f"name an existing {what} file")])
 
 
-def root_table(text: str, problems: Problems) -> Table:
+def root_table(text: str, problems: Problems) -> TomlTable:
     """The whole document as a table. Raises ``ConfigError`` where the text is not TOML."""
     document = parse(text, problems.file, problems)
     problems.raise_if_any()
-    return Table(document, problems, (), document.values)
+    return TomlTable(document, problems, (), document.values)

@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass, field
 
-from onboard.config.reader import Table
+from onboard.config.reader import TomlTable
 from onboard.contract.codes import KindCode
 from onboard.contract.constants import MAX_NODE_ID
 from onboard.core.site import Machine, Segment, Station
@@ -15,7 +15,7 @@ _DBC_WORDS = frozenset(["FILTER", "VERSION", "Vector__XXX"])
 
 
 @dataclass
-class Fleet:
+class FleetReader:
     """Machines read so far, by node-ID, and everything that has a name already, mistaken machines included.
 
     ``robots`` are their tables and homes, in the order of the file.
@@ -24,9 +24,9 @@ class Fleet:
     by_node: dict[int, Machine] = field(default_factory=dict)
     by_name: dict[str, Machine | None] = field(default_factory=dict)
     homes: dict[Segment, str] = field(default_factory=dict)
-    robots: list[tuple[Table, Segment]] = field(default_factory=list)
+    robots: list[tuple[TomlTable, Segment]] = field(default_factory=list)
 
-    def add(self, table: Table, kind: KindCode, home: Segment, station: Station | None = None) -> None:
+    def add(self, table: TomlTable, kind: KindCode, home: Segment, station: Station | None = None) -> None:
         """Read name and node-ID of one machine; both are its own. A machine with a mistake is named but not added."""
         name = table.text("name")
         if name and (not _NAME.fullmatch(name) or name in _DBC_WORDS):

@@ -6,14 +6,14 @@ from typing import Any
 
 from onboard.config.files import read_text, root_table
 from onboard.config.problems import ConfigError, Problem, Problems, quoted
-from onboard.config.reader import Table, type_name
+from onboard.config.reader import TomlTable, type_name
 from onboard.config.site import load_site
 from onboard.contract.constants import MAX_NODE_ID
 from onboard.core.site import Machine, Site
 
 
 @dataclass(frozen=True, slots=True)
-class Interface:
+class BusInterface:
     """A bus interface in python-can's words; ``extra`` are further keyword arguments of ``can.Bus``."""
 
     interface: str
@@ -29,8 +29,8 @@ class MachineConfig:
     file: Path
     site: Site
     machine: Machine
-    fleet_bus: Interface
-    device_bus: Interface
+    fleet_bus: BusInterface
+    device_bus: BusInterface
     journal: Path
 
 
@@ -56,7 +56,7 @@ def load_machine(path: Path) -> MachineConfig:
     return MachineConfig(path, site, machine, fleet_bus, device_bus, path.parent / journal)
 
 
-def _load_site(head: Table, path: Path) -> tuple[Site | None, list[Problem]]:
+def _load_site(head: TomlTable, path: Path) -> tuple[Site | None, list[Problem]]:
     """The site that the machine file names, relative to its own directory, or what is wrong with it."""
     name = head.text("site")
     if not name:
@@ -71,7 +71,7 @@ def _load_site(head: Table, path: Path) -> tuple[Site | None, list[Problem]]:
         return None, error.problems
 
 
-def _read_machine(head: Table, site: Site | None) -> Machine | None:
+def _read_machine(head: TomlTable, site: Site | None) -> Machine | None:
     """The machine by name, by node-ID, or by both where they agree."""
     name = head.text("name") if head.has("name") or not head.has("node") else ""
     node = head.integer("node", 1, MAX_NODE_ID) if head.has("node") else 0
@@ -90,7 +90,7 @@ def _read_machine(head: Table, site: Site | None) -> Machine | None:
     return fitting[0]
 
 
-def _read_interface(table: Table, bitrate: int) -> Interface | None:
+def _read_interface(table: TomlTable, bitrate: int) -> BusInterface | None:
     """``interface``, ``channel``, ``bitrate``; all further keys go to python-can as they are."""
     interface = table.text("interface")
     # python-can's tools hand every channel on as text, numbers too.
@@ -106,4 +106,4 @@ def _read_interface(table: Table, bitrate: int) -> Interface | None:
         extra.append((key, value))
     if table.wrong:
         return None
-    return Interface(interface, channel, own_bitrate, tuple(sorted(extra)))
+    return BusInterface(interface, channel, own_bitrate, tuple(sorted(extra)))

@@ -35,7 +35,7 @@ class Common(NamedTuple):
 
 
 @dataclass
-class Table:
+class TomlTable:
     """One table of a document.
 
     The stand-in for a wrong value is the default where there is one, else the lowest value allowed; ``wrong`` names
@@ -48,7 +48,7 @@ class Table:
     values: dict[str, Any]
     asked: set[str] = field(default_factory=set)
     wrong: set[str] = field(default_factory=set)
-    below: "list[Table]" = field(default_factory=list)
+    below: "list[TomlTable]" = field(default_factory=list)
 
     def bad(self, name: str, value: object, what: str, remedy: str, *, item: int | None = None) -> None:
         """Note a mistake at one key, or at one ``item`` of the list there."""
@@ -122,7 +122,7 @@ class Table:
         value = self._get(name, bool, "true or false", required=False)
         return default if value is None else bool(value)
 
-    def table(self, name: str, *, required: bool = False) -> "Table":
+    def table(self, name: str, *, required: bool = False) -> "TomlTable":
         """A table within; an empty one where it is missing. Ask once for each."""
         self.asked.add(name)
         value = self.values.get(name)
@@ -133,7 +133,7 @@ class Table:
             value = None
         return self._below((*self.path, name), value or {})
 
-    def tables(self, name: str) -> "list[Table]":
+    def tables(self, name: str) -> "list[TomlTable]":
         """An array of tables, ``[[name]]``; empty where it is missing. Ask once for each."""
         self.asked.add(name)
         values = self.values.get(name, [])
@@ -167,7 +167,7 @@ class Table:
             return None
         return value
 
-    def _below(self, path: KeyPath, values: dict[str, Any]) -> "Table":
-        table = Table(self.document, self.problems, path, values)
+    def _below(self, path: KeyPath, values: dict[str, Any]) -> "TomlTable":
+        table = TomlTable(self.document, self.problems, path, values)
         self.below.append(table)
         return table

@@ -11,7 +11,7 @@ from typing import Any
 
 from onboard.config.files import root_table
 from onboard.config.problems import Problems
-from onboard.config.reader import Common, Table
+from onboard.config.reader import Common, TomlTable
 from onboard.config.shipped import site_source
 from onboard.core.site import Site
 from onboard.systems.registry import FIRST_SYSTEM, own_names, part, system_names
@@ -49,7 +49,7 @@ def parse_site(text: str, file: str, *, crowded: bool = False) -> Site:
     return replace(site, digest=site_digest(site), time_zone=zone)
 
 
-def _read_system(root: Table, common: Common, system: str) -> Site:
+def _read_system(root: TomlTable, common: Common, system: str) -> Site:
     """A reader takes the whole document, notes every mistake in ``root.problems``, and returns what it made of it."""
     reader = part(system, "reader")
     assert reader is not None, f"system {system} has no reader"
@@ -90,7 +90,7 @@ def _plain(value: object) -> object:
     raise TypeError(f"a site holds a {type(value).__name__}, which has no canonical text")
 
 
-def _read_time_zone(head: Table) -> str:
+def _read_time_zone(head: TomlTable) -> str:
     """Its form alone: a board need not know any zone, as no machine does anything by it."""
     zone = head.text("time_zone", "") if head.has("time_zone") else ""
     if zone and not _ZONE.fullmatch(zone):
@@ -98,7 +98,7 @@ def _read_time_zone(head: Table) -> str:
     return zone
 
 
-def _read_name(head: Table) -> str:
+def _read_name(head: TomlTable) -> str:
     name = head.text("name")
     if name and not _NAME.fullmatch(name):
         head.bad("name", name, "not usable in a file name", "write up to 32 letters, digits, dots, - or _")

@@ -1,6 +1,6 @@
 """Times of a site file. All defaults are plausible, and measured nowhere."""
 
-from onboard.config.reader import Table
+from onboard.config.reader import TomlTable
 from onboard.core.negotiation.bidding import slot_length_us
 from onboard.work.timing import DeviceTiming
 
@@ -10,7 +10,7 @@ WORST_FRAME_BITS = 160
 _SHORTEST_DELAY_MS = 300
 
 
-def read_timing(table: Table, robots: int, machines: int, bitrate: int) -> DeviceTiming:
+def read_timing(table: TomlTable, robots: int, machines: int, bitrate: int) -> DeviceTiming:
     """``[timing]``, written in ms.
 
     The bidding delay W (design, section 4) is at least 3 N times the bus latency, N the robots and the latency that

@@ -36,7 +36,7 @@ class Keep(NamedTuple):
     which: Which = Which.NEWEST
 
 
-class End(NamedTuple):
+class RecordEnd(NamedTuple):
     """A record ends all of ``families`` under its ``key``; where ``when`` is given, only with one of these values.
 
     The newest ``most`` that have ended are kept as they are.
@@ -53,7 +53,7 @@ class JournalRecord:
     """One type of record. ``NAME`` stands in the journal; ``RULES`` say what outlives compaction."""
 
     NAME: ClassVar[str] = ""
-    RULES: ClassVar[tuple[Keep | End, ...]] = ()
+    RULES: ClassVar[tuple[Keep | RecordEnd, ...]] = ()
 
     @property
     def entry(self) -> Entry:

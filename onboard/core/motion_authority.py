@@ -12,7 +12,7 @@ from onboard.contract.codes import Reason
 from onboard.contract.messages import Message
 from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.effects import Actuate, Effect, Tell
-from onboard.core.site import Needs
+from onboard.core.site import MotionNeeds
 
 #: The rights of whoever moves within itself only.
 ALONE: tuple[TokenKey, ...] = ()
@@ -32,7 +32,7 @@ class MotionAuthority:
     #: Events that this machine has dealt with: a permit is good in its own and in no later one.
     event: int = 0
 
-    def fault(self, effects: Iterable[Effect], moved_by: Mapping[str, Needs]) -> str | None:
+    def fault(self, effects: Iterable[Effect], moved_by: Mapping[str, MotionNeeds]) -> str | None:
         """What is wrong with the first order among ``effects`` that must not go out, None where there is none.
 
         ``moved_by`` are the orders by which something moves in this system, and what each needs. Ends the event.
@@ -41,7 +41,7 @@ class MotionAuthority:
         self.event += 1
         return found[0] if found else None
 
-    def _why_not_out(self, effect: Effect, moved_by: Mapping[str, Needs]) -> str | None:
+    def _why_not_out(self, effect: Effect, moved_by: Mapping[str, MotionNeeds]) -> str | None:
         if isinstance(effect, Tell):
             name = type(effect.message).__name__
             return f"{name} moves something and is told as if it did not" if name in moved_by else None
@@ -54,7 +54,7 @@ class MotionAuthority:
             return f"{name} is no order of this system"
         if any(not self.tokens.holds(key) for key in permit.rights):
             return f"{name} goes out when its right is given away"
-        return f"{name} needs a right" if moved_by[name] is Needs.RIGHT and not permit.rights else None
+        return f"{name} needs a right" if moved_by[name] is MotionNeeds.RIGHT and not permit.rights else None
 
 
 @dataclass(frozen=True, slots=True)

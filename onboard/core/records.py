@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from onboard.contract.codes import ManualMode, Reason, TokenKind
 from onboard.contract.messages import Reference
-from onboard.core.journal_records import End, Entry, JournalRecord, Keep, RecordTypes, Which, records_in
+from onboard.core.journal_records import Entry, JournalRecord, Keep, RecordEnd, RecordTypes, Which, records_in
 from onboard.core.serial import successor
 
 _TOKEN = ("kind", "number")
@@ -67,7 +67,7 @@ class RetiredRecord(JournalRecord):
     """What a token is about ended long ago: what the journal has of it may go, in all families of such a load."""
 
     NAME = "retired"
-    RULES = (End(("token", "given", "gone"), _TOKEN), End(("stands", "winner", "ticket"), ("load",)))
+    RULES = (RecordEnd(("token", "given", "gone"), _TOKEN), RecordEnd(("stands", "winner", "ticket"), ("load",)))
 
     kind: TokenKind
     number: int
@@ -162,7 +162,7 @@ class ReleasedRecord(JournalRecord):
     """A person let it go on."""
 
     NAME = "released"
-    RULES = (End(("held",)),)
+    RULES = (RecordEnd(("held",)),)
 
 
 CORE_RECORDS: RecordTypes = (

@@ -81,7 +81,7 @@ class Timing:
     sub_call_percent: int = 50
 
 
-class Needs(Enum):
+class MotionNeeds(Enum):
     """What an order by which something moves needs beside a machine that stands in nobody's way."""
 
     RIGHT = "each needs a right: what it moves in is shared with others"
@@ -108,7 +108,7 @@ class Site:
     #: not in the digest.
     demand: ClassVar[frozenset[str]] = frozenset()
     #: The messages of the device bus by which something moves: no other does, and these only as ``authorised`` lets.
-    moved_by: ClassVar[Mapping[str, Needs]] = {}
+    moved_by: ClassVar[Mapping[str, MotionNeeds]] = {}
 
     name: str
     digest: int

@@ -154,12 +154,12 @@ async def _until_ended(gateway: Gateway, bus: OpenBus) -> int:
 
 async def _tell_news(gateway: Gateway) -> None:
     """One line whenever the sessions with the broker have changed, or something was lost."""
-    told = ""
+    shown = ""
     while True:
         await asyncio.sleep(NEWS_S)
         line = gateway.news()
-        if line != told:
-            told = line
+        if line != shown:
+            shown = line
             print(line, flush=True)
 
 

@@ -10,11 +10,11 @@ from onboard.gateway.dialect import Json, timestamp
 from onboard.gateway.edge import edge_of
 from onboard.gateway.factsheet import MOST_ID
 from onboard.gateway.inbox import Inbox, Incoming
-from onboard.gateway.order import Order
-from onboard.gateway.orders import Orders, Outcome, name_of
+from onboard.gateway.order import GatewayOrder
+from onboard.gateway.orders import OrderBook, OrderEffects, name_of
 from onboard.gateway.pauses import MODES, Closed, Pauses
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
-from onboard.gateway.records import Life
+from onboard.gateway.records import OrderPhase
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import level
 from onboard.gateway.state import Subject
@@ -32,7 +32,7 @@ _ERRORS = {
 _HEARD = (CallForProposals, CarAt, TaskReport)
 
 
-class OrderDesk:
+class GatewayDesk:
     """Takes orders for a site. ``post`` queues what is told, ``send`` puts a message on the bus."""
 
     def __init__(
@@ -49,12 +49,12 @@ class OrderDesk:
         settings, fleet = publisher.settings, publisher.fleet
         assert settings.node_id is not None, "who only listens takes no orders"
         self.inbox = Inbox(settings.dialect, publisher.root, settings.manufacturer)
-        wishes = edge_of(site).wishes(fleet.picture.view, fleet.place)
+        bus_orders = edge_of(site).bus_orders(fleet.picture.view, fleet.place)
         seed = (settings.epoch_us + now_us) // 1_000_000
-        self.orders = Orders(site, wishes, settings.node_id, reports.others, now_us=now_us, seed=seed)
+        self.orders = OrderBook(site, bus_orders, settings.node_id, reports.others, now_us=now_us, seed=seed)
         reports.keep = self.orders.entries
         self.pauses = Pauses(settings.node_id, seed)
-        self._no_pause = wishes.no_pause
+        self._no_pause = bus_orders.no_pause
         #: Actions that take a robot's order back, until it says so.
         self._cancelling: dict[int, list[Json]] = {}
         self._waiting: deque[tuple[Publication, Callable[[], None]]] = deque()
@@ -83,8 +83,8 @@ class OrderDesk:
             # Only now: had the power failed before, the broker would bring it again.
             taken()
         await self._perform(self.orders.wake(now_us, self._publisher.settings.epoch_us + now_us), now_us)
-        said, closed = self.pauses.wake(now_us)
-        for message in said:
+        due, closed = self.pauses.wake(now_us)
+        for message in due:
             self._send(message)
         self._close(closed, now_us)
 
@@ -116,7 +116,7 @@ class OrderDesk:
             self._refuse(self.inbox.refuse(incoming, "UNKNOWN_MACHINE", "no machine of this name travels"), now_us)
             return
         node = self._site.machine(incoming.serial).node_id
-        for action in incoming.told["actions"]:
+        for action in incoming.body["actions"]:
             if known.is_known(action):
                 continue
             kind = action["actionType"]
@@ -157,59 +157,66 @@ class OrderDesk:
 
     # --- out -----------------------------------------------------------------------------------------------------
 
-    async def _perform(self, outcome: Outcome, now_us: int) -> None:
+    async def _perform(self, outcome: OrderEffects, now_us: int) -> None:
         """First the journal, then the bus, then whoever asked."""
         for order in outcome.changed:
             try:
                 await self._reports.append(order.entry())
             except OSError:
-                if order.life is Life.ACCEPTED and not order.was_said:
+                if order.life is OrderPhase.ACCEPTED and not order.was_said:
                     del self.orders.book[order.name]
                     outcome.refused.append(Incoming("", "", {"id": order.name}, "NOT_DURABLE", "$", "the disk is full"))
                     continue
-            if order.life is not Life.ACCEPTED or not order.was_said:
+            if order.life is not OrderPhase.ACCEPTED or not order.was_said:
                 self._tell(order, now_us)
             if order.life.is_over:
                 failure = "" if order.reason == "CANCELLED" else f"the order was {order.life.value} before"
-                over = self._cancelling.pop(order.wish.node, []) if order.wish.what == "visit" else []
-                self._close([(order.wish.node, action, failure) for action in over], now_us)
+                over = self._cancelling.pop(order.request.node, []) if order.request.what == "visit" else []
+                self._close([(order.request.node, action, failure) for action in over], now_us)
         for message in outcome.say:
             self._send(message)
-        for order in outcome.told:
+        for order in outcome.to_tell:
             self._post([Outgoing(FLEET, self._answer(order, now_us))])
         for incoming in outcome.refused:
             self._refuse(incoming, now_us)
 
-    def _tell(self, order: Order, now_us: int) -> None:
+    def _tell(self, order: GatewayOrder, now_us: int) -> None:
         answer = self._answer(order, now_us)
         name = f"order {order.name} {order.life.value}" if order.life.is_over else ""
         self._post([Outgoing(FLEET, answer, name)])
-        if order.wish.what == "visit":
-            self._tell_machine(order.wish.node, now_us)
+        if order.request.what == "visit":
+            self._tell_machine(order.request.node, now_us)
 
-    def _answer(self, order: Order, now_us: int) -> Publication:
-        told: Json = {"at": self._publisher.at(now_us), "id": order.name, "phase": order.life.value}
+    def _answer(self, order: GatewayOrder, now_us: int) -> Publication:
+        body: Json = {"at": self._publisher.at(now_us), "id": order.name, "phase": order.life.value}
         if order.task is not None:
             stands = self._publisher.fleet.task(order.task, now_us)
-            told |= {key: stands[key] for key in ("task", "car", "promised") if key in stands}
+            body |= {key: stands[key] for key in ("task", "car", "promised") if key in stands}
         if order.owner:
-            told["owner"] = self._publisher.fleet.picture.view.name(order.owner)
+            body["owner"] = self._publisher.fleet.picture.view.name(order.owner)
         if order.before_us is not None:
-            told["before"] = timestamp(order.before_us)
-            told["late"] = max(told.get("promised", ""), told["at"] if order.life is Life.DONE else "") > told["before"]
-        told |= {key: one for key, one in (("reason", order.reason), ("why", order.why)) if one}
-        return self._publisher.publication(f"order/{level(order.name)}", told, qos=1)
+            body["before"] = timestamp(order.before_us)
+            body["late"] = (
+                max(body.get("promised", ""), body["at"] if order.life is OrderPhase.DONE else "") > body["before"]
+            )
+        body |= {key: one for key, one in (("reason", order.reason), ("why", order.why)) if one}
+        return self._publisher.publication(f"order/{level(order.name)}", body, qos=1)
 
     def _refuse(self, incoming: Incoming, now_us: int) -> None:
         name = name_of(incoming)[: 2 * MOST_ID]
-        told = {"at": self._publisher.at(now_us), "id": name, "phase": Life.REFUSED.value, "reason": incoming.reason}
-        told |= {"path": incoming.path, "why": incoming.why}
-        self._post([Outgoing(FLEET, self._publisher.publication(f"order/{level(name)}", told, qos=1))])
+        body = {
+            "at": self._publisher.at(now_us),
+            "id": name,
+            "phase": OrderPhase.REFUSED.value,
+            "reason": incoming.reason,
+        }
+        body |= {"path": incoming.path, "why": incoming.why}
+        self._post([Outgoing(FLEET, self._publisher.publication(f"order/{level(name)}", body, qos=1))])
         node = next((one.node_id for one in self._site.machines.values() if one.name == incoming.serial), None)
         if node is not None:
             references = [{"referenceKey": "path", "referenceValue": incoming.path}]
             references.append(
-                {"referenceKey": "orderId", "referenceValue": str(incoming.told.get("orderId", ""))[:MOST_ID]}
+                {"referenceKey": "orderId", "referenceValue": str(incoming.body.get("orderId", ""))[:MOST_ID]}
             )
             kind = _ERRORS.get(incoming.reason, "orderError")
             error = {"errorType": kind, "errorLevel": "WARNING", "errorReferences": references}
@@ -221,7 +228,7 @@ class OrderDesk:
         """What its state tells of orders; an order that was taken clears the errors of those that were not."""
         order = self.orders.of_robot(node)
         errors = self._errors.get(node)
-        if order is not None and errors and order.life is Life.ACCEPTED:
+        if order is not None and errors and order.life is OrderPhase.ACCEPTED:
             errors.clear()
         actions = self._actions[self._site.machines[node].name]
         name = order.name.partition("/")[2] if order is not None else None

@@ -8,16 +8,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from onboard.core.site import Site
+from onboard.gateway.bus_orders import BusOrders, NoBusOrders
 from onboard.gateway.dialect import Json
-from onboard.gateway.whereabouts import Tracker, TrackTracker
-from onboard.gateway.wishes import NoWishes, Wishes
+from onboard.gateway.positions import Tracker, TrackTracker
 from onboard.systems.registry import part
 from onboard.systems.words import words_of
 from onboard.trace.view import SiteView
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class PhysicalLimits:
     """Speed m/s, acceleration m/s^2, length m, most load kg; 0 where the site file is silent."""
 
     speed: float = 0.0
@@ -26,7 +26,7 @@ class Body:
     load: float = 0.0
 
 
-class Edge:
+class SystemEdge:
     """A system of which the gateway knows nothing more than its messages; a system replaces what it has."""
 
     #: Whether a machine takes orders by its name (VDA 5050's ``order``).
@@ -35,9 +35,9 @@ class Edge:
     def __init__(self, site: Site) -> None:
         self.site = site
 
-    def wishes(self, view: SiteView, place: Callable[[int], str | None]) -> Wishes:
+    def bus_orders(self, view: SiteView, place: Callable[[int], str | None]) -> BusOrders:
         """What orders become; ``view`` is what was heard, ``place`` names a station by its number."""
-        return NoWishes(self.site)
+        return NoBusOrders(self.site)
 
     def tracker(self) -> Tracker:
         """What follows where machines are; the default reads places on tracks."""
@@ -47,19 +47,19 @@ class Edge:
         """A station as topics name it; None for one that the site does not have."""
         return words_of(self.site).place(number)
 
-    def body(self) -> Body:
+    def body(self) -> PhysicalLimits:
         """What a mobile machine is, as far as the site file tells."""
-        return Body()
+        return PhysicalLimits()
 
     def loads(self) -> Json:
         """What it carries, as a factsheet's ``loadSpecification``."""
         return {}
 
 
-def edge_of(site: Site) -> Edge:
+def edge_of(site: Site) -> SystemEdge:
     """The edge of a site's system."""
     module = part(site.system, "gateway")
     if module is None:
-        return Edge(site)
-    edge: Edge = module.EDGE(site)
+        return SystemEdge(site)
+    edge: SystemEdge = module.EDGE(site)
     return edge

@@ -23,7 +23,7 @@ def factsheet(dialect: Dialect, site: Site, machine: Machine, settings: GatewayS
     kinematic, navigation = (
         ("DIFFERENTIAL", "VIRTUAL_LINE_GUIDED") if dialect.is_third else ("DIFF", "VIRTUAL_LINE_GUIDED")
     )
-    told: Json = {
+    content: Json = {
         "typeSpecification": {
             "seriesName": f"{site.system}-{machine.kind.name.lower()}",
             "seriesDescription": f"{machine.kind.name.lower()} of a {site.system}, controlled by its own holon",
@@ -57,7 +57,7 @@ def factsheet(dialect: Dialect, site: Site, machine: Machine, settings: GatewayS
         "agvGeometry": {},
         "loadSpecification": edge.loads(),
     }
-    renamed: Json = dialect.renamed(told)
+    renamed: Json = dialect.renamed(content)
     return renamed
 
 

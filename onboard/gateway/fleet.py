@@ -16,7 +16,7 @@ from onboard.gateway.edge import edge_of
 from onboard.gateway.machines import TRAVELLERS
 from onboard.gateway.settings import GatewaySettings
 from onboard.gateway.state import reference_text
-from onboard.history.calls import Call, CallAnswered, CallOpened
+from onboard.history.calls import CallAnswered, CallHistory, CallOpened
 from onboard.history.history import Fact
 from onboard.history.tasks import TaskTold
 from onboard.trace.words import Words
@@ -88,13 +88,13 @@ class FleetTopics:
     def task(self, reference: Reference, now_us: int) -> Json:
         """The JSON of one task: what it is, its phase, who has it."""
         view = self.picture.view
-        told: Json = {"at": self._at(now_us), "task": reference_text(reference)}
+        body: Json = {"at": self._at(now_us), "task": reference_text(reference)}
         record = view.tasks.get(reference)
         if record is None:
-            return told
-        told |= {"what": record.operation.name.lower(), "phase": LIFE[record.phase], "calls": record.calls}
+            return body
+        body |= {"what": record.operation.name.lower(), "phase": LIFE[record.phase], "calls": record.calls}
         if record.owner:
-            told["owner"] = view.name(record.owner)
+            body["owner"] = view.name(record.owner)
         call = next(
             (
                 one
@@ -105,11 +105,11 @@ class FleetTopics:
         )
         if call is not None:
             shown = self._call(call)
-            told |= {key: shown[key] for key in ("car", "from", "to") if shown[key] is not None}
+            body |= {key: shown[key] for key in ("car", "from", "to") if shown[key] is not None}
             promised: Json = next((bid["cost"] for bid in reversed(shown["bids"]) if bid["by"] == shown["winner"]), {})
             if "end_us" in promised:
-                told["promised"] = self._at(promised["end_us"])
-        return told
+                body["promised"] = self._at(promised["end_us"])
+        return body
 
     def place(self, number: int) -> str | None:
         """A station as the site's own topics name it."""
@@ -122,15 +122,15 @@ class FleetTopics:
 
     # --- inner works -------------------------------------------------------------------------------------------
 
-    def _on_call(self, call: Call, now_us: int) -> Iterator[Told]:
+    def _on_call(self, call: CallHistory, now_us: int) -> Iterator[Told]:
         yield "call", self._stamped({"at_us": now_us, **self._call(call)})
         if call.terms.operation in WHOLE:
             yield "task", self.task(call.terms.task, now_us)
 
-    def _on_end(self, call: Call, end: CallAnswered, now_us: int) -> Iterator[Told]:
+    def _on_end(self, call: CallHistory, end: CallAnswered, now_us: int) -> Iterator[Told]:
         reason = end.award.reason
-        told = self._call(call) | {"reason": reason.name, "code": int(reason)}
-        yield "call", self._stamped({"at_us": now_us, **told})
+        body = self._call(call) | {"reason": reason.name, "code": int(reason)}
+        yield "call", self._stamped({"at_us": now_us, **body})
         if call.terms.operation in WHOLE:
             yield "task", self.task(call.terms.task, now_us)
 
@@ -140,7 +140,7 @@ class FleetTopics:
             extra = {"phase": LIFE[report.phase], "by": self.picture.view.name(report.sender)}
             yield "task", self.task(report.task, now_us) | extra | _coded(report.reason)
 
-    def _call(self, record: Call) -> Json:
+    def _call(self, record: CallHistory) -> Json:
         call = record.terms
         return self.picture.call(record) | {
             "task": reference_text(call.task),
@@ -157,30 +157,30 @@ class FleetTopics:
         """Elevators, compartments and all others that do not travel: state, and the floor of an elevator."""
         machine, view = self.site.machines[node], self.picture.view
         state = view.history.lives.states.get(node)
-        told: Json = {"kind": machine.kind.name.lower(), "state": state.name.lower() if state is not None else "silent"}
+        body: Json = {"kind": machine.kind.name.lower(), "state": state.name.lower() if state is not None else "silent"}
         if machine.kind is KindCode.LIFT:
             segment, _ = view.positions[node]
             shaft = way_site(self.site).tracks.get(segment.track)
             floors = shaft.joins if shaft is not None else ()
             if 1 <= segment.index <= len(floors):
-                told["floor"] = floors[segment.index - 1].track
-        yield f"machine/{machine.name}", told
+                body["floor"] = floors[segment.index - 1].track
+        yield f"machine/{machine.name}", body
 
     def _event(self, message: Message, reason: Reason, now_us: int) -> Json:
-        told: Json = {
+        body: Json = {
             "at": self._at(now_us),
             "event": type(message).__name__,
             "by": self.picture.view.name(message.sender),
         }
         names = {field.name for field in fields(message)}
         if {"track", "index"} <= names:
-            told["segment"] = str(Segment(_number(message, "track"), _number(message, "index")))
+            body["segment"] = str(Segment(_number(message, "track"), _number(message, "index")))
         for name in ("blocker", "count"):
             if name in names:
-                told[name] = _number(message, name)
-        if told.get("blocker"):
-            told["blocker"] = self.picture.view.name(told["blocker"])
-        return told | _coded(reason) | {"text": self._words.message(message)}
+                body[name] = _number(message, name)
+        if body.get("blocker"):
+            body["blocker"] = self.picture.view.name(body["blocker"])
+        return body | _coded(reason) | {"text": self._words.message(message)}
 
     def _stamped(self, value: Any) -> Any:
         """The same with every time of the log as a time stamp, ``x_us`` as ``x``."""

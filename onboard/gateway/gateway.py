@@ -12,7 +12,7 @@ from functools import partial
 from onboard.contract.messages import Message
 from onboard.core.frame import Frame
 from onboard.core.site import Site
-from onboard.gateway.desk import OrderDesk
+from onboard.gateway.desk import GatewayDesk
 from onboard.gateway.link import Link, LinkWords
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
 from onboard.gateway.reports import Reports
@@ -64,10 +64,10 @@ class Gateway:
         self._stopping = False
         self._to_keep: deque[tuple[str, Publication]] = deque()
         self._set_clock()
-        self.desk: OrderDesk | None = None
+        self.desk: GatewayDesk | None = None
         if send is not None and reports is not None and settings.node_id is not None:
             transmit = partial(_transmit, codec, send)
-            self.desk = OrderDesk(site, self.publisher, reports, transmit, self._post, self._now_us())
+            self.desk = GatewayDesk(site, self.publisher, reports, transmit, self._post, self._now_us())
         self.links = {name: self._link(broker, client, name) for name in self.publisher.links}
 
     # --- in ------------------------------------------------------------------------------------------------------
@@ -83,10 +83,10 @@ class Gateway:
 
     def event(self, time_us: int, source: str, text: str) -> None:
         """``ports.Telemetry``: what a controller in this process says in words, on ``log/MACHINE``."""
-        told = {"at": self.publisher.at(time_us), "machine": source, "text": text}
+        outgoing = {"at": self.publisher.at(time_us), "machine": source, "text": text}
         link = self.links.get(level(source), self.links.get(FLEET))
         if link is not None:
-            link.post(self.publisher.publication(f"log/{level(source)}", told))
+            link.post(self.publisher.publication(f"log/{level(source)}", outgoing))
 
     def news(self) -> str:
         """The sessions in one line: how many there are, why the others are not, and what was lost."""
@@ -154,8 +154,8 @@ class Gateway:
         await self._news.wait()
         timer.cancel()
 
-    def _post(self, told: Iterable[Outgoing]) -> None:
-        for one in told:
+    def _post(self, outgoing: Iterable[Outgoing]) -> None:
+        for one in outgoing:
             if one.report and self.reports is not None:
                 self._to_keep.append((one.report, one.publication))
             elif one.link in self.links:

@@ -19,12 +19,12 @@ BURST, RATE_US = 20, 1_000_000
 class Incoming:
     """One order. ``kind``: ``transport``, or ``order`` and ``instantActions`` of VDA 5050 to the machine ``serial``.
 
-    Where ``reason`` is not empty it is refused: ``path`` is the place in it. ``told`` is what could be read of it.
+    Where ``reason`` is not empty it is refused: ``path`` is the place in it. ``body`` is what could be read of it.
     """
 
     kind: str
     serial: str
-    told: dict[str, Any]
+    body: dict[str, Any]
     reason: str = ""
     path: str = ""
     why: str = ""
@@ -60,26 +60,26 @@ class Inbox:
     def refuse(self, order: Incoming, reason: str, why: str, path: str = "$") -> Incoming:
         """The same order, refused for what it means; counted."""
         self.refused[reason] += 1
-        return Incoming(order.kind, order.serial, order.told, reason, path, why)
+        return Incoming(order.kind, order.serial, order.body, reason, path, why)
 
     def _judge(self, kind: str, serial: str, publication: Publication, now_us: int) -> Incoming:
         if len(publication.payload) > MOST_BYTES:
             return Incoming(kind, serial, {}, "OVERSIZED", "$", f"at most {MOST_BYTES} bytes are taken")
         try:
-            told = json.loads(publication.payload, parse_constant=_no_constant)
+            body = json.loads(publication.payload, parse_constant=_no_constant)
         except (ValueError, RecursionError) as error:
             return Incoming(kind, serial, {}, "MALFORMED", "$", f"no JSON: {str(error)[:100]}")
-        named = told if isinstance(told, dict) else {}
+        named = body if isinstance(body, dict) else {}
         name = TRANSPORT if kind == TRANSPORT else f"{self._dialect.number}/{kind}"
-        wrong = schema(name).first_error(told)
+        wrong = schema(name).first_error(body)
         if wrong is not None:
             return Incoming(kind, serial, named, "MALFORMED", *wrong)
         if kind != TRANSPORT:
             mine = (("serialNumber", serial), ("manufacturer", self._machines.split("/")[-2]))
             for key, value in mine:
-                if told[key] != value:
+                if body[key] != value:
                     return Incoming(kind, serial, named, "MALFORMED", f"$.{key}", f"must be that of the topic, {value}")
-            wrong = _too_long(told)
+            wrong = _too_long(body)
             if wrong is not None:
                 return Incoming(kind, serial, named, "TOO_LONG", *wrong)
         if publication.retain:
@@ -108,11 +108,11 @@ class Inbox:
         return True
 
 
-def _too_long(told: dict[str, Any]) -> tuple[str, str] | None:
+def _too_long(body: dict[str, Any]) -> tuple[str, str] | None:
     """What the factsheet's limits forbid and the schema does not: path and reason."""
-    if len(told.get("orderId", "")) > MOST_ID:
+    if len(body.get("orderId", "")) > MOST_ID:
         return "$.orderId", f"must have at most {MOST_ID} characters"
-    actions = told.get("actions", [])
+    actions = body.get("actions", [])
     if len(actions) > MOST_ACTIONS:
         return "$.actions", f"must have at most {MOST_ACTIONS} elements"
     for number, action in enumerate(actions):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from onboard.gateway.reports import Reports
-from onboard.ports.broker import Broker, BrokerError, Publication, Session
+from onboard.ports.broker import Broker, BrokerError, BrokerSession, Publication
 
 #: Telemetry of one link that waits for the broker; of more the oldest is dropped and counted.
 MOST_WAITING = 256
@@ -115,7 +115,7 @@ class Link:
                 await asyncio.wait([listening])
             await self._publish(session, self._words.goodbye())
 
-    async def _send(self, session: Session, listening: "asyncio.Future[None]") -> None:
+    async def _send(self, session: BrokerSession, listening: "asyncio.Future[None]") -> None:
         """Reports first, then telemetry in its order; a publication leaves its queue once the broker has it."""
         while not self._stopping.is_set():
             self._news.clear()
@@ -130,7 +130,7 @@ class Link:
                 listening.result()
                 raise BrokerError("the connection has ended")
 
-    async def _send_one(self, session: Session) -> bool:
+    async def _send_one(self, session: BrokerSession) -> bool:
         if self._reports is not None and self._reports.pending:
             name, report = next(iter(self._reports.pending.items()))
             await self._publish(session, report)
@@ -148,11 +148,11 @@ class Link:
             self._queue.popleft()
         return True
 
-    async def _publish(self, session: Session, publication: Publication) -> None:
+    async def _publish(self, session: BrokerSession, publication: Publication) -> None:
         await session.publish(publication)
         self.counts.published += 1
 
-    async def _listen(self, session: Session) -> None:
+    async def _listen(self, session: BrokerSession) -> None:
         async for delivery in session.incoming():
             if self._on_order is not None:
                 self._on_order(delivery, partial(session.taken, delivery))

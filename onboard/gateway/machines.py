@@ -20,7 +20,7 @@ from onboard.contract.messages import (
 )
 from onboard.core.site import Machine, Segment, Site
 from onboard.gateway.edge import edge_of
-from onboard.gateway.whereabouts import Tracker, Whereabouts
+from onboard.gateway.positions import MachinePosition, Tracker
 from onboard.history.calls import CallAnswered
 from onboard.history.history import Fact
 
@@ -50,7 +50,7 @@ class TaskInHand:
 
 
 @dataclass(slots=True)
-class Body:
+class MobileMachine:
     """What is known of one mobile machine: when it was heard (loop time, us), its state, task and load."""
 
     machine: Machine
@@ -73,7 +73,7 @@ class Machines:
     """A fold: feed every message of the fleet bus in order. ``changed`` are node-IDs whose state may be another."""
 
     site: Site
-    bodies: dict[int, Body] = field(init=False)
+    bodies: dict[int, MobileMachine] = field(init=False)
     blocked: dict[Segment, Blocked] = field(default_factory=dict)
     emergency: EmergencyStop | None = None
     changed: set[int] = field(default_factory=set)
@@ -83,10 +83,10 @@ class Machines:
 
     def __post_init__(self) -> None:
         mobile = sorted(node for node, one in self.site.machines.items() if one.kind in TRAVELLERS)
-        self.bodies = {node: Body(self.site.machines[node]) for node in mobile}
+        self.bodies = {node: MobileMachine(self.site.machines[node]) for node in mobile}
         self._tracker = edge_of(self.site).tracker()
 
-    def where(self, node_id: int) -> Whereabouts:
+    def where(self, node_id: int) -> MachinePosition:
         """Where a mobile machine is."""
         return self._tracker.where(node_id)
 
@@ -135,7 +135,7 @@ class Machines:
         """When a machine that is not heard again counts as silent, us."""
         return (self.bodies[node_id].heard_us or 0) + SILENT_BEATS * self.site.timing.heartbeat_us + 1
 
-    def _on_word(self, body: Body, message: Message, now_us: int) -> None:
+    def _on_word(self, body: MobileMachine, message: Message, now_us: int) -> None:
         """What a mobile machine says of itself."""
         match message:
             case Heartbeat():
@@ -167,7 +167,7 @@ class Machines:
                 return
         self.changed.update(self.bodies)
 
-    def _on_heartbeat(self, body: Body, message: Heartbeat) -> None:
+    def _on_heartbeat(self, body: MobileMachine, message: Heartbeat) -> None:
         if body.state is not message.state:
             body.state = message.state
             self.changed.add(message.sender)
@@ -182,7 +182,7 @@ class Machines:
             self.emergency = None
             self.changed.update(self.bodies)
 
-    def _on_report(self, body: Body, report: TaskReport) -> None:
+    def _on_report(self, body: MobileMachine, report: TaskReport) -> None:
         task = body.task
         if task is None or task.task != report.task:
             if report.phase in _OVER:

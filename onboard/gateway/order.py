@@ -4,15 +4,15 @@ import zlib
 from dataclasses import dataclass, replace
 
 from onboard.contract.messages import Reference
-from onboard.gateway.records import Life, WishRecord
+from onboard.gateway.records import OrderPhase, WishRecord
 from onboard.ports.journal import Entry
 
 #: In the order in which they come; an order never goes back but to CALLED, when it is called again.
-RANK = {life: rank for rank, life in enumerate(Life)}
+RANK = {life: rank for rank, life in enumerate(OrderPhase)}
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class OrderRequest:
     """What an order asks of the bus: a compartment to fetch ``car`` or to park, or a robot to visit ``stops``.
 
     ``base`` is the last node that a VDA 5050 order releases and its sequence number, where an update goes on;
@@ -32,39 +32,39 @@ class Wish:
 
 
 @dataclass(slots=True)
-class Order:
+class GatewayOrder:
     """One order. ``name`` is the giver's; ``content`` tells a second order under the same name from a repetition.
 
     Times in us of the loop; ``before_us`` in wall time since 1970. ``due_us``: when it is to be said (again).
     """
 
     name: str
-    wish: Wish
+    request: OrderRequest
     content: int
     before_us: int | None = None
     update: int = 0
-    life: Life = Life.ACCEPTED
+    life: OrderPhase = OrderPhase.ACCEPTED
     reason: str = ""
     why: str = ""
     task: Reference | None = None
     owner: int = 0
     was_said: bool = False
     due_us: int | None = None
-    #: Stops of updates, list by list, that the robot gets once it has done those of ``wish``.
+    #: Stops of updates, list by list, that the robot gets once it has done those of ``request``.
     ahead: tuple[tuple[int, ...], ...] = ()
     #: It was taken back while the robot had it: the robot is told until it says so.
     is_cancelled: bool = False
 
     def entry(self) -> Entry:
         """The whole order, for the journal; the newest record of a name counts."""
-        wish = self.wish
+        request = self.request
         return WishRecord(
             self.name,
-            wish.what,
-            wish.node,
-            wish.stops,
-            wish.number,
-            wish.urgent,
+            request.what,
+            request.node,
+            request.stops,
+            request.number,
+            request.urgent,
             self.content,
             self.update,
             self.life,
@@ -73,19 +73,19 @@ class Order:
             self.owner,
             self.was_said,
             ahead=",".join(_words(stops) for stops in self.ahead),
-            base=wish.base[0],
-            sequence=wish.base[1],
-            open=wish.is_open,
+            base=request.base[0],
+            sequence=request.base[1],
+            open=request.is_open,
             cancelled=self.is_cancelled,
-            car=wish.car,
+            car=request.car,
             task=self.task,
             before_us=self.before_us,
         ).entry
 
 
-def order_of(record: WishRecord) -> Order:
+def order_of(record: WishRecord) -> GatewayOrder:
     """The order that a journal record of it stands for."""
-    wish = Wish(
+    request = OrderRequest(
         record.what,
         record.node,
         record.car,
@@ -95,9 +95,9 @@ def order_of(record: WishRecord) -> Order:
         (record.base, record.sequence),
         record.open,
     )
-    return Order(
+    return GatewayOrder(
         record.name,
-        wish,
+        request,
         record.content,
         record.before_us,
         record.update,
@@ -117,9 +117,9 @@ def same_content(*parts: object) -> int:
     return zlib.crc32(repr(parts).encode())
 
 
-def with_number(wish: Wish, number: int) -> Wish:
-    """The same wish under a number on the bus."""
-    return replace(wish, number=number)
+def with_number(request: OrderRequest, number: int) -> OrderRequest:
+    """The same request under a number on the bus."""
+    return replace(request, number=number)
 
 
 def _words(stops: tuple[int, ...]) -> str:

@@ -16,11 +16,11 @@ from onboard.contract.messages import Message, Reference, TaskReport
 from onboard.core.journal_records import records_in
 from onboard.core.serial import is_newer, successor
 from onboard.core.site import Site
+from onboard.gateway.bus_orders import LISTEN_US, BusOrders, RefusedError, is_robot
 from onboard.gateway.inbox import Incoming
-from onboard.gateway.order import RANK, Order, Wish, order_of, same_content, with_number
-from onboard.gateway.records import Life, WishRecord
+from onboard.gateway.order import RANK, GatewayOrder, OrderRequest, order_of, same_content, with_number
+from onboard.gateway.records import OrderPhase, WishRecord
 from onboard.gateway.schema import TRANSPORT
-from onboard.gateway.wishes import LISTEN_US, RefusedError, Wishes, is_robot
 from onboard.ports.journal import Entry
 
 #: Orders that are over are remembered, the newest so many, so that their names are known when they come again.
@@ -30,38 +30,45 @@ MOST_OPEN = 200
 #: Lists of stops of one order that wait for the one in hand; one update more is refused.
 MOST_AHEAD = 16
 _PHASES = {
-    TaskPhase.OPEN: Life.CALLED,
-    TaskPhase.AWARDED: Life.AWARDED,
-    TaskPhase.STARTED: Life.MOVING,
-    TaskPhase.LOADED: Life.MOVING,
-    TaskPhase.DONE: Life.DONE,
-    TaskPhase.REFUSED: Life.REFUSED,
-    TaskPhase.FORFEITED: Life.CALLED,
+    TaskPhase.OPEN: OrderPhase.CALLED,
+    TaskPhase.AWARDED: OrderPhase.AWARDED,
+    TaskPhase.STARTED: OrderPhase.MOVING,
+    TaskPhase.LOADED: OrderPhase.MOVING,
+    TaskPhase.DONE: OrderPhase.DONE,
+    TaskPhase.REFUSED: OrderPhase.REFUSED,
+    TaskPhase.FORFEITED: OrderPhase.CALLED,
 }
 
 
 @dataclass
-class Outcome:
+class OrderEffects:
     """What follows from a step: ``changed`` orders are durable before ``say`` goes to the bus and anything is told.
 
-    ``told`` are orders to be told of that did not change; ``refused`` what was not taken.
+    ``to_tell`` are orders to be told of that did not change; ``refused`` what was not taken.
     """
 
-    changed: list[Order] = field(default_factory=list)
+    changed: list[GatewayOrder] = field(default_factory=list)
     say: list[Message] = field(default_factory=list)
-    told: list[Order] = field(default_factory=list)
+    to_tell: list[GatewayOrder] = field(default_factory=list)
     refused: list[Incoming] = field(default_factory=list)
 
 
-class Orders:
+class OrderBook:
     """All orders of a site that came in through one gateway, by name, oldest first."""
 
     def __init__(
-        self, site: Site, wishes: Wishes, node_id: int, entries: Iterable[Entry], *, now_us: int = 0, seed: int = 0
+        self,
+        site: Site,
+        bus_orders: BusOrders,
+        node_id: int,
+        entries: Iterable[Entry],
+        *,
+        now_us: int = 0,
+        seed: int = 0,
     ) -> None:
         """``seed`` (16 bits) begins the numbers of visit lists where the journal is empty: another than last time."""
-        self.book: OrderedDict[str, Order] = OrderedDict()
-        self._site, self._wishes, self._node_id = site, wishes, node_id
+        self.book: OrderedDict[str, GatewayOrder] = OrderedDict()
+        self._site, self._bus_orders, self._node_id = site, bus_orders, node_id
         self._number = seed & 0xFFFF
         self._asked = False
         self._ready_us = now_us + LISTEN_US
@@ -70,17 +77,17 @@ class Orders:
             order = order_of(record)
             self.book.pop(order.name, None)
             self.book[order.name] = order
-            numbers += [order.wish.number] if order.wish.number else []
+            numbers += [order.request.number] if order.request.number else []
         for place, number in enumerate(numbers):
             # The newest by serial arithmetic, for an older order may have been written about last.
             self._number = number if not place or is_newer(number, self._number, 16) else self._number
         for order in self.open:
             # A key is not pressed again: what it led to is heard, or was.
-            heard = order.wish.what == "park" and order.life is not Life.ACCEPTED
+            heard = order.request.what == "park" and order.life is not OrderPhase.ACCEPTED
             order.due_us = None if heard or _waits(order) else self._ready_us
 
     @property
-    def open(self) -> list[Order]:
+    def open(self) -> list[GatewayOrder]:
         """Orders that are not over."""
         return [order for order in self.book.values() if not order.life.is_over]
 
@@ -88,149 +95,153 @@ class Orders:
         """What counts of all, for the journal."""
         return (order.entry() for order in self.book.values())
 
-    def of_robot(self, node: int) -> Order | None:
+    def of_robot(self, node: int) -> GatewayOrder | None:
         """The order that a robot has by name, the newest; None where it never had one."""
         newest = reversed(self.book.values())
-        return next((one for one in newest if one.wish.what == "visit" and one.wish.node == node), None)
+        return next((one for one in newest if one.request.what == "visit" and one.request.node == node), None)
 
     # --- in ------------------------------------------------------------------------------------------------------
 
-    def take(self, incoming: Incoming, wall_us: int, now_us: int) -> Outcome:
+    def take(self, incoming: Incoming, wall_us: int, now_us: int) -> OrderEffects:
         """A transport, or a VDA 5050 order, that is well formed."""
-        outcome = Outcome()
+        outcome = OrderEffects()
         try:
             self._take(incoming, wall_us, now_us, outcome)
         except RefusedError as refused:
             outcome.refused.append(
-                Incoming(incoming.kind, incoming.serial, incoming.told, refused.reason, refused.path, refused.why)
+                Incoming(incoming.kind, incoming.serial, incoming.body, refused.reason, refused.path, refused.why)
             )
         return outcome
 
-    def _take(self, incoming: Incoming, wall_us: int, now_us: int, outcome: Outcome) -> None:
-        told = incoming.told
-        name, update = name_of(incoming), int(told.get("orderUpdateId", 0))
-        content = same_content(incoming.kind, _essence(told))
+    def _take(self, incoming: Incoming, wall_us: int, now_us: int, outcome: OrderEffects) -> None:
+        body = incoming.body
+        name, update = name_of(incoming), int(body.get("orderUpdateId", 0))
+        content = same_content(incoming.kind, _essence(body))
         known = self.book.get(name)
         if known is not None:
             if known.update != update:
-                self._update(known, told, content, outcome)
+                self._update(known, body, content, outcome)
                 return
             if known.content != content:
                 raise RefusedError("NAME_TAKEN", "another order has this name", _NAME[incoming.kind])
-            outcome.told.append(known)
+            outcome.to_tell.append(known)
             return
         if update and incoming.kind != TRANSPORT:
             raise RefusedError("NO_ORDER", "an update of an order that is not known", "$.orderUpdateId")
         if len(self.open) >= MOST_OPEN:
             raise RefusedError("TOO_MANY", f"{MOST_OPEN} orders are open")
-        before_us = _moment_us(told.get("before"))
+        before_us = _moment_us(body.get("before"))
         if before_us is not None and before_us <= wall_us:
             raise RefusedError("TOO_LATE", "is past", "$.before")
-        order = Order(name, self._wish(incoming), content, before_us, update)
+        order = GatewayOrder(name, self._request(incoming), content, before_us, update)
         order.due_us = max(now_us, self._ready_us)
         self.book[name] = order
         outcome.changed.append(order)
         self._forget()
 
-    def _update(self, order: Order, told: dict[str, Any], content: int, outcome: Outcome) -> None:
+    def _update(self, order: GatewayOrder, body: dict[str, Any], content: int, outcome: OrderEffects) -> None:
         """More of an order by name: what its update releases is done behind what was released (section 6.6.4)."""
-        if told["orderUpdateId"] < order.update:
+        if body["orderUpdateId"] < order.update:
             raise RefusedError("OLD_UPDATE", f"update {order.update} was taken before", "$.orderUpdateId")
         if order.life.is_over or order.is_cancelled:
             raise RefusedError("ORDER_OVER", "the order is over; give a new one", "$.orderId")
-        wish = self._wishes.visit(order.wish.node, told, order.wish.base)
+        request = self._bus_orders.visit(order.request.node, body, order.request.base)
         if len(order.ahead) >= MOST_AHEAD:
             raise RefusedError("TOO_MANY", f"{MOST_AHEAD} updates wait", "$.orderUpdateId")
-        order.update, order.content = told["orderUpdateId"], content
-        order.ahead += (wish.stops,) if wish.stops else ()
-        order.wish = replace(order.wish, base=wish.base, is_open=wish.is_open)
+        order.update, order.content = body["orderUpdateId"], content
+        order.ahead += (request.stops,) if request.stops else ()
+        order.request = replace(order.request, base=request.base, is_open=request.is_open)
         if _waits(order):
             self._next(order)
         outcome.changed.append(order)
 
-    def _next(self, order: Order) -> None:
+    def _next(self, order: GatewayOrder) -> None:
         """The robot has done what it was given: it gets the next list, waits for an update, or the order is done."""
         if order.ahead and not order.is_cancelled:
             self._number = successor(self._number, 16)
-            order.wish = replace(order.wish, stops=order.ahead[0], number=self._number)
+            order.request = replace(order.request, stops=order.ahead[0], number=self._number)
             order.ahead = order.ahead[1:]
-            order.life, order.was_said, order.due_us = Life.CALLED, False, 0
-        elif order.wish.is_open and not order.is_cancelled:
-            order.wish, order.due_us = replace(order.wish, stops=()), None
+            order.life, order.was_said, order.due_us = OrderPhase.CALLED, False, 0
+        elif order.request.is_open and not order.is_cancelled:
+            order.request, order.due_us = replace(order.request, stops=()), None
         else:
-            self._end(order, Life.DONE, "", "")
+            self._end(order, OrderPhase.DONE, "", "")
 
-    def _wish(self, incoming: Incoming) -> Wish:
+    def _request(self, incoming: Incoming) -> OrderRequest:
         if incoming.kind == TRANSPORT:
-            return self._numbered(self._wishes.transport(incoming.told))
+            return self._numbered(self._bus_orders.transport(incoming.body))
         node = next((one.node_id for one in self._site.machines.values() if one.name == incoming.serial), 0)
         if not is_robot(self._site, node):
             raise RefusedError("UNKNOWN_MACHINE", "no machine of this name travels", "$.serialNumber")
-        wish = self._wishes.visit(node, incoming.told)
+        request = self._bus_orders.visit(node, incoming.body)
         busy = self.of_robot(node)
         if busy is not None and not busy.life.is_over:
             raise RefusedError("BUSY", f"{incoming.serial} has order {busy.name}", "$.orderId")
-        return self._numbered(wish)
+        return self._numbered(request)
 
-    def _numbered(self, wish: Wish) -> Wish:
+    def _numbered(self, request: OrderRequest) -> OrderRequest:
         """A name on the bus, for what is told under one of this gateway's."""
-        if wish.what not in ("visit", "send"):
-            return wish
+        if request.what not in ("visit", "send"):
+            return request
         self._number = successor(self._number, 16)
-        return with_number(wish, self._number)
+        return with_number(request, self._number)
 
-    def cancel(self, node: int) -> Outcome | None:
+    def cancel(self, node: int) -> OrderEffects | None:
         """End a robot's order by name; None where it has none. A robot that has it is told until it says so."""
         order = self.of_robot(node)
         if order is None or order.life.is_over:
             return None
         if order.was_said and not _waits(order):
             order.is_cancelled, order.due_us = True, 0
-            return Outcome(changed=[order])
-        return Outcome(changed=[self._end(order, Life.REFUSED, "CANCELLED", "before it was given")])
+            return OrderEffects(changed=[order])
+        return OrderEffects(changed=[self._end(order, OrderPhase.REFUSED, "CANCELLED", "before it was given")])
 
     # --- the bus and the clock -----------------------------------------------------------------------------------
 
-    def feed(self, message: Message) -> Outcome:
+    def feed(self, message: Message) -> OrderEffects:
         """Take up one message of the fleet bus."""
-        outcome = Outcome()
+        outcome = OrderEffects()
         for order in self.open:
-            task = self._wishes.task_of(order, message) if order.life in (Life.ACCEPTED, Life.CALLED) else None
-            if task is not None and (task != order.task or order.life is Life.ACCEPTED):
-                order.task, order.life, order.due_us = task, Life.CALLED, None
+            task = (
+                self._bus_orders.task_of(order, message)
+                if order.life in (OrderPhase.ACCEPTED, OrderPhase.CALLED)
+                else None
+            )
+            if task is not None and (task != order.task or order.life is OrderPhase.ACCEPTED):
+                order.task, order.life, order.due_us = task, OrderPhase.CALLED, None
                 outcome.changed.append(order)
             elif isinstance(message, TaskReport) and message.task == self._task(order):
                 self._on_report(order, message, outcome)
-            elif self._wishes.is_done(order, message):
-                outcome.changed.append(self._end(order, Life.DONE, "", ""))
+            elif self._bus_orders.is_done(order, message):
+                outcome.changed.append(self._end(order, OrderPhase.DONE, "", ""))
         return outcome
 
-    def _on_report(self, order: Order, report: TaskReport, outcome: Outcome) -> None:
+    def _on_report(self, order: GatewayOrder, report: TaskReport, outcome: OrderEffects) -> None:
         life = _PHASES.get(report.phase)
         by_robot = is_robot(self._site, report.sender)
-        by_desk = report.sender == order.wish.node and order.wish.what == "send"
-        if life is None or (not by_robot and not by_desk and life is not Life.REFUSED):
+        by_desk = report.sender == order.request.node and order.request.what == "send"
+        if life is None or (not by_robot and not by_desk and life is not OrderPhase.REFUSED):
             return
-        if life is Life.DONE and order.wish.what == "visit":
+        if life is OrderPhase.DONE and order.request.what == "visit":
             order.owner = report.sender
             if not _waits(order):
                 self._next(order)
                 outcome.changed.append(order)
         elif life.is_over:
-            reason = report.reason.name if life is Life.REFUSED else ""
+            reason = report.reason.name if life is OrderPhase.REFUSED else ""
             order.owner = report.sender if by_robot else order.owner
             outcome.changed.append(self._end(order, life, reason, ""))
         elif report.phase is TaskPhase.FORFEITED or RANK[life] > RANK[order.life]:
             order.task, order.life, order.due_us = report.task, life, 0 if order.is_cancelled else None
-            order.owner = report.sender if by_robot and life is not Life.CALLED else 0
+            order.owner = report.sender if by_robot and life is not OrderPhase.CALLED else 0
             outcome.changed.append(order)
 
-    def wake(self, now_us: int, wall_us: int) -> Outcome:
+    def wake(self, now_us: int, wall_us: int) -> OrderEffects:
         """Say what is due; ``wall_us`` is the same moment since 1970."""
-        outcome = Outcome()
+        outcome = OrderEffects()
         if not self._asked:
             self._asked = True
-            outcome.say += self._wishes.ask_all(self._node_id)
+            outcome.say += self._bus_orders.ask_all(self._node_id)
         for order in self.open:
             if order.due_us is not None and order.due_us <= now_us:
                 self._say(order, now_us, wall_us, outcome)
@@ -240,28 +251,28 @@ class Orders:
         """When something is due; None for never."""
         return min((order.due_us for order in self.open if order.due_us is not None), default=None)
 
-    def _say(self, order: Order, now_us: int, wall_us: int, outcome: Outcome) -> None:
+    def _say(self, order: GatewayOrder, now_us: int, wall_us: int, outcome: OrderEffects) -> None:
         try:
-            said = self._wishes.say(order, self._node_id, wall_us)
+            to_say = self._bus_orders.say(order, self._node_id, wall_us)
         except RefusedError as refused:
             gone = order.was_said and refused.reason == "UNKNOWN_TICKET"
             # Asked for before, and not in the park any more: somebody has it.
-            life = Life.DONE if gone else Life.REFUSED
+            life = OrderPhase.DONE if gone else OrderPhase.REFUSED
             outcome.changed.append(self._end(order, life, "" if gone else refused.reason, "" if gone else refused.why))
             return
         if not order.was_said:
             order.was_said = True
             outcome.changed.append(order)
-        outcome.say += said.messages
-        order.due_us = None if said.again_us is None else now_us + said.again_us
+        outcome.say += to_say.messages
+        order.due_us = None if to_say.again_us is None else now_us + to_say.again_us
 
     # --- inner works -------------------------------------------------------------------------------------------
 
-    def _task(self, order: Order) -> Reference | None:
+    def _task(self, order: GatewayOrder) -> Reference | None:
         """The task on the bus: heard, or named by the order itself."""
-        return Reference(self._node_id, order.wish.number) if order.wish.number else order.task
+        return Reference(self._node_id, order.request.number) if order.request.number else order.task
 
-    def _end(self, order: Order, life: Life, reason: str, why: str) -> Order:
+    def _end(self, order: GatewayOrder, life: OrderPhase, reason: str, why: str) -> GatewayOrder:
         order.life, order.reason, order.why, order.due_us = life, reason, why, None
         return order
 
@@ -271,9 +282,9 @@ class Orders:
             del self.book[name]
 
 
-def _waits(order: Order) -> bool:
+def _waits(order: GatewayOrder) -> bool:
     """Whether a robot has done all that was released of its order, and waits for more."""
-    return order.wish.what == "visit" and not order.wish.stops
+    return order.request.what == "visit" and not order.request.stops
 
 
 _NAME = {TRANSPORT: "$.id", "order": "$.orderId"}
@@ -282,13 +293,13 @@ _NAME = {TRANSPORT: "$.id", "order": "$.orderId"}
 def name_of(incoming: Incoming) -> str:
     """An order's name; a robot's orders are apart from the fleet's. Empty where it has none."""
     if incoming.kind == TRANSPORT:
-        return str(incoming.told.get("id", ""))
-    return f"{incoming.serial}/{incoming.told.get('orderId', '')}"
+        return str(incoming.body.get("id", ""))
+    return f"{incoming.serial}/{incoming.body.get('orderId', '')}"
 
 
-def _essence(told: dict[str, Any]) -> list[tuple[str, Any]]:
+def _essence(body: dict[str, Any]) -> list[tuple[str, Any]]:
     """What an order says, without what differs when it is sent again."""
-    return sorted((key, repr(value)) for key, value in told.items() if key not in ("headerId", "timestamp"))
+    return sorted((key, repr(value)) for key, value in body.items() if key not in ("headerId", "timestamp"))
 
 
 def _moment_us(text: str | None) -> int | None:

@@ -64,7 +64,7 @@ class Pauses:
 
     def wake(self, now_us: int) -> tuple[list[Message], list[Closed]]:
         """What is to be said, and what nobody has answered."""
-        said: list[Message] = []
+        due: list[Message] = []
         closed: list[Closed] = []
         for node, asked in list(self._asked.items()):
             if asked.again_us > now_us:
@@ -74,8 +74,8 @@ class Pauses:
                 closed.append((node, asked.action, "the machine does not answer"))
             else:
                 asked.again_us = now_us + (AGAIN_US if asked.give_up_us is not None else RESTS_YET_US)
-                said.append(asked.order)
-        return said, closed
+                due.append(asked.order)
+        return due, closed
 
     def due(self) -> Iterable[int]:
         """When something is to be said again, or given up, us."""

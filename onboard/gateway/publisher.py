@@ -85,7 +85,7 @@ class Publisher:
     def hello(self, link: str, now_us: int) -> list[Publication]:
         """What a link says first: how it is connected, and what never changes."""
         if link == FLEET:
-            fixed = [self.publication(topic, told, retain=True) for topic, told in self._fixed.items()]
+            fixed = [self.publication(topic, body, retain=True) for topic, body in self._fixed.items()]
             return [self._link_state(link, Connection.ONLINE, now_us), *fixed]
         node = self._node(link)
         connection = self._connection_of(node, now_us)
@@ -139,11 +139,11 @@ class Publisher:
     def _feed(self, message: Message, now_us: int) -> Iterator[Outgoing]:
         fact = self.fleet.picture.history.feed(message, now_us)
         self.machines.feed(message, now_us, fact)
-        told = self._of_fleet(message, fact, now_us)
+        body = self._of_fleet(message, fact, now_us)
         if not self.settings.serials:
-            yield from told
+            yield from body
         else:
-            deque(told, maxlen=0)
+            deque(body, maxlen=0)
         node = message.sender
         if node in self._due and self._due[node].connection is not Connection.ONLINE:
             yield from self._connections([node], now_us)
@@ -164,17 +164,17 @@ class Publisher:
         if self._indicators_us <= now_us:
             self._indicators_us = now_us + self.settings.indicators_us
             if not self.settings.serials:
-                told = self.fleet.indicators(now_us)
-                yield Outgoing(FLEET, self.publication("indicators", told, retain=True))
+                body = self.fleet.indicators(now_us)
+                yield Outgoing(FLEET, self.publication("indicators", body, retain=True))
 
     def _of_fleet(self, message: Message, fact: Fact | None, now_us: int) -> Iterator[Outgoing]:
-        for topic, told in self.fleet.take(message, fact, now_us):
+        for topic, body in self.fleet.take(message, fact, now_us):
             retain = topic.startswith("machine/")
-            if retain and self._fixed.get(topic) == told:
+            if retain and self._fixed.get(topic) == body:
                 continue
             if retain:
-                self._fixed[topic] = told
-            yield Outgoing(FLEET, self.publication(topic, told, retain=retain))
+                self._fixed[topic] = body
+            yield Outgoing(FLEET, self.publication(topic, body, retain=retain))
         if isinstance(message, TaskReport) and message.phase in _TERMINAL:
             yield from self._report(message, now_us)
 
@@ -184,19 +184,19 @@ class Publisher:
         known = operation in WHOLE or (operation is None and report.sender in self.machines.bodies)
         if not known:
             return
-        told = self.fleet.task(report.task, now_us)
+        body = self.fleet.task(report.task, now_us)
         name = f"{vda.reference_text(report.task)}-{report.phase.name.lower()}"
-        told |= {"id": f"{told['at'][:10]}-{name}", "phase": report.phase.name.lower()}
-        told |= {"by": self.fleet.picture.view.name(report.sender), "reason": report.reason.name}
-        yield Outgoing(FLEET, self.publication("report", told, qos=1), name)
+        body |= {"id": f"{body['at'][:10]}-{name}", "phase": report.phase.name.lower()}
+        body |= {"by": self.fleet.picture.view.name(report.sender), "reason": report.reason.name}
+        yield Outgoing(FLEET, self.publication("report", body, qos=1), name)
 
     def _moved(self, node: int, now_us: int) -> Iterator[Outgoing]:
         due, where = self._due[node], self.machines.where(node)
         if where.map_id is None or (due.seen_us is not None and now_us - due.seen_us < self.settings.visualization_us):
             return
         due.seen_us = now_us
-        told = vda.visualization(self.settings.dialect, where, self._headers[node, "state"])
-        yield Outgoing(self._serial(node), self._vda(node, "visualization", told, now_us))
+        body = vda.visualization(self.settings.dialect, where, self._headers[node, "state"])
+        yield Outgoing(self._serial(node), self._vda(node, "visualization", body, now_us))
 
     def _tell_state(self, node: int, due: _Due, now_us: int) -> Iterator[Outgoing]:
         content = self._content(node, now_us)
@@ -238,22 +238,22 @@ class Publisher:
     def _link_state(self, link: str, connection: Connection, now_us: int) -> Publication:
         if link == FLEET:
             return self.publication("status", {"state": connection.value}, qos=1, retain=True)
-        told = vda.connection(self.settings.dialect, connection)
-        return self._vda(self._node(link), "connection", told, now_us, qos=1, retain=True)
+        body = vda.connection(self.settings.dialect, connection)
+        return self._vda(self._node(link), "connection", body, now_us, qos=1, retain=True)
 
     def at(self, time_us: int) -> str:
         """A time of the loop as a time stamp."""
         return timestamp(self.settings.epoch_us + time_us)
 
-    def publication(self, topic: str, told: Json, *, qos: int = 0, retain: bool = False) -> Publication:
+    def publication(self, topic: str, body: Json, *, qos: int = 0, retain: bool = False) -> Publication:
         """One message of the fleet's own topics; ``topic`` below PREFIX/SITE."""
-        return Publication(f"{self.root}/{topic}", _bytes(told), qos, retain)
+        return Publication(f"{self.root}/{topic}", _bytes(body), qos, retain)
 
-    def _vda(self, node: int, name: str, told: Json, now_us: int, *, qos: int = 0, retain: bool = False) -> Publication:
+    def _vda(self, node: int, name: str, body: Json, now_us: int, *, qos: int = 0, retain: bool = False) -> Publication:
         dialect, maker, serial = self.settings.dialect, self.settings.manufacturer, self._serial(node)
         header = dialect.header(self._headers[node, name], self.settings.epoch_us + now_us, maker, serial)
         self._headers[node, name] += 1
-        return Publication(dialect.topic(maker, serial, name), _bytes(header | told), qos, retain)
+        return Publication(dialect.topic(maker, serial, name), _bytes(header | body), qos, retain)
 
     def _serial(self, node: int) -> str:
         return level(self.site.machines[node].name)
@@ -262,5 +262,5 @@ class Publisher:
         return next(node for node in self._told_of if self._serial(node) == link)
 
 
-def _bytes(told: Json) -> bytes:
-    return json.dumps(told, separators=(",", ":")).encode()
+def _bytes(body: Json) -> bytes:
+    return json.dumps(body, separators=(",", ":")).encode()

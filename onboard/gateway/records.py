@@ -7,7 +7,7 @@ from onboard.contract.messages import Reference
 from onboard.core.journal_records import JournalRecord
 
 
-class Life(StrEnum):
+class OrderPhase(StrEnum):
     """Where an order is (docs/mqtt.md). ACCEPTED is durable; CALLED and what follows is heard on the bus."""
 
     ACCEPTED = "accepted"
@@ -20,7 +20,7 @@ class Life(StrEnum):
     @property
     def is_over(self) -> bool:
         """Whether the order is done or refused, and nothing follows."""
-        return self in (Life.DONE, Life.REFUSED)
+        return self in (OrderPhase.DONE, OrderPhase.REFUSED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class WishRecord(JournalRecord):
     urgent: bool
     content: int
     update: int
-    life: Life
+    life: OrderPhase
     reason: str
     why: str
     owner: int

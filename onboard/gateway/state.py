@@ -10,8 +10,8 @@ from onboard.contract.codes import MachineState, Operation, TaskPhase
 from onboard.contract.messages import Halted, Reference
 from onboard.core.site import Segment
 from onboard.gateway.dialect import Connection, Dialect, Json
-from onboard.gateway.machines import Body, Machines, TaskInHand
-from onboard.gateway.whereabouts import Whereabouts
+from onboard.gateway.machines import Machines, MobileMachine, TaskInHand
+from onboard.gateway.positions import MachinePosition
 from onboard.holon.remedies import reason_words, remedy
 
 #: A wait is told as information as long as nothing newer is heard, at most so long, us. As on the page (onboard/web).
@@ -47,7 +47,7 @@ def state(
     began = task.began if task is not None else 0
     sequence = 2 * max(0, where.passed - began)
     nodes, edges = _way(where, sequence)
-    told: Json = {
+    content: Json = {
         "orderId": _order_id(task, subject),
         "orderUpdateId": _update_id(task, subject),
         "lastNodeId": where.node,
@@ -70,11 +70,11 @@ def state(
     }
     actions = _actions(task, does)
     if dialect.is_third:
-        return told | {"actionStates": actions, "instantActionStates": list(subject.actions)}
-    return told | {"actionStates": [*actions, *subject.actions]}
+        return content | {"actionStates": actions, "instantActionStates": list(subject.actions)}
+    return content | {"actionStates": [*actions, *subject.actions]}
 
 
-def visualization(dialect: Dialect, where: Whereabouts, state_header: int) -> Json:
+def visualization(dialect: Dialect, where: MachinePosition, state_header: int) -> Json:
     """The body of a `visualization` message; ``state_header`` is that of the state told last."""
     extra: Json = {"referenceStateHeaderId": state_header & 0xFFFFFFFF} if dialect.is_third else {}
     return extra | _place(dialect, where)
@@ -92,7 +92,7 @@ def _update_id(task: TaskInHand | None, subject: Subject) -> int:
     return max(0, task.updates - 1) if task is not None else 0
 
 
-def _way(where: Whereabouts, sequence: int) -> tuple[list[Json], list[Json]]:
+def _way(where: MachinePosition, sequence: int) -> tuple[list[Json], list[Json]]:
     """Nodes and edges ahead: even and odd sequence numbers, as in an order."""
     nodes: list[Json] = []
     edges: list[Json] = []
@@ -105,7 +105,7 @@ def _way(where: Whereabouts, sequence: int) -> tuple[list[Json], list[Json]]:
     return nodes, edges
 
 
-def _place(dialect: Dialect, where: Whereabouts) -> Json:
+def _place(dialect: Dialect, where: MachinePosition) -> Json:
     """Position and velocity, where the site has coordinates."""
     if where.map_id is None:
         return {}
@@ -133,7 +133,7 @@ def _actions(task: TaskInHand | None, does: Operation | None) -> list[Json]:
     return found
 
 
-def _errors(machines: Machines, body: Body, now_us: int) -> list[Json]:
+def _errors(machines: Machines, body: MobileMachine, now_us: int) -> list[Json]:
     node = body.machine.node_id
     found: list[Json] = []
     word = machines.halted(node, now_us)
@@ -162,18 +162,18 @@ def _errors(machines: Machines, body: Body, now_us: int) -> list[Json]:
 def _halted(machines: Machines, word: Halted) -> Json:
     """A machine that does not act: FATAL where a person is needed, and what to do; else it goes on by itself."""
     name = machines.site.machines[word.machine].name
-    said = f"{name} stands: {reason_words(word.reason)}"
+    stands = f"{name} stands: {reason_words(word.reason)}"
     if not word.needs_person:
-        return _error("machineHalted", "WARNING", f"{said}; it goes on by itself")
+        return _error("machineHalted", "WARNING", f"{stands}; it goes on by itself")
     hint = {"errorHint": remedy(machines.site, word.reason, name)}
-    return _error("machineHalted", "FATAL", f"{said}; it needs a person") | hint
+    return _error("machineHalted", "FATAL", f"{stands}; it needs a person") | hint
 
 
 def _error(kind: str, level: str, description: str) -> Json:
     return {"errorType": kind, "errorLevel": level, "errorDescription": description}
 
 
-def _information(machines: Machines, body: Body, now_us: int) -> list[Json]:
+def _information(machines: Machines, body: MobileMachine, now_us: int) -> list[Json]:
     wait = body.wait
     if wait is None or now_us - body.wait_us > WAIT_TOLD_US:
         return []

@@ -18,7 +18,7 @@ from onboard.contract.messages import (
 from onboard.core.serial import ms_after
 from onboard.core.site import Station
 from onboard.history.bounds import drop_oldest
-from onboard.history.clock import BusClock
+from onboard.history.clock import LoggedBusTime
 
 #: Calls of the first depth that are no customer's: for a part of a task, and for room.
 _NO_TASKS = (Operation.RIDE, Operation.GIVE_WAY)
@@ -30,7 +30,7 @@ def is_task(call: CallForProposals) -> bool:
 
 
 @dataclass
-class Call:
+class CallHistory:
     """One call; times in us of the log. ``finished_us`` None: not yet, or the fleet bus does not tell."""
 
     terms: CallForProposals
@@ -69,14 +69,14 @@ class Call:
 class CallOpened:
     """A call is heard for the first time."""
 
-    call: Call
+    call: CallHistory
 
 
 @dataclass(frozen=True, slots=True)
 class BidMade:
     """A bid; ``call`` None where its call was not heard."""
 
-    call: Call | None
+    call: CallHistory | None
     bid: Bid
 
 
@@ -87,7 +87,7 @@ class CallAnswered:
     ``is_end``: the first one on it that is more than an option.
     """
 
-    call: Call | None
+    call: CallHistory | None
     award: Award
     is_end: bool
 
@@ -101,17 +101,17 @@ class Calls:
     ``clock`` is fed here.
     """
 
-    def __init__(self, most: int | None = None, clock: BusClock | None = None) -> None:
+    def __init__(self, most: int | None = None, clock: LoggedBusTime | None = None) -> None:
         #: The newest of each number of each caller.
-        self.by_key: dict[tuple[int, int], Call] = {}
+        self.by_key: dict[tuple[int, int], CallHistory] = {}
         #: All of them where ``most`` is None.
-        self.all: list[Call] = []
+        self.all: list[CallHistory] = []
         self._most = most
-        self._going: list[Call] = []
+        self._going: list[CallHistory] = []
         self._boots: dict[int, int] = {}
-        self._clock = clock if clock is not None else BusClock()
+        self._clock = clock if clock is not None else LoggedBusTime()
         #: Whose tentative itinerary of which version goes with which call's bid.
-        self._offers: dict[tuple[int, int], Call] = {}
+        self._offers: dict[tuple[int, int], CallHistory] = {}
 
     def feed(self, message: Message, time_us: int) -> CallFact | None:
         """Take up one message; what it told of a call, if anything."""
@@ -153,7 +153,7 @@ class Calls:
         if known is not None and known.terms == terms:
             known.messages += 1
             return None
-        call = Call(terms, time_us)
+        call = CallHistory(terms, time_us)
         self.by_key[key] = call
         if self._most is None:
             self.all.append(call)
@@ -230,7 +230,7 @@ def _platform(number: int) -> tuple[int, int]:
     return station.track, 0 if station.index == 1 else station.index + 1
 
 
-def _is_stamped(call: Call, itinerary: Itinerary) -> bool:
+def _is_stamped(call: CallHistory, itinerary: Itinerary) -> bool:
     stamp = itinerary.stamp
     same = (stamp.initiator, stamp.call) == (call.terms.sender, call.terms.call & 0xFF)
     return same and itinerary.sender == call.winner and not call.is_over

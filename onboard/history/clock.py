@@ -4,7 +4,7 @@ from onboard.contract.messages import BusTime
 from onboard.core.serial import from_bus_ms
 
 
-class BusClock:
+class LoggedBusTime:
     """What the last ``BusTime`` said. ``offset_us`` is None before it."""
 
     def __init__(self) -> None:

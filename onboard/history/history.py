@@ -2,10 +2,10 @@
 
 from onboard.contract.messages import Message, TaskReport, TokenGrant, TokenHeld
 from onboard.history.calls import BidMade, CallAnswered, CallOpened, Calls
-from onboard.history.clock import BusClock
-from onboard.history.lives import Lives
-from onboard.history.rights import Rights
-from onboard.history.tasks import Tasks, TaskTold
+from onboard.history.clock import LoggedBusTime
+from onboard.history.lives import MachineLives
+from onboard.history.rights import RightsHistory
+from onboard.history.tasks import TaskFold, TaskTold
 
 #: Calls and tasks that are kept, so that a picture may stay open for ever: those that are over go first, the oldest of
 #: them. A site of 24 machines has fewer than 20 open at a time, and what is asked about was lately.
@@ -18,11 +18,11 @@ class History:
     """The fold."""
 
     def __init__(self) -> None:
-        self.clock = BusClock()
-        self.lives = Lives()
-        self.rights = Rights()
+        self.clock = LoggedBusTime()
+        self.lives = MachineLives()
+        self.rights = RightsHistory()
         self.calls = Calls(CALL_LIMIT, self.clock)
-        self.tasks = Tasks(TASK_LIMIT)
+        self.tasks = TaskFold(TASK_LIMIT)
 
     def feed(self, message: Message, time_us: int) -> Fact | None:
         """Take up one message, at a time of the log in us."""

@@ -4,7 +4,7 @@ from onboard.contract.codes import MachineState
 from onboard.contract.messages import Heartbeat, Message, Progress, Waiting
 
 
-class Lives:
+class MachineLives:
     """A fold over what machines say of themselves; times in us of the log."""
 
     def __init__(self) -> None:

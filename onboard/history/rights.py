@@ -8,7 +8,7 @@ from onboard.core.serial import is_newer
 _PLACES = (TokenKind.SEGMENT, TokenKind.STATION)
 
 
-class Rights:
+class RightsHistory:
     """A fold over grants and statements: (version, node-ID of the holder) of each right to a segment or station."""
 
     def __init__(self) -> None:

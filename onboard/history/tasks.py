@@ -14,7 +14,7 @@ CALLS_OVER = (CallResult.REFUSED, CallResult.WITHDRAWN, CallResult.REJECTED)
 
 
 @dataclass
-class Task:
+class TaskHistory:
     """One task: the last phase told, when each phase was first told (us of the log), and its calls."""
 
     operation: Operation
@@ -44,24 +44,24 @@ class Task:
 class TaskTold:
     """A report on a task that was heard of; its phase ``before``, and whether this one is told for the first time."""
 
-    task: Task
+    task: TaskHistory
     report: TaskReport
     before: TaskPhase
     is_first: bool
 
 
-class Tasks:
+class TaskFold:
     """A fold over what calls and reports tell; ``most`` tasks are kept."""
 
     def __init__(self, most: int) -> None:
-        self.by_name: dict[Reference, Task] = {}
+        self.by_name: dict[Reference, TaskHistory] = {}
         self._most = most
 
     def open(self, reference: Reference, operation: Operation, time_us: int) -> bool:
         """A task is told for the first time, by a call or otherwise; False where it was known."""
         if reference in self.by_name:
             return False
-        self.by_name[reference] = Task(operation, phase_us={TaskPhase.OPEN: time_us})
+        self.by_name[reference] = TaskHistory(operation, phase_us={TaskPhase.OPEN: time_us})
         drop_oldest(self.by_name, self._most, lambda task: not task.is_waiting)
         return True
 

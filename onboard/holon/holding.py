@@ -30,7 +30,7 @@ DEAF_BEATS = 2
 _APART = (Reason.DUPLICATE_NODE_ID, Reason.JOURNAL_FOREIGN)
 
 
-class Hold(Enum):
+class HoldState(Enum):
     """Whether a machine acts, or what holds it."""
 
     ACTING = "acts"
@@ -53,7 +53,7 @@ class HoldEvent(Enum):
     BREAK = "an invariant is broken: the process ends"
 
 
-class Outcome(Enum):
+class HoldResponse(Enum):
     """What the machine does upon it."""
 
     NOTHING = "nothing new"
@@ -63,7 +63,7 @@ class Outcome(Enum):
     ENDS = "says why, and is silent"
 
 
-class Why(NamedTuple):
+class HoldReason(NamedTuple):
     """Why a machine does not act: the reason, the node that brought it about (0: nobody), whether a person decides."""
 
     reason: Reason
@@ -71,11 +71,11 @@ class Why(NamedTuple):
     needs_person: bool
 
 
-_NOTHING = Why(Reason.NONE, NOBODY, False)
+_NOTHING = HoldReason(Reason.NONE, NOBODY, False)
 
 
 @dataclass
-class Holding:
+class MachineHolds:
     """One machine's holds. All times are bus time in us; ``beat_us`` is the heartbeat period.
 
     Every event answers with what is to be done. A hold for a person outlives the process: ``record`` is for the
@@ -84,10 +84,10 @@ class Holding:
 
     node_id: int
     beat_us: int
-    hold: Hold = Hold.ACTING
+    hold: HoldState = HoldState.ACTING
     #: Emergency stops that hold: by whom, and when last heard.
     stops: dict[int, int] = field(default_factory=dict)
-    _decision: Why = _NOTHING
+    _decision: HoldReason = _NOTHING
     _own_since_us: int | None = None
     _quiet_since_us: int = 0
     _heard_us: int | None = None
@@ -97,23 +97,23 @@ class Holding:
     @property
     def is_held(self) -> bool:
         """Whether the machine does nothing: it neither moves nor bids nor gives a right away."""
-        return self.hold is not Hold.ACTING
+        return self.hold is not HoldState.ACTING
 
     @property
     def is_apart(self) -> bool:
         """Whether it also takes in nothing of rights and plans, as if it were off: it compares all when it is back."""
-        if self.hold is Hold.ACTING:
+        if self.hold is HoldState.ACTING:
             return False
-        lasting = self.hold is Hold.PERSON and self._decision.reason in _APART
-        return lasting or self.hold in (Hold.OWN_NUMBER, Hold.HALTED)
+        lasting = self.hold is HoldState.PERSON and self._decision.reason in _APART
+        return lasting or self.hold in (HoldState.OWN_NUMBER, HoldState.HALTED)
 
     @property
-    def why(self) -> Why:
+    def why(self) -> HoldReason:
         """Why the machine does not act; NONE where it acts."""
-        if self.hold is Hold.STOPPED:
-            return Why(Reason.EMERGENCY_STOP, max(self.stops, key=lambda node: self.stops[node]), False)
-        if self.hold is Hold.OWN_NUMBER:
-            return Why(Reason.DUPLICATE_NODE_ID, self.node_id, False)
+        if self.hold is HoldState.STOPPED:
+            return HoldReason(Reason.EMERGENCY_STOP, max(self.stops, key=lambda node: self.stops[node]), False)
+        if self.hold is HoldState.OWN_NUMBER:
+            return HoldReason(Reason.DUPLICATE_NODE_ID, self.node_id, False)
         return self._decision if self.is_held else _NOTHING
 
     def word(self, boot: int) -> Halted:
@@ -122,20 +122,20 @@ class Holding:
 
     # --- events ------------------------------------------------------------------------------------------------
 
-    def stop(self, stopper: int, now_us: int) -> Outcome:
+    def stop(self, stopper: int, now_us: int) -> HoldResponse:
         """An emergency stop from ``stopper`` is heard."""
         self.stops[stopper] = now_us
         return self._fire(HoldEvent.STOP)
 
-    def go(self, named: int) -> Outcome:
+    def go(self, named: int) -> HoldResponse:
         """A person ends the emergency stop of node ``named``, or all with 0; my own number lets me go on at all."""
         for stopper in list(self.stops) if named == NOBODY else [named]:
             self.stops.pop(stopper, None)
-        if named == self.node_id and self.hold in (Hold.PERSON, Hold.OWN_NUMBER):
+        if named == self.node_id and self.hold in (HoldState.PERSON, HoldState.OWN_NUMBER):
             return self._fire(HoldEvent.GO)
-        return Outcome.NOTHING if self.stops else self._fire(HoldEvent.STOP_OVER)
+        return HoldResponse.NOTHING if self.stops else self._fire(HoldEvent.STOP_OVER)
 
-    def own_frame(self, now_us: int, *, is_right: bool) -> Outcome:
+    def own_frame(self, now_us: int, *, is_right: bool) -> HoldResponse:
         """Somebody sends under my number; ``is_right``: what it says makes or moves a right that is not so."""
         if self._own_since_us is None:
             self._own_since_us = now_us
@@ -157,32 +157,32 @@ class Holding:
         self._quiet_since_us = now_us
         self._own_since_us = None if self._own_since_us is None else now_us
 
-    def for_person(self, reason: Reason, cause: int) -> Outcome:
+    def for_person(self, reason: Reason, cause: int) -> HoldResponse:
         """Only a person can know what is right: hold for ``reason``, brought about by node ``cause`` (0: nobody)."""
         return self._decide(HoldEvent.DECIDE, reason, cause)
 
-    def halt(self, reason: Reason, cause: int = NOBODY) -> Outcome:
+    def halt(self, reason: Reason, cause: int = NOBODY) -> HoldResponse:
         """The process is about to end."""
-        if self.hold is Hold.PERSON:
+        if self.hold is HoldState.PERSON:
             return self._fire(HoldEvent.BREAK)
         return self._decide(HoldEvent.BREAK, reason, cause)
 
-    def wake(self, now_us: int, *, acknowledged: bool = True) -> Outcome:
+    def wake(self, now_us: int, *, acknowledged: bool = True) -> HoldResponse:
         """Let stops grow old and silence count; ``acknowledged``: the bus has taken my own frames meanwhile."""
         for stopper in [node for node, heard_us in self.stops.items() if now_us - heard_us >= STOP_LASTS_US]:
             del self.stops[stopper]
         if not acknowledged or self._is_deaf(now_us):
             self._quiet_since_us = now_us
-        if self.hold is Hold.OWN_NUMBER and self._is_quiet(now_us):
+        if self.hold is HoldState.OWN_NUMBER and self._is_quiet(now_us):
             return self._fire(HoldEvent.QUIET)
-        return Outcome.NOTHING if self.stops else self._fire(HoldEvent.STOP_OVER)
+        return HoldResponse.NOTHING if self.stops else self._fire(HoldEvent.STOP_OVER)
 
     def next_wake(self) -> int | None:
         """When ``wake`` has something to do, bus time in us."""
-        if self.hold is Hold.ACTING and not self.stops:
+        if self.hold is HoldState.ACTING and not self.stops:
             return None
         times = [heard_us + STOP_LASTS_US for heard_us in self.stops.values()]
-        if self.hold is Hold.OWN_NUMBER:
+        if self.hold is HoldState.OWN_NUMBER:
             times.append(self._quiet_since_us + QUIET_BEATS * self.beat_us)
         return min(times, default=None)
 
@@ -190,7 +190,7 @@ class Holding:
 
     def record(self) -> HeldRecord | ReleasedRecord:
         """The journal's entry about a hold for a person, or about its end."""
-        if self.hold is not Hold.PERSON:
+        if self.hold is not HoldState.PERSON:
             return ReleasedRecord()
         return HeldRecord(self._decision.reason, self._decision.cause)
 
@@ -199,28 +199,28 @@ class Holding:
         for record in records_in(entries, HeldRecord, ReleasedRecord):
             if isinstance(record, HeldRecord):
                 self.for_person(record.reason, record.cause)
-            elif self.hold is Hold.PERSON:
+            elif self.hold is HoldState.PERSON:
                 self._fire(HoldEvent.GO)
         if of_journal is not Reason.NONE:
             self.for_person(of_journal, NOBODY)
 
     # --- inner works -------------------------------------------------------------------------------------------
 
-    def _decide(self, event: HoldEvent, reason: Reason, cause: int) -> Outcome:
+    def _decide(self, event: HoldEvent, reason: Reason, cause: int) -> HoldResponse:
         if (self.hold, event) in TABLE:
             # The first decision that is due stands: what follows from it would hide it.
-            self._decision = Why(reason, cause, True)
+            self._decision = HoldReason(reason, cause, True)
         return self._fire(event)
 
-    def _fire(self, event: HoldEvent) -> Outcome:
+    def _fire(self, event: HoldEvent) -> HoldResponse:
         entry = TABLE.get((self.hold, event))
         if entry is None:
-            return Outcome.NOTHING
+            return HoldResponse.NOTHING
         self.hold, outcome = entry
-        if self.hold is Hold.ACTING:
+        if self.hold is HoldState.ACTING:
             self._own_since_us = None
             if self.stops:
-                self.hold = Hold.STOPPED
+                self.hold = HoldState.STOPPED
         return outcome
 
     def _is_deaf(self, now_us: int) -> bool:
@@ -231,22 +231,22 @@ class Holding:
 
 
 #: (state, event) to the next state and what the machine does; pairs that are missing change nothing.
-TABLE: dict[tuple[Hold, HoldEvent], tuple[Hold, Outcome]] = {
-    (Hold.ACTING, HoldEvent.STOP): (Hold.STOPPED, Outcome.HOLDS),
-    (Hold.ACTING, HoldEvent.OWN_FRAME): (Hold.OWN_NUMBER, Outcome.HOLDS),
-    (Hold.ACTING, HoldEvent.OWN_RIGHT): (Hold.PERSON, Outcome.HOLDS),
-    (Hold.ACTING, HoldEvent.DECIDE): (Hold.PERSON, Outcome.HOLDS),
-    (Hold.ACTING, HoldEvent.BREAK): (Hold.HALTED, Outcome.ENDS),
-    (Hold.STOPPED, HoldEvent.STOP_OVER): (Hold.ACTING, Outcome.GOES_ON),
-    (Hold.STOPPED, HoldEvent.OWN_FRAME): (Hold.OWN_NUMBER, Outcome.HOLDS),
-    (Hold.STOPPED, HoldEvent.OWN_RIGHT): (Hold.PERSON, Outcome.HOLDS),
-    (Hold.STOPPED, HoldEvent.DECIDE): (Hold.PERSON, Outcome.HOLDS),
-    (Hold.STOPPED, HoldEvent.BREAK): (Hold.HALTED, Outcome.ENDS),
-    (Hold.OWN_NUMBER, HoldEvent.QUIET): (Hold.ACTING, Outcome.COMES_BACK),
-    (Hold.OWN_NUMBER, HoldEvent.GO): (Hold.ACTING, Outcome.COMES_BACK),
-    (Hold.OWN_NUMBER, HoldEvent.OWN_RIGHT): (Hold.PERSON, Outcome.HOLDS),
-    (Hold.OWN_NUMBER, HoldEvent.DECIDE): (Hold.PERSON, Outcome.HOLDS),
-    (Hold.OWN_NUMBER, HoldEvent.BREAK): (Hold.HALTED, Outcome.ENDS),
-    (Hold.PERSON, HoldEvent.GO): (Hold.ACTING, Outcome.COMES_BACK),
-    (Hold.PERSON, HoldEvent.BREAK): (Hold.HALTED, Outcome.ENDS),
+TABLE: dict[tuple[HoldState, HoldEvent], tuple[HoldState, HoldResponse]] = {
+    (HoldState.ACTING, HoldEvent.STOP): (HoldState.STOPPED, HoldResponse.HOLDS),
+    (HoldState.ACTING, HoldEvent.OWN_FRAME): (HoldState.OWN_NUMBER, HoldResponse.HOLDS),
+    (HoldState.ACTING, HoldEvent.OWN_RIGHT): (HoldState.PERSON, HoldResponse.HOLDS),
+    (HoldState.ACTING, HoldEvent.DECIDE): (HoldState.PERSON, HoldResponse.HOLDS),
+    (HoldState.ACTING, HoldEvent.BREAK): (HoldState.HALTED, HoldResponse.ENDS),
+    (HoldState.STOPPED, HoldEvent.STOP_OVER): (HoldState.ACTING, HoldResponse.GOES_ON),
+    (HoldState.STOPPED, HoldEvent.OWN_FRAME): (HoldState.OWN_NUMBER, HoldResponse.HOLDS),
+    (HoldState.STOPPED, HoldEvent.OWN_RIGHT): (HoldState.PERSON, HoldResponse.HOLDS),
+    (HoldState.STOPPED, HoldEvent.DECIDE): (HoldState.PERSON, HoldResponse.HOLDS),
+    (HoldState.STOPPED, HoldEvent.BREAK): (HoldState.HALTED, HoldResponse.ENDS),
+    (HoldState.OWN_NUMBER, HoldEvent.QUIET): (HoldState.ACTING, HoldResponse.COMES_BACK),
+    (HoldState.OWN_NUMBER, HoldEvent.GO): (HoldState.ACTING, HoldResponse.COMES_BACK),
+    (HoldState.OWN_NUMBER, HoldEvent.OWN_RIGHT): (HoldState.PERSON, HoldResponse.HOLDS),
+    (HoldState.OWN_NUMBER, HoldEvent.DECIDE): (HoldState.PERSON, HoldResponse.HOLDS),
+    (HoldState.OWN_NUMBER, HoldEvent.BREAK): (HoldState.HALTED, HoldResponse.ENDS),
+    (HoldState.PERSON, HoldEvent.GO): (HoldState.ACTING, HoldResponse.COMES_BACK),
+    (HoldState.PERSON, HoldEvent.BREAK): (HoldState.HALTED, HoldResponse.ENDS),
 }

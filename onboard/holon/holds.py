@@ -26,7 +26,7 @@ from onboard.contract.messages import (
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.records import BootRecord
-from onboard.holon.holding import Hold, Holding, Outcome
+from onboard.holon.holding import HoldResponse, HoldState, MachineHolds
 from onboard.holon.own_number import OwnNumber
 from onboard.holon.presence import Presence
 
@@ -42,7 +42,7 @@ _OF_RIGHTS = (
 class Holds:
     """One machine's. ``heartbeat`` makes its sign of life, ``new_life`` begins another: its number, what to ask."""
 
-    holding: Holding
+    holding: MachineHolds
     presence: Presence
     own: OwnNumber
     drops: Counter[Reason]
@@ -69,19 +69,19 @@ class Holds:
         self.presence.heard_halted(halted, now_us)
         return []
 
-    def apply(self, outcome: Outcome, now_us: int) -> list[Effect]:
+    def apply(self, outcome: HoldResponse, now_us: int) -> list[Effect]:
         """What follows from an event of the holds."""
         match outcome:
-            case Outcome.HOLDS:
+            case HoldResponse.HOLDS:
                 reason, cause, needs_person = self.holding.why
                 line = f"held: {reason.name}, by node {cause}" + (", a person must decide" if needs_person else "")
-                is_lasting = self.holding.hold is Hold.PERSON
+                is_lasting = self.holding.hold is HoldState.PERSON
                 record: list[Effect] = [Record(self.holding.record())] if is_lasting else []
                 return [*record, Report(line), *self.words()]
-            case Outcome.GOES_ON:
+            case HoldResponse.GOES_ON:
                 self.presence.listen_anew(now_us)
                 return [Report("goes on"), *self.words()]
-            case Outcome.COMES_BACK:
+            case HoldResponse.COMES_BACK:
                 return self._come_back(now_us)
             case _:
                 return []

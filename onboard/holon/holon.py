@@ -40,14 +40,14 @@ from onboard.core.records import BootRecord
 from onboard.core.site import Machine, Site
 from onboard.holon.admission import Admission
 from onboard.holon.drops import ToldDrops
-from onboard.holon.holding import Hold, Holding
+from onboard.holon.holding import HoldState, MachineHolds
 from onboard.holon.holds import Holds, without_rights
 from onboard.holon.own_number import OwnNumber
 from onboard.holon.presence import Presence
 from onboard.holon.regeneration import Regenerating
-from onboard.holon.rights import Rights
+from onboard.holon.rights import RightsTalk
 from onboard.holon.taking_part import TakingPart
-from onboard.holon.timekeeper import Heard, Timekeeper
+from onboard.holon.timekeeper import TimeHeard, Timekeeper
 from onboard.holon.witness import Doubt, Witness
 
 #: Most effects that one event may cause before the holon counts as running away.
@@ -90,7 +90,7 @@ class Holon:
         self.time = Timekeeper(site, machine, self.mirror, self.drops)
         self.clock = self.time.clock
         self.presence = Presence(site, machine.node_id, self.mirror, self.tokens)
-        self.holding = Holding(machine.node_id, site.timing.heartbeat_us)
+        self.holding = MachineHolds(machine.node_id, site.timing.heartbeat_us)
         self.holding.replay(entries, reason_of(journal))
         #: Whether the bus has taken my frames of late; the shell knows.
         self.is_acknowledged = True
@@ -103,7 +103,7 @@ class Holon:
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
         self._attentive = self.behaviour if isinstance(self.behaviour, Attentive) else None
         self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
-        self.rights = Rights(self.fleet, self._may_grant, self.witness)
+        self.rights = RightsTalk(self.fleet, self._may_grant, self.witness)
         self.regeneration = Regenerating(self.tokens, self.mirror, self._statements, self._thaw)
         self.regeneration.replay(entries)
         self.regeneration.refuses = lambda: self.holding.why.reason if self.holding.is_apart else Reason.NONE
@@ -287,13 +287,13 @@ class Holon:
         heard = self.time.hear(message, local_us)
         now_us = self.clock.bus_us(local_us)
         self.witness.shift(now_us - before_us)
-        self._bus_time_lost &= heard in (Heard.NOTHING, Heard.REFUTED)
+        self._bus_time_lost &= heard in (TimeHeard.NOTHING, TimeHeard.REFUTED)
         match heard:
-            case Heard.REFUTED:
+            case TimeHeard.REFUTED:
                 return [self._bus_time(now_us)]
-            case Heard.FIRST:
+            case TimeHeard.FIRST:
                 return self._begin(now_us)
-            case Heard.SET_ANEW:
+            case TimeHeard.SET_ANEW:
                 return self._set_anew(now_us)
         return []
 
@@ -393,7 +393,7 @@ class Holon:
 
     def last_word(self, reason: Reason) -> Halted:
         """What is said before the process ends: ``reason`` where none was given before."""
-        if self.holding.hold is not Hold.HALTED:
+        if self.holding.hold is not HoldState.HALTED:
             self.holding.halt(reason)
         return self.holding.word(self.boot)
 

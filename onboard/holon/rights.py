@@ -33,7 +33,7 @@ ASK_AGAIN_US = 1_000_000
 
 
 @dataclass
-class Rights:
+class RightsTalk:
     """One node's words about tokens; all times are bus time, us.
 
     ``may_grant`` is its behaviour's verdict on a request: token, requester and time to a reason, NONE for yes.

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from onboard.contract.codes import MachineState, Reason
 from onboard.contract.messages import Heartbeat
-from onboard.holon.holding import Holding
+from onboard.holon.holding import MachineHolds
 from onboard.holon.presence import Presence
 from onboard.holon.regeneration import Regenerating
 from onboard.holon.timekeeper import Timekeeper
@@ -19,7 +19,7 @@ class TakingPart:
     """One machine's part, by what holds it; nothing is kept here, so nothing here can be old."""
 
     presence: Presence
-    holding: Holding
+    holding: MachineHolds
     regeneration: Regenerating
     witness: Witness
     time: Timekeeper

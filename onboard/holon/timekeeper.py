@@ -15,7 +15,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.site import Machine, Site
 
 
-class Heard(Enum):
+class TimeHeard(Enum):
     """What a time message did to the clock."""
 
     NOTHING = "nothing"
@@ -77,19 +77,19 @@ class Timekeeper:
         machine = self.site.machines.get(node)
         return machine is not None and machine.kind not in MOBILE_KINDS
 
-    def hear(self, message: BusTime, local_us: int) -> Heard:
+    def hear(self, message: BusTime, local_us: int) -> TimeHeard:
         """Take up a time message of a machine of this site."""
         if message.bus_time_us >= BUS_TIME_MODULUS or not self._is_fixed(message.sender):
             self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
-            return Heard.NOTHING
+            return TimeHeard.NOTHING
         is_mobile = self.machine.kind in MOBILE_KINDS
         if not is_mobile and message.sender > self.machine.node_id:
             # At power-up every fixed machine speaks until it hears a lower one: that is no mistake.
-            return Heard.SET_ANEW if self.clock.adopt(message.bus_time_us, local_us) else Heard.NOTHING
+            return TimeHeard.SET_ANEW if self.clock.adopt(message.bus_time_us, local_us) else TimeHeard.NOTHING
         if not is_mobile and self.clock.refutes(message.bus_time_us, local_us):
-            return Heard.REFUTED
+            return TimeHeard.REFUTED
         first, before_us = not self.clock.is_set, self.clock.bus_us(local_us)
         self.clock.heard(message.bus_time_us, local_us)
         if first:
-            return Heard.FIRST
-        return Heard.SET_ANEW if self.clock.bus_us(local_us) - before_us > MAX_SLEW_US else Heard.FOLLOWED
+            return TimeHeard.FIRST
+        return TimeHeard.SET_ANEW if self.clock.bus_us(local_us) - before_us > MAX_SLEW_US else TimeHeard.FOLLOWED

@@ -5,7 +5,7 @@ from enum import IntEnum
 from onboard.contract.codes import Reason
 
 
-class Ending(IntEnum):
+class ExitStatus(IntEnum):
     """Exit statuses of ``onboard``; ``deploy/files/onboard.service`` starts it again but after the last two."""
 
     STOPPED = 0
@@ -23,6 +23,6 @@ OWN_FAULTS = frozenset({Reason.INVARIANT_BROKEN, Reason.RUNAWAY})
 _COMES_BACK = OWN_FAULTS | {Reason.WATCHDOG, Reason.BUS_LOST}
 
 
-def ending_of(reason: Reason) -> Ending:
+def ending_of(reason: Reason) -> ExitStatus:
     """What becomes of a controller that has halted for this reason."""
-    return Ending.COMES_BACK if reason in _COMES_BACK else Ending.WAITS_FOR_PERSON
+    return ExitStatus.COMES_BACK if reason in _COMES_BACK else ExitStatus.WAITS_FOR_PERSON

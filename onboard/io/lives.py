@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from onboard.contract.codes import Reason
-from onboard.io.endings import Ending
+from onboard.io.endings import ExitStatus
 
 #: So many lives in a row that an own fault ended within ``HEALTHY_US`` each, and the machine waits for a person.
 LIMIT = 3
@@ -37,7 +37,7 @@ class LastLife:
     reason: Reason = Reason.NONE
 
 
-class Lives:
+class LifeBook:
     """The book of one controller's lives. What cannot be read or written is passed over: telling is not working."""
 
     def __init__(self, journal: Path) -> None:
@@ -61,12 +61,12 @@ class Lives:
             return LastLife()
         return LastLife(f"the last life: {_RESULTS.get(seen, 'the board was reset or lost its power')}")
 
-    def end(self, ending: Ending, lived_us: int, *, own_fault: bool = False) -> Ending:
+    def end(self, ending: ExitStatus, lived_us: int, *, own_fault: bool = False) -> ExitStatus:
         """Write down how this life ends. One ended by a fault of its own too often waits for a person."""
         self._short = self._short + 1 if own_fault and lived_us < HEALTHY_US else 0
         if self._short >= LIMIT:
             self._short = 0
-            ending = Ending.WAITS_FOR_PERSON
+            ending = ExitStatus.WAITS_FOR_PERSON
         self._write(ending.name)
         return ending
 

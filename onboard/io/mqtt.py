@@ -15,7 +15,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 import aiomqtt
 
 from onboard.io.broker_address import BrokerAddress
-from onboard.ports.broker import BrokerError, Delivery, Publication
+from onboard.ports.broker import BrokerError, Publication, ReceivedPublication
 
 #: Without a sign of life a connection is given up after one and a half times this (MQTT 3.1.1, 3.1.2.10), s: a link
 #: that is gone is noticed within half a minute.
@@ -114,15 +114,17 @@ class MqttSession:
         except (aiomqtt.MqttError, OSError) as error:
             raise BrokerError(str(error)) from error
 
-    async def incoming(self) -> AsyncIterator[Delivery]:
+    async def incoming(self) -> AsyncIterator[ReceivedPublication]:
         """Deliveries in the order of aiomqtt's queue. Raises ``BrokerError`` when the connection ends."""
         try:
             async for message in self.client.messages:
-                yield Delivery(str(message.topic), message.payload, message.qos, bool(message.retain), message.mid)
+                yield ReceivedPublication(
+                    str(message.topic), message.payload, message.qos, bool(message.retain), message.mid
+                )
         except (aiomqtt.MqttError, OSError) as error:
             raise BrokerError(str(error)) from error
 
-    def taken(self, delivery: Delivery) -> None:
+    def taken(self, delivery: ReceivedPublication) -> None:
         """Acknowledge a delivery, so that the broker does not bring it again."""
         self.client._client.ack(delivery.number, delivery.qos)  # noqa: SLF001  # aiomqtt 2.5 hands no such thing on
 

@@ -41,7 +41,7 @@ _FIELDS = 3
 _UNREADABLE = "its seal cannot be read"
 
 
-class Line(NamedTuple):
+class SealedLine(NamedTuple):
     """One checked line: its number (0 is the head), what it says, its link and its bytes."""
 
     number: int
@@ -159,7 +159,7 @@ def read(content: bytes, owner: str, name: str) -> Reading:
     return _compare(content, seal, lines, name)
 
 
-def _compare(content: bytes, seal: Seal, lines: list[Line], name: str) -> Reading:
+def _compare(content: bytes, seal: Seal, lines: list[SealedLine], name: str) -> Reading:
     """Hold the lines that are good against what the seal says."""
     good, state = len(lines) - 1, JournalState.INTACT
     end = SLOTS_BYTES + sum(len(line.text) for line in lines)
@@ -167,7 +167,7 @@ def _compare(content: bytes, seal: Seal, lines: list[Line], name: str) -> Readin
         if lines[seal.records].link.decode() != seal.link:
             return _refused([], JournalState.FOREIGN, 0, f"{name}: its records are not those that were sealed")
         state = JournalState.TORN if end < len(content) else state
-        restored: list[Line] = []
+        restored: list[SealedLine] = []
     else:
         restored = _restored(seal, lines)
         if not restored:
@@ -189,13 +189,13 @@ def _refused(entries: list[Entry], state: JournalState, missing: int | None, why
     return Reading(entries, JournalCondition(state, missing, 0, why), None)
 
 
-def _other_owner(seal: Seal | None, lines: list[Line], owner: str) -> str | None:
+def _other_owner(seal: Seal | None, lines: list[SealedLine], owner: str) -> str | None:
     owners = [seal.owner] if seal is not None else []
     owners += [_said(line).owner for line in lines[:1]]
     return next((one for one in owners if one != owner), None)
 
 
-def _restored(seal: Seal, lines: list[Line]) -> list[Line]:
+def _restored(seal: Seal, lines: list[SealedLine]) -> list[SealedLine]:
     """The lines that are missing at the end, from the seal's copies; none where the copies do not reach back so far.
 
     The first line says nothing that the seal does not know.
@@ -210,7 +210,7 @@ def _restored(seal: Seal, lines: list[Line]) -> list[Line]:
     return found if last.number == seal.records and last.link.decode() == seal.link else []
 
 
-def _lines(content: bytes) -> Iterator[Line]:
+def _lines(content: bytes) -> Iterator[SealedLine]:
     """Good lines from the first on, up to the first that is not."""
     link = b""
     for number, text in enumerate(content.splitlines(keepends=True)):
@@ -221,7 +221,7 @@ def _lines(content: bytes) -> Iterator[Line]:
         link = line.link
 
 
-def _checked(text: bytes, number: int, before: bytes) -> Line | None:
+def _checked(text: bytes, number: int, before: bytes) -> SealedLine | None:
     fields = text.rstrip(b"\n").split(b" ", _FIELDS - 1)
     if len(fields) != _FIELDS or not text.endswith(b"\n") or fields[1] != b"%d" % number:
         return None
@@ -229,18 +229,18 @@ def _checked(text: bytes, number: int, before: bytes) -> Line | None:
     if fields[0] != _link(before, body):
         return None
     entry: Entry = json.loads(fields[2])
-    return Line(number, entry, fields[0], text)
+    return SealedLine(number, entry, fields[0], text)
 
 
-def _said(head: Line) -> HeadRecord:
+def _said(head: SealedLine) -> HeadRecord:
     """What the first line says; of one that is no head, nobody's."""
     return next(records_in([head.entry], HeadRecord), HeadRecord("nobody", ""))
 
 
-def _head(owner: str, identity: str) -> Line:
+def _head(owner: str, identity: str) -> SealedLine:
     entry = HeadRecord(owner, identity).entry
     text = _line(b"", 0, _json(entry))
-    return Line(0, entry, text[:_LINK_CHARS], text)
+    return SealedLine(0, entry, text[:_LINK_CHARS], text)
 
 
 def _line(before: bytes, number: int, entry: bytes) -> bytes:

@@ -5,8 +5,8 @@ import sys
 from collections.abc import Callable
 from typing import TextIO
 
-from onboard.operate.order import Order
-from onboard.operate.station import Station
+from onboard.operate.order import OperatorCommand
+from onboard.operate.station import OperatorStation
 
 _YES = ("y", "yes")
 
@@ -18,12 +18,12 @@ class Asker:
     """
 
     def __init__(
-        self, station: Station, tell: Callable[[str], None], *, is_agreed: bool = False, typed: str = ""
+        self, station: OperatorStation, tell: Callable[[str], None], *, is_agreed: bool = False, typed: str = ""
     ) -> None:
         self._station, self._tell, self._is_agreed, self._typed = station, tell, is_agreed, typed
         self._source: TextIO = sys.stdin
 
-    async def agrees(self, order: Order) -> bool:
+    async def agrees(self, order: OperatorCommand) -> bool:
         """Whether the person says yes, or types the word that the order asks for."""
         if self._typed if order.answer else self._is_agreed:
             return not order.answer or self._typed == order.answer

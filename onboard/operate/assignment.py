@@ -24,7 +24,7 @@ LAST_VERSION = (1 << 28) - 1
 MOST_TOKENS = 20_000
 
 
-class Claim(NamedTuple):
+class TokenClaim(NamedTuple):
     """Who says to hold a token, or is said to, under which version."""
 
     version: int
@@ -38,7 +38,7 @@ class Statements:
     site: Site
     lost: int
     held: dict[TokenKey, dict[int, int]] = field(default_factory=dict)
-    seen: dict[TokenKey, Claim] = field(default_factory=dict)
+    seen: dict[TokenKey, TokenClaim] = field(default_factory=dict)
     said_by: dict[int, set[TokenKey]] = field(default_factory=dict)
     cars: dict[TokenKey, CarAt] = field(default_factory=dict)
 
@@ -49,7 +49,7 @@ class Statements:
         self.said_by.setdefault(sender, set()).add(key)
         known = self.seen.get(key)
         if known is None or version > known.version:
-            self.seen[key] = Claim(version, holder)
+            self.seen[key] = TokenClaim(version, holder)
         if sender == self.lost:
             return
         if sender == holder:
@@ -87,14 +87,14 @@ class Statements:
 
 
 @dataclass(frozen=True)
-class Body:
+class BodySlots:
     """Slots and stations in which a machine's body is."""
 
     slots: frozenset[Segment] = frozenset()
     bay: Station | None = None
 
     @classmethod
-    def of_fixed(cls, site: Site, machine: Machine) -> "Body":
+    def of_fixed(cls, site: Site, machine: Machine) -> "BodySlots":
         """A lift's platform and gate, a compartment's bay."""
         if machine.station is not None:
             return cls(bay=machine.station)
@@ -103,7 +103,7 @@ class Body:
         return cls()
 
     @classmethod
-    def of_segments(cls, site: Site, segments: Iterable[Segment]) -> "Body":
+    def of_segments(cls, site: Site, segments: Iterable[Segment]) -> "BodySlots":
         """A platform goes with its gate: who may stand on the sill keeps the lift where it is."""
         slots: set[Segment] = set()
         for segment in segments:
@@ -122,10 +122,10 @@ class Body:
 
 
 #: Of a machine that is in no slot.
-NO_BODY = Body()
+NO_BODY = BodySlots()
 
 
-class Assignment(NamedTuple):
+class RightsAssignment(NamedTuple):
     """What is made anew, and which tokens are nobody's from now on."""
 
     given: tuple[TokenAssigned, ...]
@@ -137,45 +137,45 @@ class Whose(NamedTuple):
 
     lost: int
     absent: int
-    body: Body
-    blocked: Body
+    body: BodySlots
+    blocked: BodySlots
 
 
-def assign(said: Statements, whose: Whose, operator: int) -> Assignment:
+def assign(statements: Statements, whose: Whose, operator: int) -> RightsAssignment:
     """The lost machine's rights: to it where its body is, else to who had them first, else to the lowest fixed one.
 
     What the absent machine held goes the same way, but for the slots of its body, which are nobody's.
     """
     given: list[TokenAssigned] = []
     nobodys: list[TokenKey] = []
-    for key in sorted({*tokens_of(way_site(said.site)), *said.seen}):
-        if key in said.held or not _is_orphan(said, key, whose):
+    for key in sorted({*tokens_of(way_site(statements.site)), *statements.seen}):
+        if key in statements.held or not _is_orphan(statements, key, whose):
             continue
-        to = _heir(said, key, whose)
-        version = said.seen[key].version + 1 if key in said.seen else 1
+        to = _heir(statements, key, whose)
+        version = statements.seen[key].version + 1 if key in statements.seen else 1
         if to == NOBODY or version > LAST_VERSION:
             nobodys.append(key)
         else:
             given.append(TokenAssigned(operator, key.kind, key.number, version, to))
-    return Assignment(tuple(given), tuple(nobodys))
+    return RightsAssignment(tuple(given), tuple(nobodys))
 
 
-def _is_orphan(said: Statements, key: TokenKey, whose: Whose) -> bool:
+def _is_orphan(statements: Statements, key: TokenKey, whose: Whose) -> bool:
     """Whether a token that nobody says to hold is lost: one never seen to move is with its first holder."""
-    if key in said.seen:
+    if key in statements.seen:
         return True
-    return genesis_holder(said.site, key) in (whose.lost, whose.absent)
+    return genesis_holder(statements.site, key) in (whose.lost, whose.absent)
 
 
-def _heir(said: Statements, key: TokenKey, whose: Whose) -> int:
-    site, absent = said.site, whose.absent
+def _heir(statements: Statements, key: TokenKey, whose: Whose) -> int:
+    site, absent = statements.site, whose.absent
     if whose.blocked.has(key):
         return NOBODY
     if whose.body.has(key):
         return whose.lost
     if key.kind in (TokenKind.CAR, TokenKind.TASK):
-        return _heir_of_car(said, key, whose)
-    seen = said.seen.get(key)
+        return _heir_of_car(statements, key, whose)
+    seen = statements.seen.get(key)
     # A grant to a machine that lives is on its way: it is that machine's.
     wanted = NOBODY if seen is None or seen.node == whose.lost else seen.node
     # A machine that moves learns from the slots that it gets where it is: it gets no others.
@@ -186,16 +186,16 @@ def _heir(said: Statements, key: TokenKey, whose: Whose) -> int:
     return _lowest_fixed(site, absent)
 
 
-def _heir_of_car(said: Statements, key: TokenKey, whose: Whose) -> int:
+def _heir_of_car(statements: Statements, key: TokenKey, whose: Whose) -> int:
     """Who keeps the station at which a car stands; nobody where nobody knows it, or it is aboard who is absent."""
-    word = said.cars.get(key)
+    word = statements.cars.get(key)
     if word is not None and word.station not in (ANY_STATION, OUTSIDE):
         station = Station.from_number(word.station)
-        keeper = next((node for node, one in way_site(said.site).compartments.items() if one == station), None)
-        keeper = said.site.stewards.get(station.track, NOBODY) if keeper is None else keeper
-        if keeper in said.site.machines and keeper != whose.absent:
+        keeper = next((node for node, one in way_site(statements.site).compartments.items() if one == station), None)
+        keeper = statements.site.stewards.get(station.track, NOBODY) if keeper is None else keeper
+        if keeper in statements.site.machines and keeper != whose.absent:
             return keeper
-        return _lowest_fixed(said.site, whose.absent)
+        return _lowest_fixed(statements.site, whose.absent)
     return NOBODY if whose.lost == whose.absent else whose.lost
 
 

@@ -4,7 +4,7 @@ from onboard.contract.codes import Reason
 from onboard.contract.messages import Blocked, Clear, Message, SyncDone, SyncRequest
 from onboard.core.site import Segment
 from onboard.holon.remedies import reason_words
-from onboard.operate.order import AGAIN_US, DONE, Order
+from onboard.operate.order import AGAIN_US, DONE, OperatorCommand
 from onboard.operate.park import Park
 from onboard.operate.words import state_words
 
@@ -12,7 +12,7 @@ from onboard.operate.words import state_words
 ANSWER_US = 2_000_000
 
 
-class Mark(Order):
+class Mark(OperatorCommand):
     """Says that a segment is blocked, or clear, and asks the steward of its track what it keeps."""
 
     def __init__(self, park: Park, node: int, segment: Segment, reason: Reason, *, blocks: bool) -> None:

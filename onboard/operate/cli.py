@@ -13,10 +13,10 @@ from onboard.config.site import load_site
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError, BusSettings, add_site_arguments, bus_settings, open_bus, parse_with_bus
 from onboard.operate.asking import Asker
+from onboard.operate.commands import CommandRequest, Maker, maker_of
 from onboard.operate.names import OperateError, tool_of
 from onboard.operate.order import MISTAKE
-from onboard.operate.station import Station
-from onboard.operate.wishes import Maker, Wish, maker_of
+from onboard.operate.station import OperatorStation
 from onboard.systems.contract import codecs_for
 
 EXAMPLES = """\
@@ -55,8 +55,8 @@ def build_parser() -> argparse.ArgumentParser:
     common.add_argument("--yes", action="store_true", help="do not ask")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
-    def command(name: str, told: str) -> argparse.ArgumentParser:
-        return commands.add_parser(name, parents=[common], help=told, description=told)
+    def command(name: str, help_text: str) -> argparse.ArgumentParser:
+        return commands.add_parser(name, parents=[common], help=help_text, description=help_text)
 
     status = command("status", "who lives, who stands and why; only listens")
     status.add_argument("--for", type=float, dest="for_s", metavar="SECONDS", help="listen for so long")
@@ -100,7 +100,7 @@ def main(argv: Sequence[str]) -> int:
         if args.node is not None:
             tool_of(args.node)
         # Another life of this station begins elsewhere in the numbers of orders.
-        make = maker_of(site, wish_of(args), seed=time.time_ns() // 1_000_000_000)
+        make = maker_of(site, request_of(args), seed=time.time_ns() // 1_000_000_000)
         settings = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
         return asyncio.run(_run(args, site, settings, make))
     except (ConfigError, BusOpenError, OperateError) as error:
@@ -109,10 +109,10 @@ def main(argv: Sequence[str]) -> int:
         return MISTAKE
 
 
-def wish_of(args: argparse.Namespace) -> Wish:
+def request_of(args: argparse.Namespace) -> CommandRequest:
     """What a command line asks for."""
     seconds = getattr(args, "for_s", None)
-    return Wish(
+    return CommandRequest(
         args.command,
         machine=getattr(args, "machine", ""),
         segment=getattr(args, "segment", ""),
@@ -127,7 +127,7 @@ def wish_of(args: argparse.Namespace) -> Wish:
 
 async def _run(args: argparse.Namespace, site: Site, settings: BusSettings, make: Maker) -> int:
     bus = await open_bus(settings)
-    station = Station(site, codecs_for(site).fleet, bus, _tell)
+    station = OperatorStation(site, codecs_for(site).fleet, bus, _tell)
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, station.interrupt)
@@ -140,7 +140,7 @@ async def _run(args: argparse.Namespace, site: Site, settings: BusSettings, make
         await bus.close()
 
 
-async def _watch(wait_lost: Callable[[], Awaitable[str]], station: Station) -> None:
+async def _watch(wait_lost: Callable[[], Awaitable[str]], station: OperatorStation) -> None:
     station.lose(await wait_lost())
 
 

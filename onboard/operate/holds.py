@@ -3,12 +3,12 @@
 from onboard.contract.messages import ManualState, Message
 from onboard.core.site import Machine
 from onboard.gateway.pauses import Pauses
-from onboard.operate.order import DONE, Order
+from onboard.operate.order import DONE, OperatorCommand
 from onboard.operate.park import Park
 from onboard.operate.words import state_words
 
 
-class Hold(Order):
+class HoldCommand(OperatorCommand):
     """Holds a machine until it says that it has come to rest, or lets it go until it says so.
 
     ``seed`` begins the numbers of orders, so that another life of this station has others.
@@ -56,7 +56,7 @@ class Hold(Order):
         """Repeat the request as ``Pauses`` says; give up after ``REST_US``."""
         if self.status is not None:
             return []
-        said, closed = self._pauses.wake(now_us)
+        due, closed = self._pauses.wake(now_us)
         self._wake_us = min(self._pauses.due(), default=None)
         if closed or now_us >= self.began_us + REST_US:
             state = state_words(self.park, self._machine.node_id, now_us)
@@ -64,7 +64,7 @@ class Hold(Order):
             self.tell(f"{self._machine.name} {why}; it {state}")
             self.end([self._machine.name])
             return []
-        return said
+        return due
 
 
 #: The longest way to a place where a held robot may stand: a ride and a spur of the largest site, us.

@@ -13,7 +13,7 @@ AGAIN_US = 1_000_000
 DONE, NOT_CONFIRMED, MISTAKE = 0, 1, 2
 
 
-class Order:
+class OperatorCommand:
     """A command. ``begin`` once, then ``feed`` and ``wake`` until ``status`` is set; no method ever raises.
 
     ``node`` is the station's own node-ID. All times are loop time in us.

@@ -7,7 +7,7 @@ from onboard.contract.constants import MAX_NODE_ID, NOBODY
 from onboard.contract.messages import Blocked, Clear, Diagnostic, EmergencyStop, Halted, Heartbeat, ManualState, Message
 from onboard.core.site import Machine, Segment, Site
 from onboard.gateway.edge import edge_of
-from onboard.gateway.whereabouts import Tracker
+from onboard.gateway.positions import Tracker
 
 #: Heartbeats missed before a machine counts as silent, as the machines themselves count (onboard/core/mirror.py).
 SILENT_BEATS = 3

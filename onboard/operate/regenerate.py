@@ -28,8 +28,8 @@ from onboard.core.assignments import assignment_digest
 from onboard.core.authority import TokenKey
 from onboard.core.serial import is_newer, successor
 from onboard.holon.remedies import reason_words
-from onboard.operate.assignment import NO_BODY, Assignment, Body, Statements, Whose, assign
-from onboard.operate.order import AGAIN_US, MISTAKE, NOT_CONFIRMED, Order
+from onboard.operate.assignment import NO_BODY, BodySlots, RightsAssignment, Statements, Whose, assign
+from onboard.operate.order import AGAIN_US, MISTAKE, NOT_CONFIRMED, OperatorCommand
 from onboard.operate.park import Park
 from onboard.operate.words import state_words
 from onboard.ways.site import TrackKind, way_site
@@ -45,7 +45,7 @@ ABORTS = 3
 _SLOT = TokenKind.SEGMENT
 
 
-class Step(Enum):
+class RegenerationStep(Enum):
     """How far a regeneration is, in the words that the person reads."""
 
     FREEZE = "all are asked to stand and to say what they hold"
@@ -57,11 +57,11 @@ class Step(Enum):
 
 #: What is said in each step.
 PHASES = {
-    Step.FREEZE: RegenerationPhase.FREEZE,
-    Step.ASK: RegenerationPhase.FREEZE,
-    Step.READ_BACK: RegenerationPhase.READ_BACK,
-    Step.COMMIT: RegenerationPhase.COMMIT,
-    Step.ABORT: RegenerationPhase.ABORT,
+    RegenerationStep.FREEZE: RegenerationPhase.FREEZE,
+    RegenerationStep.ASK: RegenerationPhase.FREEZE,
+    RegenerationStep.READ_BACK: RegenerationPhase.READ_BACK,
+    RegenerationStep.COMMIT: RegenerationPhase.COMMIT,
+    RegenerationStep.ABORT: RegenerationPhase.ABORT,
 }
 
 
@@ -74,24 +74,24 @@ class Lost:
 
     lost: int
     absent: int = NOBODY
-    body: Body = NO_BODY
-    blocked: Body = NO_BODY
+    body: BodySlots = NO_BODY
+    blocked: BodySlots = NO_BODY
 
 
-class Regenerate(Order):
+class Regenerate(OperatorCommand):
     """See the module. A machine that is said to be locked off and is heard ends it."""
 
     def __init__(self, park: Park, node: int, who: Lost) -> None:
         super().__init__(park, node)
         self._who = who
-        self._step = Step.FREEZE
+        self._step = RegenerationStep.FREEZE
         self._since_us = 0
         self._epoch = 0
         self._said = Statements(park.site, who.lost)
         self._frozen: dict[int, int] = {}
         self._read: set[int] = set()
         self._boots: dict[int, int] = {}
-        self._assignment = Assignment((), ())
+        self._assignment = RightsAssignment((), ())
         self._bursts: Iterator[list[Message]] = iter(())
         self._again_us = 0
         self._aborts = 0
@@ -117,7 +117,7 @@ class Regenerate(Order):
     @property
     def question(self) -> str:
         """First whether the absent machine is locked off; then whether the rights listed shall be made anew."""
-        if self._step is Step.ASK:
+        if self._step is RegenerationStep.ASK:
             return f"Shall {len(self._assignment.given)} rights be made anew under epoch {self._epoch}?"
         if self._who.absent:
             name = self.park.name(self._who.absent)
@@ -127,29 +127,29 @@ class Regenerate(Order):
     @property
     def answer(self) -> str:
         """The name of who is locked off is typed."""
-        return self.park.name(self._who.absent) if self._who.absent and self._step is Step.FREEZE else ""
+        return self.park.name(self._who.absent) if self._who.absent and self._step is RegenerationStep.FREEZE else ""
 
     @property
     def has_question(self) -> bool:
         """Whether all have said what they hold, so that the person has to decide now."""
-        return self._step is Step.ASK and self.status is None
+        return self._step is RegenerationStep.ASK and self.status is None
 
     def answered(self, now_us: int, *, agrees: bool) -> None:
         """The person's yes has the list read back by all; a no breaks it off with nothing changed."""
-        if self._step is not Step.ASK:
+        if self._step is not RegenerationStep.ASK:
             return
         if agrees:
-            self._go_to(Step.READ_BACK, now_us)
+            self._go_to(RegenerationStep.READ_BACK, now_us)
         else:
             self._abort("the person does not want it", now_us)
 
     def interrupt(self, now_us: int) -> list[Message]:
         """Break it off with nothing changed; what was committed stays so."""
-        if self._step is Step.COMMIT:
+        if self._step is RegenerationStep.COMMIT:
             self.tell("COMMIT was said: those who have not heard it stand until it is said again")
             return super().interrupt(now_us)
         self.tell("broken off: nothing has changed")
-        self._step = Step.ABORT
+        self._step = RegenerationStep.ABORT
         super().interrupt(now_us)
         return [self._word()]
 
@@ -171,7 +171,7 @@ class Regenerate(Order):
         self._boots = {node: beat.boot for node, beat in beats.items() if beat is not None}
         self._epoch = successor(_newest([beat.epoch for beat in beats.values() if beat is not None]), 8)
         if self.status is None:
-            self.tell(f"epoch {self._epoch}: {Step.FREEZE.value}")
+            self.tell(f"epoch {self._epoch}: {RegenerationStep.FREEZE.value}")
 
     def feed(self, message: Message, now_us: int) -> None:
         """Statements, answers, and whatever speaks against it."""
@@ -181,7 +181,7 @@ class Regenerate(Order):
             self._absent_is_heard(message, now_us)
             return
         match message:
-            case Regeneration() if self._step is not Step.ABORT:
+            case Regeneration() if self._step is not RegenerationStep.ABORT:
                 self._abort(f"{self.park.name(message.sender)} regenerates as well", now_us)
             case RegenerationState() if message.epoch == self._epoch and message.sender in self._participants():
                 self._on_state(message, now_us)
@@ -189,9 +189,9 @@ class Regenerate(Order):
                 self._on_heartbeat(message, now_us)
             case CarAt():
                 self._said.car_at(message)
-            case TokenHeld() if self._step is Step.FREEZE:
+            case TokenHeld() if self._step is RegenerationStep.FREEZE:
                 self._said.take_up(message.sender, _key(message), message.version, message.sender)
-            case TokenSeen() | TokenGiven() | TokenGrant() if self._step is Step.FREEZE:
+            case TokenSeen() | TokenGiven() | TokenGrant() if self._step is RegenerationStep.FREEZE:
                 # The giver's word about what has left it is as good as a bystander's: only TokenHeld tells a holder.
                 holder = message.holder if message.holder != message.sender else NOBODY
                 self._said.take_up(message.sender, _key(message), message.version, holder)
@@ -202,13 +202,13 @@ class Regenerate(Order):
         if self.status is not None:
             return []
         match self._step:
-            case Step.FREEZE:
+            case RegenerationStep.FREEZE:
                 self._freeze(now_us)
-            case Step.ASK if now_us >= self._since_us + DECIDE_US:
+            case RegenerationStep.ASK if now_us >= self._since_us + DECIDE_US:
                 self._abort("nobody has answered", now_us)
-            case Step.READ_BACK:
+            case RegenerationStep.READ_BACK:
                 self._read_back(now_us)
-            case Step.COMMIT:
+            case RegenerationStep.COMMIT:
                 self._commit(now_us)
         return [] if self.next_wake() is None else self._words(now_us)
 
@@ -233,7 +233,7 @@ class Regenerate(Order):
             self._abort(wrong, now_us)
             return
         self._show()
-        self._go_to(Step.ASK, now_us)
+        self._go_to(RegenerationStep.ASK, now_us)
 
     def _wrong_body(self, whose: Whose) -> str:
         """Where the person sees a body that a right says cannot be there: whose it is, and where it may be instead.
@@ -257,8 +257,8 @@ class Regenerate(Order):
         for node in self.park.machines:
             kinds = [one.token_kind for one in self._assignment.given if one.holder == node]
             if kinds:
-                told = ", ".join(f"{kinds.count(kind)} {kind.name.lower()}s" for kind in TokenKind if kind in kinds)
-                self.tell(f"{self.park.name(node)} gets {told}")
+                rights = ", ".join(f"{kinds.count(kind)} {kind.name.lower()}s" for kind in TokenKind if kind in kinds)
+                self.tell(f"{self.park.name(node)} gets {rights}")
         if self._assignment.nobodys:
             self.tell(f"{len(self._assignment.nobodys)} rights stay nobody's")
 
@@ -266,7 +266,7 @@ class Regenerate(Order):
         late = [node for node in self._participants() if node not in self._read]
         if not late:
             self.tell(f"all have read {len(self._assignment.given)} rights back")
-            self._go_to(Step.COMMIT, now_us)
+            self._go_to(RegenerationStep.COMMIT, now_us)
         elif now_us >= self._since_us + READ_US:
             self._abort(f"not all have read the list back: {self._names(late)}", now_us)
 
@@ -282,7 +282,7 @@ class Regenerate(Order):
 
     def _words(self, now_us: int) -> list[Message]:
         """What is said in the present step, and when it is said again."""
-        burst = next(self._bursts, None) if self._step is Step.READ_BACK else None
+        burst = next(self._bursts, None) if self._step is RegenerationStep.READ_BACK else None
         if burst is not None:
             self._wake_us = now_us + PAUSE_US
             return burst
@@ -290,15 +290,15 @@ class Regenerate(Order):
             self._wake_us = self._again_us
             return []
         self._again_us = self._wake_us = now_us + AGAIN_US
-        if self._step is Step.READ_BACK:
+        if self._step is RegenerationStep.READ_BACK:
             self._again_us = self._wake_us = now_us + TELL_AGAIN_US
             self._bursts = self._in_bursts()
             return [self._word()]
-        if self._step is Step.ABORT:
+        if self._step is RegenerationStep.ABORT:
             self._aborts += 1
             if self._aborts == ABORTS:
                 self.status = self._ending
-        return [self._word(), *(self._blocks() if self._step is Step.COMMIT else [])]
+        return [self._word(), *(self._blocks() if self._step is RegenerationStep.COMMIT else [])]
 
     def _in_bursts(self) -> Iterator[list[Message]]:
         given = self._assignment.given
@@ -307,7 +307,7 @@ class Regenerate(Order):
         yield [self._word()]
 
     def _word(self) -> Regeneration:
-        is_listed = self._step in (Step.READ_BACK, Step.COMMIT)
+        is_listed = self._step in (RegenerationStep.READ_BACK, RegenerationStep.COMMIT)
         given: tuple[TokenAssigned, ...] = self._assignment.given if is_listed else ()
         digest = assignment_digest(given) if is_listed else 0
         who = self._who
@@ -325,26 +325,26 @@ class Regenerate(Order):
     # --- what is heard -----------------------------------------------------------------------------------------
 
     def _absent_is_heard(self, message: Message, now_us: int) -> None:
-        name, said = self.park.name(message.sender), type(message).__name__
-        if self._step in (Step.COMMIT, Step.ABORT):
-            self.tell(f"{name} LIVES though it is said to be locked off ({said})")
+        name, sign_of_life = self.park.name(message.sender), type(message).__name__
+        if self._step in (RegenerationStep.COMMIT, RegenerationStep.ABORT):
+            self.tell(f"{name} LIVES though it is said to be locked off ({sign_of_life})")
             return
-        self._abort(f"{name} LIVES though it is said to be locked off ({said}): go and see", now_us)
+        self._abort(f"{name} LIVES though it is said to be locked off ({sign_of_life}): go and see", now_us)
 
     def _on_state(self, state: RegenerationState, now_us: int) -> None:
         wanted = self._word()
         match state.regeneration_phase:
-            case RegenerationPhase.REFUSED if self._step not in (Step.COMMIT, Step.ABORT):
+            case RegenerationPhase.REFUSED if self._step not in (RegenerationStep.COMMIT, RegenerationStep.ABORT):
                 self._abort(f"{self.park.name(state.sender)} refuses: {reason_words(state.reason)}", now_us)
-            case RegenerationPhase.FREEZE if self._step is Step.FREEZE:
+            case RegenerationPhase.FREEZE if self._step is RegenerationStep.FREEZE:
                 self._frozen[state.sender] = state.tokens
-            case RegenerationPhase.READ_BACK if self._step is Step.READ_BACK:
+            case RegenerationPhase.READ_BACK if self._step is RegenerationStep.READ_BACK:
                 if (state.tokens, state.digest) == (wanted.tokens, wanted.digest):
                     self._read.add(state.sender)
 
     def _on_heartbeat(self, beat: Heartbeat, now_us: int) -> None:
         before = self._boots.setdefault(beat.sender, beat.boot)
-        if beat.boot != before and self._step not in (Step.COMMIT, Step.ABORT):
+        if beat.boot != before and self._step not in (RegenerationStep.COMMIT, RegenerationStep.ABORT):
             self._abort(f"{self.park.name(beat.sender)} was started again meanwhile", now_us)
 
     # --- inner works -------------------------------------------------------------------------------------------
@@ -359,16 +359,16 @@ class Regenerate(Order):
         beat = self.park.machines[node].beat
         return beat is not None and beat.epoch == self._epoch
 
-    def _go_to(self, step: Step, now_us: int) -> None:
+    def _go_to(self, step: RegenerationStep, now_us: int) -> None:
         self._step, self._since_us, self._again_us, self._wake_us = step, now_us, now_us, now_us
-        if step is Step.READ_BACK:
+        if step is RegenerationStep.READ_BACK:
             self._bursts = self._in_bursts()
             self._again_us = now_us + TELL_AGAIN_US
         self.tell(f"epoch {self._epoch}: {step.value}")
 
     def _abort(self, why: str, now_us: int) -> None:
         self.tell(why)
-        self._go_to(Step.ABORT, now_us)
+        self._go_to(RegenerationStep.ABORT, now_us)
 
     def _names(self, nodes: list[int]) -> str:
         return ", ".join(self.park.name(node) for node in nodes)

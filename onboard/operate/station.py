@@ -6,10 +6,10 @@ from collections.abc import Awaitable, Callable
 from onboard.contract.messages import Message
 from onboard.core.frame import Frame
 from onboard.core.site import Site
+from onboard.operate.commands import LISTEN_BEATS, Maker
 from onboard.operate.names import FIRST_TOOL, LAST_TOOL, OperateError
-from onboard.operate.order import MISTAKE, NOT_CONFIRMED, Order
+from onboard.operate.order import MISTAKE, NOT_CONFIRMED, OperatorCommand
 from onboard.operate.park import Park
-from onboard.operate.wishes import LISTEN_BEATS, Maker
 from onboard.ports.bus import Bus
 from onboard.wire.codec import Codec
 from onboard.wire.decoder import Decoder
@@ -18,7 +18,7 @@ from onboard.wire.decoder import Decoder
 LINGER_S = 0.2
 
 
-class Station:
+class OperatorStation:
     """Hears a bus from its making on. ``tell`` is given every line for the person."""
 
     def __init__(self, site: Site, codec: Codec, bus: Bus, tell: Callable[[str], None]) -> None:
@@ -27,7 +27,7 @@ class Station:
         self._codec, self._bus, self._tell = codec, bus, tell
         self._decoder = Decoder(codec, site.machines)
         self._loop = asyncio.get_running_loop()
-        self._order: Order | None = None
+        self._order: OperatorCommand | None = None
         self._news = asyncio.Event()
         self._is_interrupted = False
         self._is_lost = ""
@@ -58,7 +58,7 @@ class Station:
         self.node = free[0] if node is None else node
         return self.node
 
-    async def operate(self, make: Maker, node: int | None, agrees: Callable[[Order], Awaitable[bool]]) -> int:
+    async def operate(self, make: Maker, node: int | None, agrees: Callable[[OperatorCommand], Awaitable[bool]]) -> int:
         """Look, show, ask, do: the exit status. ``node`` as in ``speak_as``. Raises ``OperateError``.
 
         What is urgent is said at once, under ``node`` or the first of a tool's.
@@ -78,7 +78,7 @@ class Station:
             return MISTAKE
         return await self.carry_out(order, agrees)
 
-    async def carry_out(self, order: Order, agrees: Callable[[Order], Awaitable[bool]]) -> int:
+    async def carry_out(self, order: OperatorCommand, agrees: Callable[[OperatorCommand], Awaitable[bool]]) -> int:
         """Do it; the exit status. Lines are told as they come; while a question is open the order speaks on."""
         self._order = order
         order.begin(self.now_us())
@@ -117,7 +117,7 @@ class Station:
 
     # --- inner works -------------------------------------------------------------------------------------------
 
-    def _do(self, order: Order) -> None:
+    def _do(self, order: OperatorCommand) -> None:
         """One turn: what is due is said, what is new is told."""
         now_us = self.now_us()
         if self._is_lost:
@@ -157,7 +157,7 @@ class Station:
         if timer is not None:
             timer.cancel()
 
-    def _show(self, order: Order) -> None:
+    def _show(self, order: OperatorCommand) -> None:
         for line in order.news():
             self._tell(line)
 

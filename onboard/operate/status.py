@@ -4,12 +4,12 @@ from onboard.contract.codes import Reason
 from onboard.contract.constants import MOBILE_KINDS
 from onboard.contract.messages import Message
 from onboard.holon.remedies import reason_words
-from onboard.operate.order import DONE, NOT_CONFIRMED, Order
+from onboard.operate.order import DONE, NOT_CONFIRMED, OperatorCommand
 from onboard.operate.park import Park
 from onboard.operate.words import state_words
 
 
-class Status(Order):
+class Status(OperatorCommand):
     """Listens for ``listen_us`` and tells; status 1 where a machine is silent or needs a person."""
 
     is_silent = True
@@ -45,8 +45,8 @@ def status_lines(park: Park, now_us: int) -> list[str]:
         what = "a gateway or tool" if node in park.tools() else "no machine of this site"
         lines.append(f"node {node} is heard: {what}, last with {park.others[node]}")
     for node, counts in sorted(park.dropped.items()):
-        told = ", ".join(f"{reason_words(reason)} {count}" for reason, count in sorted(counts.items()))
-        lines.append(f"{park.name(node)} has dropped since its start: {told}")
+        drops = ", ".join(f"{reason_words(reason)} {count}" for reason, count in sorted(counts.items()))
+        lines.append(f"{park.name(node)} has dropped since its start: {drops}")
     return lines
 
 

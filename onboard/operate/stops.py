@@ -7,7 +7,7 @@ from onboard.contract.codes import MachineState, Reason
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import EmergencyStop, Go, Halted, Heartbeat, Message
 from onboard.core.site import Machine
-from onboard.operate.order import AGAIN_US, DONE, NOT_CONFIRMED, Order
+from onboard.operate.order import AGAIN_US, DONE, NOT_CONFIRMED, OperatorCommand
 from onboard.operate.park import Park
 from onboard.operate.words import halted_words, state_words
 
@@ -15,7 +15,7 @@ from onboard.operate.words import halted_words, state_words
 LASTS_US = 30_000_000
 
 
-class Stop(Order):
+class StopCommand(OperatorCommand):
     """Says EmergencyStop each second: until all have answered and ``keep_us`` are over, None for ever."""
 
     is_urgent = True
@@ -80,7 +80,7 @@ class Stop(Order):
             self.end(names)
 
 
-class GoAgain(Order):
+class GoAgain(OperatorCommand):
     """Lifts the stop of node ``stopper``, 0 for all; each machine that held by it has to be heard without it."""
 
     def __init__(self, park: Park, node: int, stopper: int = NOBODY) -> None:

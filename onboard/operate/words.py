@@ -17,14 +17,14 @@ _STATES = {
 
 def halted_words(park: Park, word: Halted) -> str:
     """Why a machine stands, who brought it about, and what to do where a person is needed."""
-    said = f"stands: {reason_words(word.reason)}"
+    text = f"stands: {reason_words(word.reason)}"
     if word.cause:
-        said += f" by {park.name(word.cause)}"
+        text += f" by {park.name(word.cause)}"
     if word.sender != word.machine:
         why = "itself it says that it goes" if word.reason is Reason.FALSE_STATEMENT else "itself it is silent"
-        said += f" (said by {park.name(word.sender)}; {why})"
+        text += f" (said by {park.name(word.sender)}; {why})"
     what = remedy(park.site, word.reason, park.name(word.machine))
-    return said + (f"; needs a person: {what}" if word.needs_person else "; goes on by itself")
+    return text + (f"; needs a person: {what}" if word.needs_person else "; goes on by itself")
 
 
 def state_words(park: Park, node: int, now_us: int) -> str:

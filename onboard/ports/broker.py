@@ -21,25 +21,25 @@ class Publication:
 
 
 @dataclass(frozen=True, slots=True)
-class Delivery(Publication):
+class ReceivedPublication(Publication):
     """A publication as it arrived; ``number`` is its name in the session that brought it."""
 
     number: int = 0
 
 
-class Session(Protocol):
+class BrokerSession(Protocol):
     """One connection under one client identifier."""
 
     async def publish(self, publication: Publication) -> None:
         """Hand one publication over; with QoS 1 return once the broker has acknowledged it. Raises ``BrokerError``."""
 
-    def incoming(self) -> AsyncIterator[Delivery]:
+    def incoming(self) -> AsyncIterator[ReceivedPublication]:
         """What arrives on the topics subscribed to, until the connection ends. Raises ``BrokerError`` then.
 
         With QoS 1 the broker keeps each until it is ``taken``, and brings it again in the next session.
         """
 
-    def taken(self, delivery: Delivery) -> None:
+    def taken(self, delivery: ReceivedPublication) -> None:
         """What came of it is on disk here: the broker may forget it. Never raises, and says nothing once it is over."""
 
 
@@ -48,5 +48,5 @@ class Broker(Protocol):
 
     def session(
         self, client: str, will: Publication | None, subscriptions: tuple[str, ...]
-    ) -> AbstractAsyncContextManager[Session]:
+    ) -> AbstractAsyncContextManager[BrokerSession]:
         """Connect as ``client``; entering raises ``BrokerError``. Leaving disconnects in order: no will is sent."""

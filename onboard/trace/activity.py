@@ -12,7 +12,7 @@ from onboard.contract.codes import CallResult, Grade, KindCode, LegAction, Opera
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import CarAt, Itinerary, Message, Progress, Reference, TaskReport, Waiting
 from onboard.core.site import Segment, Site
-from onboard.history.calls import Call, CallAnswered
+from onboard.history.calls import CallAnswered, CallHistory
 from onboard.history.history import Fact
 from onboard.ways.site import way_site
 
@@ -36,7 +36,7 @@ class Activity(StrEnum):
 
 
 @dataclass
-class Body:
+class MachineActivity:
     """One robot or lift as its messages tell it; times in us of the log, since the last ``begin``."""
 
     node: int
@@ -66,14 +66,14 @@ class Activities:
 
     def __init__(self, site: Site, begin_us: int = 0) -> None:
         ways = way_site(site)
-        self.bodies: dict[int, Body] = {}
+        self.bodies: dict[int, MachineActivity] = {}
         self._site = site
         self._begin_us = begin_us
         for machine in site.machines.values():
             if machine.kind in (KindCode.ROBOT, KindCode.LIFT):
                 track = next((t for t in ways.lifts if site.stewards[t] == machine.node_id), machine.home.track)
                 at = machine.home if machine.kind is KindCode.ROBOT else Segment(track, machine.home.index)
-                self.bodies[machine.node_id] = Body(
+                self.bodies[machine.node_id] = MachineActivity(
                     machine.node_id, machine.kind, at, ways.position_mm(at), since_us=begin_us
                 )
 
@@ -133,7 +133,7 @@ class Activities:
         if body.kind is KindCode.LIFT or left != self._platform_of(body):
             self._settle_lifts(time_us)
 
-    def _travel(self, body: Body, way_mm: int) -> None:
+    def _travel(self, body: MachineActivity, way_mm: int) -> None:
         body.travel_mm += way_mm
         loaded = body.car is not None if body.kind is KindCode.ROBOT else self._passengers(body)
         if not loaded:
@@ -144,7 +144,7 @@ class Activities:
         if body is not None and body.waiting_since_us is None:
             body.waiting_since_us = time_us
 
-    def _on_itinerary(self, robot: Body, itinerary: Itinerary, time_us: int) -> None:
+    def _on_itinerary(self, robot: MachineActivity, itinerary: Itinerary, time_us: int) -> None:
         robot.works = [Segment(leg.track, leg.to_index) for leg in itinerary.legs if leg.action is LegAction.WORK]
         self._settle(robot, time_us)
         rides = Counter(self._site.stewards.get(leg.track) for leg in itinerary.legs if leg.action is LegAction.RIDE)
@@ -153,7 +153,7 @@ class Activities:
                 lift.rides[robot.node] = rides[lift.node]
                 self._settle(lift, time_us)
 
-    def _on_end(self, call: Call, end: CallAnswered, time_us: int) -> None:
+    def _on_end(self, call: CallHistory, end: CallAnswered, time_us: int) -> None:
         body = self.bodies.get(end.award.winner)
         if call.terms.operation in TASKS and body is not None and end.award.result is CallResult.AWARDED:
             body.tasks.add(call.terms.task)
@@ -174,7 +174,7 @@ class Activities:
             if body.car == car:
                 body.car = None
 
-    def _end_ride(self, lift: int, robot: Body, time_us: int) -> None:
+    def _end_ride(self, lift: int, robot: MachineActivity, time_us: int) -> None:
         body = self.bodies.get(self._site.stewards[lift])
         if body is not None and body.rides[robot.node] > 0:
             body.rides[robot.node] -= 1
@@ -182,10 +182,10 @@ class Activities:
 
     # --- time --------------------------------------------------------------------------------------------------
 
-    def _platform_of(self, body: Body) -> int | None:
+    def _platform_of(self, body: MachineActivity) -> int | None:
         return way_site(self._site).platforms.get(body.at) if body.kind is KindCode.ROBOT else None
 
-    def _passengers(self, lift: Body) -> bool:
+    def _passengers(self, lift: MachineActivity) -> bool:
         return any(self._platform_of(body) == lift.at.track for body in self.bodies.values())
 
     def _settle_lifts(self, time_us: int) -> None:
@@ -193,7 +193,7 @@ class Activities:
             if body.kind is KindCode.LIFT:
                 self._settle(body, time_us)
 
-    def _settle(self, body: Body, time_us: int) -> None:
+    def _settle(self, body: MachineActivity, time_us: int) -> None:
         """Book the time since the last change to what the machine did then."""
         passed_us = max(0, time_us - body.since_us)
         body.spent_us[body.activity] += passed_us
@@ -203,7 +203,7 @@ class Activities:
         body.busy = bool(body.tasks) or any(body.rides.values())
         body.activity = self._activity(body)
 
-    def _activity(self, body: Body) -> Activity:
+    def _activity(self, body: MachineActivity) -> Activity:
         if body.kind is KindCode.LIFT:
             if self._passengers(body):
                 return Activity.RIDING if body.moving else Activity.HANDLING
@@ -215,7 +215,7 @@ class Activities:
             return Activity.DRIVING
         return Activity.STANDING if body.busy else Activity.IDLE
 
-    def _note_wait(self, body: Body, time_us: int) -> None:
+    def _note_wait(self, body: MachineActivity, time_us: int) -> None:
         assert body.waiting_since_us is not None
         since_us = max(body.waiting_since_us, self._begin_us)
         body.longest_wait_us = max(body.longest_wait_us, time_us - since_us)

@@ -16,7 +16,7 @@ _SHORT, _LONG = 3, 8
 _MILLION = 1_000_000
 
 
-class Fault(StrEnum):
+class LineFault(StrEnum):
     """Why a line gave no frame."""
 
     NOT_A_LINE = "not a line of candump -L"
@@ -26,7 +26,7 @@ class Fault(StrEnum):
     CUT = "last line cut off"
 
 
-class Record(NamedTuple):
+class LogRecord(NamedTuple):
     """One frame of a log; ``time_us`` since the epoch. A nanosecond log is cut to microseconds."""
 
     time_us: int
@@ -44,50 +44,50 @@ class CandumpReader:
 
     def __init__(self, lines: Iterable[bytes]) -> None:
         """``lines`` with their ends, as a binary file gives them; a pipe is read as it comes."""
-        self.faults: Counter[Fault] = Counter()
-        self.first: dict[Fault, int] = {}
+        self.faults: Counter[LineFault] = Counter()
+        self.first: dict[LineFault, int] = {}
         self._lines = lines
 
-    def __iter__(self) -> Iterator[Record]:
+    def __iter__(self) -> Iterator[LogRecord]:
         for number, line in enumerate(self._lines, 1):
             if not line.strip():
                 continue
-            found = parse_line(line) if line.endswith(b"\n") else Fault.CUT
-            if isinstance(found, Record):
+            found = parse_line(line) if line.endswith(b"\n") else LineFault.CUT
+            if isinstance(found, LogRecord):
                 yield found
             else:
                 self.faults[found] += 1
                 self.first.setdefault(found, number)
 
 
-def parse_line(line: bytes) -> Record | Fault:
+def parse_line(line: bytes) -> LogRecord | LineFault:
     """The frame of one line, its end included or not."""
     match = _LINE.fullmatch(line)
     if match is None:
-        return Fault.NOT_A_LINE
+        return LineFault.NOT_A_LINE
     seconds, fraction, channel, digits, flexible, body = match.groups()
     if flexible:
-        return Fault.FD
+        return LineFault.FD
     frame = _parse_frame(digits.decode(), body.decode())
-    if isinstance(frame, Fault):
+    if isinstance(frame, LineFault):
         return frame
-    return Record(int(seconds) * _MILLION + int(fraction[:6]), channel.decode("utf-8", "replace"), frame)
+    return LogRecord(int(seconds) * _MILLION + int(fraction[:6]), channel.decode("utf-8", "replace"), frame)
 
 
-def _parse_frame(digits: str, body: str) -> Frame | Fault:
+def _parse_frame(digits: str, body: str) -> Frame | LineFault:
     identifier, extended = int(digits, 16), len(digits) == _LONG
     if len(digits) not in (_SHORT, _LONG) or identifier > (CAN_EFF_MASK | ERROR_FLAG if extended else CAN_SFF_MASK):
-        return Fault.IDENTIFIER
+        return LineFault.IDENTIFIER
     if body[:1] == "R":
         if not re.fullmatch(r"R[0-8]?", body):
-            return Fault.DATA
+            return LineFault.DATA
         return Frame(identifier, b"", extended, is_remote=True, remote_dlc=int(body[1:] or 0))
     try:
         data = bytes.fromhex(body)
     except ValueError:
-        return Fault.DATA
+        return LineFault.DATA
     if len(data) > CAN_MAX_DLC:
-        return Fault.DATA
+        return LineFault.DATA
     if identifier & ERROR_FLAG:
         return Frame(identifier & CAN_EFF_MASK, data, extended, is_error=True)
     return Frame(identifier, data, extended)

@@ -8,9 +8,9 @@ from onboard.contract.codes import KindCode
 from onboard.contract.messages import BusTime, Heartbeat, Message
 from onboard.core.site import Site
 from onboard.history.history import Fact, History
-from onboard.trace.activity import Activities, Activity, Body
-from onboard.trace.dealings import ANSWER, Counts, Dealings
+from onboard.trace.activity import Activities, Activity, MachineActivity
 from onboard.trace.durations import percentile
+from onboard.trace.negotiations import ANSWER, NegotiationCounts, NegotiationFold
 
 _HOUR_US = 3_600_000_000
 #: Said by the clock and not because of a task.
@@ -125,7 +125,7 @@ class Indicators:
         self._history = history if history is not None else History()
         self._begin_us = begin_us
         self._activities = Activities(site, begin_us)
-        self._dealings = Dealings(self._history)
+        self._negotiations = NegotiationFold(self._history)
 
     def feed(self, message: Message, time_us: int) -> None:
         """Take up one message, where the history is these indicators' own."""
@@ -133,7 +133,7 @@ class Indicators:
 
     def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Take up one message, and what the history made of it."""
-        self._dealings.take(message, fact, time_us)
+        self._negotiations.take(message, fact, time_us)
         self._activities.take(message, fact, time_us)
 
     def begin(self, time_us: int) -> None:
@@ -141,13 +141,13 @@ class Indicators:
         self._begin_us = time_us
         self._activities.settle_all(time_us)
         self._activities.begin(time_us)
-        self._dealings.begin()
+        self._negotiations.begin()
 
     def figures(self, now_us: int) -> FleetIndicators:
         """The figures from the last ``begin`` up to now."""
         self._activities.settle_all(now_us)
         passed_us = max(1, now_us - self._begin_us)
-        counts = self._dealings.counts
+        counts = self._negotiations.counts
         bodies = self._activities.bodies
         robots = [body for body in bodies.values() if body.kind is KindCode.ROBOT]
         travel_mm, empty_mm = sum(body.travel_mm for body in robots), sum(body.empty_mm for body in robots)
@@ -176,7 +176,7 @@ class Indicators:
             robots_empty_share=_per(empty_mm, travel_mm),
         )
 
-    def _utilisation(self, body: Body, passed_us: int) -> Utilisation:
+    def _utilisation(self, body: MachineActivity, passed_us: int) -> Utilisation:
         shares = {activity: body.spent_us[activity] / passed_us for activity in Activity}
         return Utilisation(
             self._site.machines[body.node].name,
@@ -197,7 +197,7 @@ def _per(count: int, of: int) -> float:
     return count / of if of else 0.0
 
 
-def _give_ways(counts: Counts) -> int:
+def _give_ways(counts: NegotiationCounts) -> int:
     return counts.replans["way", ANSWER] + counts.unasked_moves + counts.give_way_calls
 
 

@@ -14,7 +14,7 @@ from onboard.wire.decoder import Decoder
 MOST_CHANNELS = 300
 
 
-class Heard(NamedTuple):
+class LoggedFrame(NamedTuple):
     """One frame and what it came to: the message that it completes, or why it came to none; neither for a part."""
 
     frame: RawFrame
@@ -23,7 +23,7 @@ class Heard(NamedTuple):
     is_fleet: bool
 
 
-class Said(NamedTuple):
+class LoggedMessage(NamedTuple):
     """One whole message: time in us of the log, channel, and whether it was of the fleet bus's contract."""
 
     time_us: int
@@ -41,13 +41,13 @@ class Listener:
         self.others: Counter[str] = Counter()
         self._decoders: dict[str, tuple[Decoder, Decoder]] = {}
 
-    def hear(self, frame: RawFrame) -> Heard:
+    def hear(self, frame: RawFrame) -> LoggedFrame:
         """Take up one frame. Never raises, whatever the frame."""
         classic = frame.classic()
         if classic is None or classic.is_error or classic.is_remote:
             kind = "CAN FD frames" if classic is None else "error frames" if classic.is_error else "remote frames"
             self.others[kind] += 1
-            return Heard(frame, None, None, False)
+            return LoggedFrame(frame, None, None, False)
         fleet, device = self._decoders_of(frame.channel)
         is_fleet = self.codecs.fleet.name_of(classic) is not None
         decoder = fleet if is_fleet else device
@@ -57,14 +57,14 @@ class Listener:
             reason = next(iter(decoder.drops))
             self.drops.update(decoder.drops)
             decoder.drops.clear()
-        return Heard(frame, message, reason, is_fleet)
+        return LoggedFrame(frame, message, reason, is_fleet)
 
-    def messages(self, frames: Iterable[RawFrame]) -> Iterator[Said]:
+    def messages(self, frames: Iterable[RawFrame]) -> Iterator[LoggedMessage]:
         """Whole messages only, in the order of the log."""
         for frame in frames:
             heard = self.hear(frame)
             if heard.message is not None:
-                yield Said(frame.time_us, frame.channel, heard.message, heard.is_fleet)
+                yield LoggedMessage(frame.time_us, frame.channel, heard.message, heard.is_fleet)
 
     def lines(self) -> list[str]:
         """What came to nothing, one line for each reason."""

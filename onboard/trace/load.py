@@ -122,7 +122,9 @@ def _greatest(bounds: Iterable[Bound], name: str) -> int | None:
     return None if None in times else max(time_us for time_us in times if time_us is not None)
 
 
-def told(found: Iterable[ChannelLoad], bounds: dict[str, tuple[int | None, int | None]], start_us: int) -> list[str]:
+def load_lines(
+    found: Iterable[ChannelLoad], bounds: dict[str, tuple[int | None, int | None]], start_us: int
+) -> list[str]:
     """Tables for people: the buses, then the messages of the bus that has bounds."""
     lines = [f"{'bus':<10} {'frames':>9} {'mean load':>10} {'worst second':>13}"]
     for load in found:

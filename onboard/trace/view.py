@@ -22,9 +22,9 @@ from onboard.contract.messages import (
     Waiting,
 )
 from onboard.core.site import Segment, Site
-from onboard.history.calls import BidMade, Call, CallAnswered, CallOpened
+from onboard.history.calls import BidMade, CallAnswered, CallHistory, CallOpened
 from onboard.history.history import Fact, History
-from onboard.history.tasks import Task, TaskTold
+from onboard.history.tasks import TaskHistory, TaskTold
 from onboard.systems.words import words_of
 
 #: Events in words that are kept.
@@ -84,12 +84,12 @@ class SiteView:
         self.say(time_us, f"{self.name(halted.machine)} does not act: {why}{person}")
 
     @property
-    def calls(self) -> dict[tuple[int, int], Call]:
+    def calls(self) -> dict[tuple[int, int], CallHistory]:
         """Calls by their caller and number."""
         return self.history.calls.by_key
 
     @property
-    def tasks(self) -> dict[Reference, Task]:
+    def tasks(self) -> dict[Reference, TaskHistory]:
         """Tasks by their names."""
         return self.history.tasks.by_name
 
@@ -131,12 +131,12 @@ class SiteView:
             case TaskTold() if fact.is_first:
                 self._on_phase(fact, time_us)
 
-    def _on_progress(self, told: Progress) -> None:
-        here, word = (Segment(told.track, told.index), told.offset_mm), self.halts.get(told.sender)
-        if word is not None and word.reason is Reason.FALSE_STATEMENT and here != self.positions.get(told.sender):
+    def _on_progress(self, statement: Progress) -> None:
+        here, word = (Segment(statement.track, statement.index), statement.offset_mm), self.halts.get(statement.sender)
+        if word is not None and word.reason is Reason.FALSE_STATEMENT and here != self.positions.get(statement.sender):
             # Said by others, because it stood: it moves.
-            del self.halts[told.sender]
-        self.positions[told.sender] = here
+            del self.halts[statement.sender]
+        self.positions[statement.sender] = here
 
     def _on_heartbeat(self, beat: Heartbeat) -> None:
         word = self.halts.get(beat.sender)
@@ -188,7 +188,7 @@ class SiteView:
             task.phase = TaskPhase.DONE
             self._count_done(task, time_us)
 
-    def _on_end(self, call: Call, end: CallAnswered, time_us: int) -> None:
+    def _on_end(self, call: CallHistory, end: CallAnswered, time_us: int) -> None:
         award = end.award
         self.calls_closed[award.result] += 1
         terms, thing = call.terms, self.words.thing(call.terms.car)
@@ -199,8 +199,8 @@ class SiteView:
         else:
             self.say(time_us, f"{self.name(award.winner)} wins {thing}")
 
-    def _on_phase(self, told: TaskTold, time_us: int) -> None:
-        task, report = told.task, told.report
+    def _on_phase(self, statement: TaskTold, time_us: int) -> None:
+        task, report = statement.task, statement.report
         if report.phase is TaskPhase.DONE:
             self._count_done(task, time_us)
             self.parked += task.operation is Operation.PARK
@@ -209,6 +209,6 @@ class SiteView:
         if words:
             self.say(time_us, f"{self.name(report.sender)} {words}")
 
-    def _count_done(self, task: Task, time_us: int) -> None:
+    def _count_done(self, task: TaskHistory, time_us: int) -> None:
         self.done += 1
         self.done_us += time_us - task.phase_us.get(TaskPhase.OPEN, time_us)

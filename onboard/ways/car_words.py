@@ -23,7 +23,7 @@ _MASK = (1 << VERSION_BITS) - 1
 
 
 @dataclass(frozen=True, slots=True)
-class CarRecord:
+class KnownCar:
     """Where a car stands, who vouches for it, under which version of its token, and its wheelbase in mm."""
 
     station: int
@@ -39,7 +39,7 @@ class CarWords:
     node_id: int
     tokens: TokenBook
     drops: Counter[Reason]
-    cars: Mapping[Reference, CarRecord]
+    cars: Mapping[Reference, KnownCar]
     take_up: Callable[[CarAt], object]
     _unproven: dict[Reference, CarAt] = field(default_factory=dict)
 

@@ -19,7 +19,7 @@ from onboard.core.records import RetiredRecord
 from onboard.core.serial import is_newer
 from onboard.core.site import Station
 from onboard.core.token_keys import TokenKey
-from onboard.ways.car_words import VERSION_BITS, CarRecord, CarWords
+from onboard.ways.car_words import VERSION_BITS, CarWords, KnownCar
 from onboard.ways.tokens import car_token
 
 #: Cars that have left and are still remembered; bounds the memory of a machine that runs for years.
@@ -32,9 +32,9 @@ class CarMirror(Mirror):
 
     vouching: ClassVar[tuple[type[Message], ...]] = (CarAt,)
 
-    cars: dict[Reference, CarRecord] = field(default_factory=dict)
+    cars: dict[Reference, KnownCar] = field(default_factory=dict)
     #: Where cars stand whose custody came to this machine as rights were made anew, by who remembers it.
-    told: dict[Reference, CarAt] = field(default_factory=dict)
+    taken_over: dict[Reference, CarAt] = field(default_factory=dict)
     #: Who wants to know that a car which left long ago is remembered no longer.
     on_forgotten: list[Callable[[Reference], object]] = field(default_factory=list)
     words: CarWords | None = None
@@ -72,7 +72,7 @@ class CarMirror(Mirror):
     def on_car(self, statement: CarAt) -> bool:
         """Take up a custodian's statement; True where it changed anything."""
         known = self.cars.get(statement.car)
-        record = CarRecord(statement.station, statement.sender, statement.version, statement.wheelbase_mm)
+        record = KnownCar(statement.station, statement.sender, statement.version, statement.wheelbase_mm)
         if known == record:
             return False
         if known is not None and not is_newer(statement.version, known.version, VERSION_BITS):
@@ -148,7 +148,7 @@ class CarMirror(Mirror):
 
     def takes_over(self, keys: Collection[TokenKey]) -> None:
         """These cars are in my custody: where they stand by who remembers it, for my behaviour to take up."""
-        self.told.update({car: one for car, one in self._recalled.items() if car_token(*car) in keys})
+        self.taken_over.update({car: one for car, one in self._recalled.items() if car_token(*car) in keys})
 
 
 @dataclass

@@ -17,7 +17,7 @@ _NS_PER_US = 1_000
 _US_PER_MS = 1_000
 
 
-class Run(NamedTuple):
+class RestToRest(NamedTuple):
     """A motion from rest to rest over ``distance_mm`` >= 0."""
 
     distance_mm: int
@@ -45,7 +45,7 @@ def run_duration_us(distance_mm: int, axis: Axis) -> int:
     return ceil_ms(_ceil_us(_duration_ns(distance_mm, axis).high))
 
 
-def time_at_us(run: Run, travelled_mm: int) -> int:
+def time_at_us(run: RestToRest, travelled_mm: int) -> int:
     """Time from the start until ``travelled_mm`` (clamped to the run) is reached, rounded down: never too late.
 
     For what the front of a body enters. Less than 1 us and 2 ns below the exact time.
@@ -53,7 +53,7 @@ def time_at_us(run: Run, travelled_mm: int) -> int:
     return _time_at_ns(run, travelled_mm).low // _NS_PER_US
 
 
-def cleared_at_us(run: Run, travelled_mm: int) -> int:
+def cleared_at_us(run: RestToRest, travelled_mm: int) -> int:
     """As ``time_at_us`` but rounded up, never too early: for what the rear of a body leaves.
 
     The end of the run is its ``run_duration_us``, as the leg on the wire ends no sooner.
@@ -63,7 +63,7 @@ def cleared_at_us(run: Run, travelled_mm: int) -> int:
     return _ceil_us(_time_at_ns(run, travelled_mm).high)
 
 
-def _time_at_ns(run: Run, travelled_mm: int) -> _Bounds:
+def _time_at_ns(run: RestToRest, travelled_mm: int) -> _Bounds:
     """The three parts of the profile: speeding up, top speed, braking (the mirror image of speeding up)."""
     distance_mm, (speed, acceleration) = run.distance_mm, (run.axis.speed_mm_s, run.axis.acceleration_mm_s2)
     if travelled_mm <= 0:

@@ -19,7 +19,7 @@ from onboard.ways.lift_uses import standing_after
 from onboard.ways.lifts import lift_tracks
 from onboard.ways.obstacles import Obstacles
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses, turned_in
-from onboard.ways.passing import Plan, next_plan
+from onboard.ways.passing import BegunItinerary, next_plan
 from onboard.ways.passing_order import PassingOrder
 from onboard.ways.reservations import Reservations
 from onboard.ways.site import WaySite
@@ -34,8 +34,8 @@ class WayMirror(CarMirror):
     site: WaySite
 
     #: Plans with when their first legs began, and what each replaced: the order of passing comes from there.
-    plans: dict[int, Plan] = field(default_factory=dict)
-    replaced: dict[int, Plan] = field(default_factory=dict)
+    plans: dict[int, BegunItinerary] = field(default_factory=dict)
+    replaced: dict[int, BegunItinerary] = field(default_factory=dict)
     reservations: Reservations = field(default_factory=Reservations)
     order: PassingOrder = field(init=False)
     obstacles: Obstacles = field(init=False)
@@ -83,7 +83,7 @@ class WayMirror(CarMirror):
             self._count_on(self.plans[node], now_us)
         return True
 
-    def _count_on(self, plan: Plan, now_us: int) -> None:
+    def _count_on(self, plan: BegunItinerary, now_us: int) -> None:
         """Plan around a machine's plan, and keep its place in the order of passing."""
         itinerary = plan.itinerary
         self.order.on_plan(plan, now_us)

@@ -15,7 +15,7 @@ from onboard.core.mirror import Obstacle
 from onboard.core.site import Machine, Segment
 from onboard.ways.lifts import PLATFORM_INDEX, lift_at, platform
 from onboard.ways.occupancy import standing_segments
-from onboard.ways.reservations import FOREVER, Reservations, Use, Window
+from onboard.ways.reservations import FOREVER, Reservations, SlotWindow, Use
 from onboard.ways.site import WaySite
 from onboard.ways.tokens import site_slots
 
@@ -83,7 +83,7 @@ class Obstacles:
         lifts = [slot.track for slot in sorted(slots) if slot.index == PLATFORM_INDEX and slot.track in self.site.lifts]
         reservations.reserve(
             owner,
-            [Window(slot, now_us, FOREVER) for slot in sorted(slots)],
+            [SlotWindow(slot, now_us, FOREVER) for slot in sorted(slots)],
             [Use(lift, 1, 1, now_us, FOREVER, owner) for lift in lifts],
         )
         reservations.fix(owner)

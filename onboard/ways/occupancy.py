@@ -16,9 +16,9 @@ from onboard.contract.codes import LegAction
 from onboard.contract.messages import Itinerary, Leg
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment
-from onboard.ways.kinematics import Run, ceil_ms, cleared_at_us, run_duration_us, time_at_us
+from onboard.ways.kinematics import RestToRest, ceil_ms, cleared_at_us, run_duration_us, time_at_us
 from onboard.ways.lifts import PLATFORM_INDEX, lift_at, lift_index_of, platform, platform_on
-from onboard.ways.reservations import FOREVER, Use, Window
+from onboard.ways.reservations import FOREVER, SlotWindow, Use
 from onboard.ways.site import Axis, TrackKind, WaySite
 
 
@@ -51,7 +51,7 @@ def run_sweeps(segments: int, pitch_mm: int, length_mm: int, axis: Axis) -> tupl
     Ordered by offset, which goes from ``-reach`` to ``segments + reach``; sweeps at the start begin with the run and
     those at the destination end with it.
     """
-    run = Run(segments * pitch_mm, axis)
+    run = RestToRest(segments * pitch_mm, axis)
     reach = _reach(pitch_mm, length_mm)
     sweeps = []
     for offset in range(-reach, segments + reach + 1):
@@ -125,7 +125,7 @@ def junction_segments(site: WaySite, origin: Segment, inside: Segment) -> list[S
     return standing_segments(site, origin) + standing_segments(site, inside)
 
 
-def travel_windows(site: WaySite, origin: Segment, to_index: int, begin_us: int, end_us: int) -> list[Window]:
+def travel_windows(site: WaySite, origin: Segment, to_index: int, begin_us: int, end_us: int) -> list[SlotWindow]:
     """Windows of one run from standing at ``origin``; either end may be a platform.
 
     Where ``[begin, end)`` is not exactly the run's duration (a delay, a leg under way), a segment counts as occupied
@@ -142,7 +142,7 @@ def travel_windows(site: WaySite, origin: Segment, to_index: int, begin_us: int,
         if segment is not None and not 1 <= segment.index <= track.length:
             segment = _platform_at(site, segment) if sweep.offset in (0, segments) else None
         if segment is not None:
-            windows.append(Window(segment, early_us + sweep.enter_us, late_us + sweep.leave_us))
+            windows.append(SlotWindow(segment, early_us + sweep.enter_us, late_us + sweep.leave_us))
     return windows
 
 
@@ -157,7 +157,7 @@ class _Part(NamedTuple):
 
 def itinerary_windows(
     site: WaySite, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None
-) -> list[Window]:
+) -> list[SlotWindow]:
     """All windows of an itinerary; after the last leg the machine stands where it ends, without end.
 
     The first leg begins at ``first_begin_us``, by default when the task was awarded. Legs on tracks that the site does
@@ -169,7 +169,7 @@ def itinerary_windows(
 
 def leg_windows(
     site: WaySite, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None
-) -> list[tuple[Window, ...]]:
+) -> list[tuple[SlotWindow, ...]]:
     """The same windows leg by leg, those of the standing behind the last leg at the end."""
     return [tuple(_part_windows(site, part)) for part in _parts(site, itinerary, now_us, first_begin_us)]
 
@@ -253,7 +253,7 @@ def _floors(site: WaySite, part: _Part, lift_track: int) -> tuple[int, int]:
     return served[0], served[-1]
 
 
-def _part_windows(site: WaySite, part: _Part) -> list[Window]:
+def _part_windows(site: WaySite, part: _Part) -> list[SlotWindow]:
     """Windows of one part; a leg on another track than ``here`` is a ride, or a hop through a junction."""
     leg, here, begin_us, end_us = part
     if leg is None:
@@ -274,6 +274,6 @@ def _part_windows(site: WaySite, part: _Part) -> list[Window]:
     return windows or _stays(standing_segments(site, origin), begin_us, end_us)
 
 
-def _stays(segments: list[Segment], begin_us: int, end_us: int) -> list[Window]:
+def _stays(segments: list[Segment], begin_us: int, end_us: int) -> list[SlotWindow]:
     """The same window on each segment; none where it has no length."""
-    return [Window(segment, begin_us, end_us) for segment in segments] if begin_us < end_us else []
+    return [SlotWindow(segment, begin_us, end_us) for segment in segments] if begin_us < end_us else []

@@ -10,26 +10,26 @@ from onboard.ways.occupancy import leg_begins_us
 TOLERANCE_US = 10_000
 
 
-class Plan(NamedTuple):
+class BegunItinerary(NamedTuple):
     """A firm itinerary and when its first leg began (bus us)."""
 
     itinerary: Itinerary
     first_begin_us: int
 
 
-def next_plan(known: Plan | None, itinerary: Itinerary, now_us: int) -> Plan:
+def next_plan(known: BegunItinerary | None, itinerary: Itinerary, now_us: int) -> BegunItinerary:
     """The plan that ``itinerary`` tells after ``known``: a first leg that was planned before keeps its begin.
 
     An itinerary names the ends of its legs and its award; a leg under way began long after that.
     """
     award_us = from_bus_ms(itinerary.stamp.award_ms, now_us)
     if known is None or not itinerary.legs:
-        return Plan(itinerary, award_us)
+        return BegunItinerary(itinerary, award_us)
     begins_us = leg_begins_us(known.itinerary, now_us, known.first_begin_us)
     for leg, begin_us in zip(known.itinerary.legs, begins_us, strict=True):
         if _way(leg) == _way(itinerary.legs[0]):
-            return Plan(itinerary, min(begin_us, from_bus_ms(itinerary.legs[0].end_ms, now_us)))
-    return Plan(itinerary, award_us)
+            return BegunItinerary(itinerary, min(begin_us, from_bus_ms(itinerary.legs[0].end_ms, now_us)))
+    return BegunItinerary(itinerary, award_us)
 
 
 def _way(leg: Leg) -> tuple[int, ...]:

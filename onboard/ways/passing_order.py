@@ -20,7 +20,7 @@ from onboard.contract.messages import Itinerary, Leg, Progress
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment
 from onboard.ways.occupancy import body_mm, leg_windows
-from onboard.ways.passing import TOLERANCE_US, Plan
+from onboard.ways.passing import TOLERANCE_US, BegunItinerary
 from onboard.ways.site import WaySite
 
 
@@ -82,7 +82,7 @@ class PassingOrder:
 
     # --- what is heard -----------------------------------------------------------------------------------------
 
-    def on_plan(self, plan: Plan, now_us: int) -> None:
+    def on_plan(self, plan: BegunItinerary, now_us: int) -> None:
         """A firm plan under a new version, or a released one, which has no turns."""
         node, itinerary = plan.itinerary.sender, plan.itinerary
         known = self._ways.get(node)
@@ -255,7 +255,7 @@ def _moves(itinerary: Itinerary) -> tuple[Leg, ...]:
     return tuple(leg._replace(end_ms=0) for leg in itinerary.legs if moves(leg))
 
 
-def _turns(site: WaySite, plan: Plan, now_us: int) -> Turns:
+def _turns(site: WaySite, plan: BegunItinerary, now_us: int) -> Turns:
     legs = [leg for leg in plan.itinerary.legs if leg.track in site.tracks]
     to_come = sum(moves(leg) for leg in legs)
     found: Turns = {}

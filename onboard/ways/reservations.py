@@ -10,7 +10,7 @@ from onboard.core.site import Segment
 FOREVER = 1 << 62
 
 
-class Window(NamedTuple):
+class SlotWindow(NamedTuple):
     """Occupation of one segment during ``[from_us, to_us)``."""
 
     segment: Segment
@@ -55,7 +55,7 @@ class Reservations:
         """``owner`` is an obstacle, which never gives way, until it is released."""
         self._fixed.add(owner)
 
-    def reserve(self, owner: int, windows: Iterable[Window], uses: Iterable[Use] = ()) -> None:
+    def reserve(self, owner: int, windows: Iterable[SlotWindow], uses: Iterable[Use] = ()) -> None:
         """Add windows and lift uses of ``owner`` (a node-ID). Raises ``ValueError`` where one has no length."""
         touched = self._segments.setdefault(owner, set())
         for window in windows:
@@ -108,7 +108,7 @@ class Reservations:
             found._windows[segment] = [window for window in kept if window[0] < window[1]]
         return found
 
-    def standing_in(self, owner: int, windows: Iterable[Window]) -> list[int]:
+    def standing_in(self, owner: int, windows: Iterable[SlotWindow]) -> list[int]:
         """Nodes other than ``owner`` that stand for ever where one of ``windows`` is, in order."""
         found = set()
         for window in windows:
@@ -131,7 +131,7 @@ class Reservations:
         """Uses of one lift by all but ``excluding``, sorted by begin, end and owner."""
         return [use for use in self._uses.get(lift_track, ()) if use.owner != excluding]
 
-    def conflicts(self, owner: int, windows: Iterable[Window]) -> list[tuple[Window, int]]:
+    def conflicts(self, owner: int, windows: Iterable[SlotWindow]) -> list[tuple[SlotWindow, int]]:
         """Each of ``windows`` that overlaps one of another node, with that node."""
         return [
             (window, holder)
@@ -140,7 +140,7 @@ class Reservations:
             if holder != owner and start_us < window.to_us and window.from_us < end_us
         ]
 
-    def hinders(self, owner: int, windows: Iterable[Window], now_us: int) -> bool:
+    def hinders(self, owner: int, windows: Iterable[SlotWindow], now_us: int) -> bool:
         """Whether one of ``windows`` of ``owner`` that is not over at ``now_us`` meets an obstacle."""
         if not self._fixed - {owner}:
             return False

@@ -119,7 +119,7 @@ def plan_route(
     if interval is None:
         return NoRoute(f"the start {start} is reserved by another machine", 0)
     root = _Node(0, start, interval, start_us, None, LegAction.STAND, start_us, (), _Effort(0, 0, 0))
-    return _Search(roads, departures, visits, refuges).run(root, max_expansions)
+    return _IntervalSearch(roads, departures, visits, refuges).run(root, max_expansions)
 
 
 class _Node(NamedTuple):
@@ -159,7 +159,7 @@ _Key = tuple[int, int, _Effort, int, int]
 _UNTRIED = -FOREVER
 
 
-class _Search:
+class _IntervalSearch:
     """One search.
 
     ``_tails`` holds for each phase (work, floor): whoever arrives at its visit at t ends the last visit at
@@ -313,7 +313,7 @@ class _Search:
 
 
 def _tails(roads: Roads, visits: tuple[Visit, ...]) -> list[tuple[int, int]]:
-    """For each phase the constants of ``_Search``, from the last visit backwards."""
+    """For each phase the constants of ``_IntervalSearch``, from the last visit backwards."""
     tails: list[tuple[int, int]] = []
     work_us = floor_us = 0
     after: Segment | None = None

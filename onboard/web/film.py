@@ -27,7 +27,7 @@ _BLOCK = 2048
 KEY_EVERY, MOST_KEYS = 8_192, 32
 
 
-class _State(NamedTuple):
+class _FilmState(NamedTuple):
     """Everything after so many frames."""
 
     picture: LivePicture
@@ -43,15 +43,15 @@ class Film:
         self._file: BinaryIO = TemporaryFile(prefix="onboard-web-")  # noqa: SIM115  # closed by close()
         self._channels: list[str] = []
         self._count = 0
-        self._keys: list[tuple[int, int, _State]] = []
+        self._keys: list[tuple[int, int, _FilmState]] = []
         self._every = KEY_EVERY
         self._state = self._empty()
         self._next = 0
         self._messages = 0
         self.first_us = self.last_us = 0
 
-    def _empty(self) -> _State:
-        return _State(LivePicture(self.site), Listener(self._codecs))
+    def _empty(self) -> _FilmState:
+        return _FilmState(LivePicture(self.site), Listener(self._codecs))
 
     def __enter__(self) -> Self:
         return self
@@ -101,7 +101,7 @@ class Film:
             self._every *= 2
             self._keys = [key for key in self._keys if key[0] % self._every == 0]
 
-    def _copy(self, state: _State) -> _State:
+    def _copy(self, state: _FilmState) -> _FilmState:
         """A copy that shares what never changes."""
         fixed = (self.site, self._codecs, self._codecs.fleet, self._codecs.device)
         return copy.deepcopy(state, {id(one): one for one in fixed})

@@ -11,7 +11,7 @@ from onboard.contract.codes import CallResult, Criterion, Reason, TaskPhase
 from onboard.contract.messages import Message
 from onboard.core.frame import Frame
 from onboard.core.site import Site
-from onboard.history.calls import Call
+from onboard.history.calls import CallHistory
 from onboard.history.history import Fact
 from onboard.trace.frame_bits import frame_bits
 from onboard.trace.indicators import Indicators
@@ -155,7 +155,7 @@ class LivePicture:
             return "silent"
         return self._lives.states[node].name.lower()
 
-    def call(self, record: Call) -> dict[str, Any]:
+    def call(self, record: CallHistory) -> dict[str, Any]:
         """One call with its bids; times in us of the log."""
         call, view, end = record.terms, self.view, record.end
         return {

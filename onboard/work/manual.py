@@ -42,8 +42,8 @@ class Manual:
         """A person's order; said again it is only answered again. A single step is not known here: all stays."""
         if order.manual_mode is ManualMode.STEP:
             self.by, self.number = order.sender, order.number
-            return [self.told()]
-        return self.take(order) or [self.told()]
+            return [self.report()]
+        return self.take(order) or [self.report()]
 
     def take(self, order: ManualOrder) -> list[Effect]:
         """Take an order up: what is journalled and said; nothing where it is the last one, said again."""
@@ -51,19 +51,19 @@ class Manual:
             return []
         self.mode, self.by, self.number = order.manual_mode, order.sender, order.number
         self.at_rest = False
-        return [Record(ManualRecord(self.mode, self.by, self.number)), self.told()]
+        return [Record(ManualRecord(self.mode, self.by, self.number)), self.report()]
 
     def rests(self, at_rest: bool) -> list[Effect]:
         """Note whether the machine stands and does nothing; it says so where that is news."""
         if self.is_automatic or at_rest is self.at_rest:
             return []
         self.at_rest = at_rest
-        return [self.told()]
+        return [self.report()]
 
-    def told(self) -> Effect:
+    def report(self) -> Effect:
         """What the machine says of it."""
         return Send(ManualState(self.node_id, self.number, self.mode, self.at_rest))
 
     def statement(self) -> list[Effect]:
         """What it says to whoever asks: nothing while nobody has a hand in."""
-        return [] if self.is_automatic else [self.told()]
+        return [] if self.is_automatic else [self.report()]

@@ -15,7 +15,7 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import JournalRecord
-from onboard.core.negotiation import CallTerms, Closed, NegotiationEvent
+from onboard.core.negotiation import Closed, NegotiationEvent, RequestedTerms
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.work.order_life import NEXT, OrderEvent, OrderState, WorkOrder
 
@@ -64,7 +64,7 @@ class OrderDesk(ABC, Generic[AnOrder]):
         """How the order stands, for the journal; written whenever that changes."""
 
     @abstractmethod
-    def terms(self, order: AnOrder) -> CallTerms:
+    def terms(self, order: AnOrder) -> RequestedTerms:
         """The call by which this order finds its machine."""
 
     @abstractmethod

@@ -87,6 +87,6 @@ class WorkOrder:
         return self.state in OVER
 
     @property
-    def told(self) -> str:
+    def result_name(self) -> str:
         """How it stands in the words of a counter: RECEIVED, IN_HAND, DONE or REFUSED."""
         return "RECEIVED" if self.state in (OrderState.HEARD, OrderState.CALLED) else self.state.name

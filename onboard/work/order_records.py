@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from onboard.core.journal_records import MOST_OVER, End, JournalRecord, Keep
+from onboard.core.journal_records import MOST_OVER, JournalRecord, Keep, RecordEnd
 from onboard.work.order_life import OVER, OrderState
 
 _NUMBER = ("number",)
@@ -25,7 +25,7 @@ class OrderStateRecord(JournalRecord):
     NAME = "order_state"
     RULES = (
         Keep("order_state", _NUMBER),
-        End(("order", "order_state"), _NUMBER, ("state", OVER), MOST_OVER),
+        RecordEnd(("order", "order_state"), _NUMBER, ("state", OVER), MOST_OVER),
     )
 
     number: int

@@ -40,7 +40,7 @@ class TaskEvent(Enum):
     GIVE_UP = "this machine cannot do it"
 
 
-class Answer(Enum):
+class UndertakingAnswer(Enum):
     """What is said of it."""
 
     NOTHING = "nothing"
@@ -50,26 +50,26 @@ class Answer(Enum):
 
 _UNKNOWN, _WON, _BEGUN, _OVER = TaskStanding
 #: What follows, and what is said; an event that has no line here changes nothing, and nothing is said.
-TABLE: dict[tuple[TaskStanding, TaskEvent], tuple[TaskStanding, Answer]] = {
-    (_UNKNOWN, TaskEvent.WIN): (_WON, Answer.REPORT),
-    (_UNKNOWN, TaskEvent.AWARDED_AGAIN): (_UNKNOWN, Answer.GIVES_BACK),
+TABLE: dict[tuple[TaskStanding, TaskEvent], tuple[TaskStanding, UndertakingAnswer]] = {
+    (_UNKNOWN, TaskEvent.WIN): (_WON, UndertakingAnswer.REPORT),
+    (_UNKNOWN, TaskEvent.AWARDED_AGAIN): (_UNKNOWN, UndertakingAnswer.GIVES_BACK),
     # Its giver takes back what this machine was never told of.
-    (_UNKNOWN, TaskEvent.END): (_OVER, Answer.REPORT),
-    (_WON, TaskEvent.WIN): (_WON, Answer.REPORT),
-    (_WON, TaskEvent.AWARDED_AGAIN): (_WON, Answer.REPORT),
-    (_WON, TaskEvent.CALLED): (_WON, Answer.REPORT),
-    (_WON, TaskEvent.TO_ANOTHER): (_UNKNOWN, Answer.NOTHING),
-    (_WON, TaskEvent.END): (_OVER, Answer.REPORT),
-    (_WON, TaskEvent.GIVE_UP): (_UNKNOWN, Answer.NOTHING),
-    (_BEGUN, TaskEvent.WIN): (_BEGUN, Answer.REPORT),
-    (_BEGUN, TaskEvent.AWARDED_AGAIN): (_BEGUN, Answer.REPORT),
-    (_BEGUN, TaskEvent.CALLED): (_BEGUN, Answer.REPORT),
-    (_BEGUN, TaskEvent.END): (_OVER, Answer.REPORT),
-    (_BEGUN, TaskEvent.GIVE_UP): (_UNKNOWN, Answer.NOTHING),
-    (_OVER, TaskEvent.WIN): (_OVER, Answer.REPORT),
-    (_OVER, TaskEvent.AWARDED_AGAIN): (_OVER, Answer.REPORT),
-    (_OVER, TaskEvent.CALLED): (_OVER, Answer.REPORT),
-    (_OVER, TaskEvent.END): (_OVER, Answer.REPORT),
+    (_UNKNOWN, TaskEvent.END): (_OVER, UndertakingAnswer.REPORT),
+    (_WON, TaskEvent.WIN): (_WON, UndertakingAnswer.REPORT),
+    (_WON, TaskEvent.AWARDED_AGAIN): (_WON, UndertakingAnswer.REPORT),
+    (_WON, TaskEvent.CALLED): (_WON, UndertakingAnswer.REPORT),
+    (_WON, TaskEvent.TO_ANOTHER): (_UNKNOWN, UndertakingAnswer.NOTHING),
+    (_WON, TaskEvent.END): (_OVER, UndertakingAnswer.REPORT),
+    (_WON, TaskEvent.GIVE_UP): (_UNKNOWN, UndertakingAnswer.NOTHING),
+    (_BEGUN, TaskEvent.WIN): (_BEGUN, UndertakingAnswer.REPORT),
+    (_BEGUN, TaskEvent.AWARDED_AGAIN): (_BEGUN, UndertakingAnswer.REPORT),
+    (_BEGUN, TaskEvent.CALLED): (_BEGUN, UndertakingAnswer.REPORT),
+    (_BEGUN, TaskEvent.END): (_OVER, UndertakingAnswer.REPORT),
+    (_BEGUN, TaskEvent.GIVE_UP): (_UNKNOWN, UndertakingAnswer.NOTHING),
+    (_OVER, TaskEvent.WIN): (_OVER, UndertakingAnswer.REPORT),
+    (_OVER, TaskEvent.AWARDED_AGAIN): (_OVER, UndertakingAnswer.REPORT),
+    (_OVER, TaskEvent.CALLED): (_OVER, UndertakingAnswer.REPORT),
+    (_OVER, TaskEvent.END): (_OVER, UndertakingAnswer.REPORT),
 }
 
 AWork = TypeVar("AWork")
@@ -112,10 +112,10 @@ class Undertakings(Generic[AWork]):
 
     # --- events ------------------------------------------------------------------------------------------------
 
-    def meet(self, task: Reference, event: TaskEvent, work: AWork | None = None) -> Answer:
+    def meet(self, task: Reference, event: TaskEvent, work: AWork | None = None) -> UndertakingAnswer:
         """What an event does to a task; ``work`` is what is taken on, where it is won. What is to be said of it."""
         was = self.standing(task)
-        following, answer = TABLE.get((was, event), (was, Answer.NOTHING))
+        following, answer = TABLE.get((was, event), (was, UndertakingAnswer.NOTHING))
         if following is was:
             return answer
         if following is _WON:
@@ -132,7 +132,7 @@ class Undertakings(Generic[AWork]):
         """Awards and calls for what is in hand, or was."""
         match message:
             case Award() if message.winner == self.fleet.node_id and message.result is CallResult.AWARDED:
-                if self.meet(message.task, TaskEvent.AWARDED_AGAIN) is Answer.GIVES_BACK:
+                if self.meet(message.task, TaskEvent.AWARDED_AGAIN) is UndertakingAnswer.GIVES_BACK:
                     return gives_back(self.fleet, message)
                 return [self.report(message.task)]
             case Award(result=CallResult.AWARDED | CallResult.REJECTED) if message.task in self.in_hand:
@@ -143,7 +143,7 @@ class Undertakings(Generic[AWork]):
                 return self.lose(one) if message.task not in self.in_hand else []
             case CallForProposals():
                 answer = self.meet(message.task, TaskEvent.CALLED)
-                return [self.report(message.task)] if answer is Answer.REPORT else []
+                return [self.report(message.task)] if answer is UndertakingAnswer.REPORT else []
         return []
 
     def remember(self, task: Reference) -> None:

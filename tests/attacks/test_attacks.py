@@ -7,19 +7,19 @@ from pathlib import Path
 import pytest
 
 from bus_sim.attacks.catalogue import ATTACKS
-from bus_sim.attacks.trials import Plan, run_attack
+from bus_sim.attacks.trials import TrialSettings, run_attack
 from bus_sim.cli import main
 from bus_sim.systems.car_park.demand import Arrivals
-from bus_sim.systems.orders import Orders
+from bus_sim.systems.orders import OrderArrivals
 from onboard.contract.codes import Reason
 from onboard.holon.admission import Admission
 from tests.mapd.sites import drawn, site_text
 
-PARK = Plan("small", demand=Arrivals(3, 60.0, 30.0))
-PLANS = {name: Plan(name, demand=Orders(4, 10.0)) for name in ("cell", "graph", "terminal", "turning")}
+PARK = TrialSettings("small", demand=Arrivals(3, 60.0, 30.0))
+PLANS = {name: TrialSettings(name, demand=OrderArrivals(4, 10.0)) for name in ("cell", "graph", "terminal", "turning")}
 
 
-def play(attack: str, plan: Plan, seed: int = 1) -> list[str]:
+def play(attack: str, plan: TrialSettings, seed: int = 1) -> list[str]:
     """What was not harmless, in words; nothing where all was."""
     result = run_attack(plan, (attack, seed))
     return [] if result.is_harmless else [f"{result.report.verdict.value}: {result.why()}"]
@@ -40,19 +40,19 @@ def test_other_systems_get_over_it(attack: str, site: str) -> None:
 
 def test_bids_of_machines_that_have_no_plans_to_tell_count_again_after_a_stop() -> None:
     """Who says OBSTACLE is one; robots of a graph were for ever, as they tell no itinerary, and no call had a bid."""
-    assert play("stop", replace(PLANS["graph"], demand=Orders(12, 17.0), limit_s=900.0), seed=11) == []
+    assert play("stop", replace(PLANS["graph"], demand=OrderArrivals(12, 17.0), limit_s=900.0), seed=11) == []
 
 
 def test_arms_that_were_held_in_the_middle_of_a_goal_go_on_with_it() -> None:
     """The first that was let go took the rest of its goal from one still held, which kept its own successor waiting."""
-    assert play("stop", replace(PLANS["cell"], demand=Orders(6, 20.0)), seed=4) == []
+    assert play("stop", replace(PLANS["cell"], demand=OrderArrivals(6, 20.0)), seed=4) == []
 
 
 def test_a_floor_of_robots_in_step_gets_over_it(tmp_path: Path) -> None:
     site = tmp_path / "made.toml"
     site.write_text(site_text(4, drawn(6, seed=1)))
     for attack in ("grant-away", "stop"):
-        assert play(attack, Plan(str(site))) == []
+        assert play(attack, TrialSettings(str(site))) == []
 
 
 @pytest.mark.parametrize("site", ["graph", "terminal"])

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import pytest
 
-from bus_sim.can.faults import Fault
+from bus_sim.can.faults import InjectedFault
 from tests.can.rig import Rig
 
 MakeRig = Callable[..., Rig]
@@ -14,7 +14,7 @@ MakeRig = Callable[..., Rig]
 def make_rig() -> Iterator[MakeRig]:
     rigs: list[Rig] = []
 
-    def make(bit_rate: int = 500_000, faults: Sequence[Fault] = ()) -> Rig:
+    def make(bit_rate: int = 500_000, faults: Sequence[InjectedFault] = ()) -> Rig:
         rigs.append(Rig(bit_rate, faults))
         return rigs[-1]
 

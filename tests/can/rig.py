@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Sequence
 
-from bus_sim.can.faults import Fault
+from bus_sim.can.faults import InjectedFault
 from bus_sim.can.medium import Medium
 from bus_sim.can.node import AcceptanceFilter, NodeOptions, SimulatedBus
 from bus_sim.virtual_time import VirtualTimeLoop
@@ -23,7 +23,7 @@ def ext(identifier: int, data: bytes = b"", *, remote_dlc: int | None = None) ->
 class Rig:
     """One bus; ``log`` is what a tap saw, ``heard`` and ``confirmed`` what each node was told."""
 
-    def __init__(self, bit_rate: int = 500_000, faults: Sequence[Fault] = ()) -> None:
+    def __init__(self, bit_rate: int = 500_000, faults: Sequence[InjectedFault] = ()) -> None:
         self.loop = VirtualTimeLoop()
         self.medium = Medium(self.loop, bit_rate=bit_rate, faults=faults)
         self.log: list[tuple[int, Frame, str]] = []

@@ -11,7 +11,7 @@ from bus_sim.can.error_frames import (
     CAN_ERR_PROT,
     CAN_ERR_RESTARTED,
 )
-from bus_sim.can.faults import Fault, FaultKind, parse_fault
+from bus_sim.can.faults import FaultKind, InjectedFault, parse_fault
 from bus_sim.can.medium import Medium
 from bus_sim.can.node import NodeOptions
 from bus_sim.virtual_time import VirtualTimeLoop
@@ -23,8 +23,8 @@ BIT_US = 2
 FRAME = ext(0x123456, bytes(range(8)))
 
 
-def every_frame(until_us: int | None = None, receivers: tuple[str, ...] = (), nth: int | None = None) -> Fault:
-    return Fault(FaultKind.CORRUPTION, receivers=receivers, until_us=until_us, nth=nth)
+def every_frame(until_us: int | None = None, receivers: tuple[str, ...] = (), nth: int | None = None) -> InjectedFault:
+    return InjectedFault(FaultKind.CORRUPTION, receivers=receivers, until_us=until_us, nth=nth)
 
 
 def test_a_lone_node_repeats_for_ever_becomes_passive_and_never_leaves_the_bus(rig: Rig) -> None:
@@ -141,7 +141,7 @@ def test_a_node_comes_back_by_itself_and_sends_what_it_held(make_rig: MakeRig) -
 
 
 def test_a_node_off_the_bus_hears_nothing_acknowledges_nothing_and_keeps_its_queue(make_rig: MakeRig) -> None:
-    rig = make_rig(faults=[Fault(FaultKind.CORRUPTION, id_value=1, id_mask=0xFF, until_us=20_000)])
+    rig = make_rig(faults=[InjectedFault(FaultKind.CORRUPTION, id_value=1, id_mask=0xFF, until_us=20_000)])
     a, b = rig.node("a", options=NodeOptions(restart_after_us=None)), rig.node("b")
     a.send(ext(0x101))
     rig.run(30_000)
@@ -159,7 +159,7 @@ def test_a_node_off_the_bus_hears_nothing_acknowledges_nothing_and_keeps_its_que
 
 
 def test_recovery_on_a_busy_bus_takes_128_frames(make_rig: MakeRig) -> None:
-    rig = make_rig(faults=[Fault(FaultKind.CORRUPTION, id_value=1, id_mask=0xFF, until_us=50_000)])
+    rig = make_rig(faults=[InjectedFault(FaultKind.CORRUPTION, id_value=1, id_mask=0xFF, until_us=50_000)])
     a, b = rig.node("a", options=NodeOptions(restart_after_us=None)), rig.node("b")
     rig.node("c")
     a.send(ext(0x101))

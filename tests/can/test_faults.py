@@ -1,6 +1,6 @@
 import pytest
 
-from bus_sim.can.faults import Fault, FaultKind, parse_fault
+from bus_sim.can.faults import FaultKind, InjectedFault, parse_fault
 from tests.can.conftest import MakeRig
 from tests.can.rig import Rig, ext, std
 
@@ -110,7 +110,7 @@ def test_a_fault_reads_what_it_writes(line: str) -> None:
 
 def test_the_line_means_what_it_says() -> None:
     fault = parse_fault("omission:receivers=3|4,probability=0.01,id=0x18FF0005,seed=7")
-    assert fault == Fault(
+    assert fault == InjectedFault(
         FaultKind.OMISSION,
         receivers=("3", "4"),
         probability=0.01,

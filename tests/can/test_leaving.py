@@ -1,6 +1,6 @@
 from bus_sim.can.bitstream import frame_length_bits
 from bus_sim.can.error_frames import CAN_ERR_ACK, CAN_ERR_RESTARTED
-from bus_sim.can.faults import Fault, FaultKind
+from bus_sim.can.faults import FaultKind, InjectedFault
 from bus_sim.can.node import NodeOptions
 from onboard.ports.bus import ErrorState
 from tests.can.conftest import MakeRig
@@ -59,7 +59,8 @@ def test_a_node_may_leave_before_its_start_bit_is_over(rig: Rig) -> None:
 def switched_off(make_rig: MakeRig, names: str, until_us: int = 50_000) -> Rig:
     """A bus on which the nodes of ``names`` are off, and two that are well."""
     faults = [
-        Fault(FaultKind.CORRUPTION, id_value=index, id_mask=0xFF, until_us=until_us) for index in range(len(names))
+        InjectedFault(FaultKind.CORRUPTION, id_value=index, id_mask=0xFF, until_us=until_us)
+        for index in range(len(names))
     ]
     rig = make_rig(faults=faults)
     rig.node("well")
@@ -101,7 +102,7 @@ def test_a_node_that_leaves_while_it_recovers_does_not_come_back(make_rig: MakeR
 
 
 def test_a_delayed_restart_waits_first(make_rig: MakeRig) -> None:
-    rig = make_rig(faults=[Fault(FaultKind.CORRUPTION, until_us=50_000)])
+    rig = make_rig(faults=[InjectedFault(FaultKind.CORRUPTION, until_us=50_000)])
     rig.node("b")
     rig.node("a", options=NodeOptions(restart_after_us=100_000)).send(FRAME)
     rig.run(300_000)

@@ -8,23 +8,23 @@ from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
 from bus_sim.session import play
 from bus_sim.sites import find_site
-from bus_sim.systems.cell.plant import CellPlant, Entry
+from bus_sim.systems.cell.plant import CellPlant, GoalEntry
 from bus_sim.systems.cell.view import CellView
-from bus_sim.systems.stage import Stage
+from bus_sim.systems.stage import SystemStage
 from onboard.contract.codes import KindCode
 from onboard.contract.messages import Message
 from onboard.core.site import Machine, Segment
 from onboard.systems.cell.contracts import Arm
 from onboard.systems.cell.geometry import Area, Point
 from onboard.systems.cell.robot import ArmRobot
-from onboard.systems.cell.site import Cell, Wish
+from onboard.systems.cell.site import Cell, GoalDemand
 from tests.cell.witness import ARMS, DESK, GOAL
 
 M = TypeVar("M", bound=Message)
 
 
 def cell(
-    *wishes: Wish, arms: tuple[Arm, ...] = ARMS, obstacles: tuple[Area, ...] = (), desks: tuple[int, ...] = (DESK,)
+    *goals: GoalDemand, arms: tuple[Arm, ...] = ARMS, obstacles: tuple[Area, ...] = (), desks: tuple[int, ...] = (DESK,)
 ) -> Cell:
     """A cell with these goals; by default the paper's robots, and nothing in the way."""
     site = find_site("cell")
@@ -36,7 +36,7 @@ def cell(
         machines=dict(sorted(machines.items())),
         arms={one.node_id: one for one in arms},
         obstacles=obstacles,
-        wishes=wishes or (Wish(0, GOAL.start, GOAL.end),),
+        goals=goals or (GoalDemand(0, GOAL.start, GOAL.end),),
     )
 
 
@@ -52,7 +52,7 @@ class Scene:
             if prepare is not None:
                 prepare(run)
 
-        self.played: Stage[Any] = play(site, RunOptions(limit_s=limit_s), prepare=before)
+        self.played: SystemStage[Any] = play(site, RunOptions(limit_s=limit_s), prepare=before)
 
     @property
     def plant(self) -> CellPlant:
@@ -60,7 +60,7 @@ class Scene:
         return cast("CellPlant", self.played.plant)
 
     @property
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[GoalEntry]:
         """Orders at the counters."""
         return self.plant.entries
 
@@ -81,7 +81,9 @@ class Scene:
         assert self.played.is_over
 
 
-def wish(start: tuple[float, float], end: tuple[float, float], *, at_s: float = 0, within_s: int = 0) -> Wish:
+def goal_demand(
+    start: tuple[float, float], end: tuple[float, float], *, at_s: float = 0, within_s: int = 0
+) -> GoalDemand:
     """A goal by metres and seconds."""
     one, other = (Point(round(1000 * x), round(1000 * y)) for x, y in (start, end))
-    return Wish(round(1000 * at_s), one, other, within_s * 1000)
+    return GoalDemand(round(1000 * at_s), one, other, within_s * 1000)

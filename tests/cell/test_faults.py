@@ -7,10 +7,10 @@ from bus_sim.session import play
 from onboard.contract.cell import ArmPhase, ArmProgress, GoalPath, PartAt
 from onboard.contract.messages import Bid, CallForProposals, Message, Reference
 from onboard.systems.cell.checks import RULES
-from tests.cell.playing import cell, wish
+from tests.cell.playing import cell, goal_demand
 from tests.faults.systems import judged, withstands
 
-SITE = cell(wish((10, 10), (40, 30)), wish((40, 30), (30, 5), at_s=20, within_s=600))
+SITE = cell(goal_demand((10, 10), (40, 30)), goal_demand((40, 30), (30, 5), at_s=20, within_s=600))
 
 
 @pytest.mark.parametrize("seed", range(16))

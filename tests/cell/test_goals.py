@@ -12,7 +12,7 @@ from onboard.contract.codes import OrderResult
 from onboard.contract.messages import Bid, CallForProposals, Reference, TaskReport
 from onboard.systems.cell.contracts import Goal
 from onboard.systems.cell.geometry import Area, distance_m
-from tests.cell.playing import Scene, cell, wish
+from tests.cell.playing import Scene, cell, goal_demand
 from tests.cell.witness import ARMS, DESK, arm, metres
 
 
@@ -35,8 +35,12 @@ def test_c02_a_robot_that_joins_makes_the_goal_possible() -> None:
 
 def test_c15_the_earlier_deadline_goes_first() -> None:
     one_robot = (arm(1, (0, 0, 20, 20), (1, 1)),)
-    wishes = (wish((2, 2), (18, 2)), wish((2, 6), (18, 6), at_s=6), wish((2, 4), (18, 4), at_s=7, within_s=200))
-    scene = Scene(cell(*wishes, arms=one_robot))
+    goals = (
+        goal_demand((2, 2), (18, 2)),
+        goal_demand((2, 6), (18, 6), at_s=6),
+        goal_demand((2, 4), (18, 4), at_s=7, within_s=200),
+    )
+    scene = Scene(cell(*goals, arms=one_robot))
     scene.assert_sound()
     won = {one.task.number: time_us for time_us, one in reversed(list(scene.said(TaskReport)))}
     begun_us = next(time_us for time_us, one in scene.said(PartAt) if one.aboard and one.part.number != 1)
@@ -47,14 +51,16 @@ def test_c15_the_earlier_deadline_goes_first() -> None:
 def test_c14_c15_what_cannot_be_in_time_is_declined() -> None:
     one_robot = (arm(1, (0, 0, 20, 20), (1, 1)),)
     # 17 m at 1 m/s and two grips of 2 s: 21 s at least.
-    scene = Scene(cell(wish((2, 1), (18, 1), within_s=20), wish((2, 1), (18, 1), within_s=100), arms=one_robot))
+    scene = Scene(
+        cell(goal_demand((2, 1), (18, 1), within_s=20), goal_demand((2, 1), (18, 1), within_s=100), arms=one_robot)
+    )
     scene.assert_sound()
     assert [one.result for one in scene.entries] == [OrderResult.REFUSED, OrderResult.DONE]
 
 
 def test_c16_a_bid_begins_where_the_contract_in_hand_ends() -> None:
     one_robot = (arm(1, (0, 0, 20, 20), (1, 1), unit_cost=2.0),)
-    scene = Scene(cell(wish((2, 1), (18, 1)), wish((18, 3), (2, 3), at_s=6), arms=one_robot))
+    scene = Scene(cell(goal_demand((2, 1), (18, 1)), goal_demand((18, 3), (2, 3), at_s=6), arms=one_robot))
     scene.assert_sound()
     bids = [one.cost for _, one in scene.said(Bid)]
     # From (1, 1): 1 m and 16 m at 2 a metre; then from (18, 1), not from where it is: 2 m and 16 m.
@@ -65,8 +71,13 @@ def test_c16_a_bid_begins_where_the_contract_in_hand_ends() -> None:
 
 
 def test_c17_several_goals_of_two_managers_at_once() -> None:
-    wishes = (wish((10, 10), (40, 30)), wish((12, 30), (25, 34)), wish((40, 4), (36, 32)), wish((6, 20), (10, 6)))
-    scene = Scene(cell(*wishes, desks=(DESK, 10)))
+    goals = (
+        goal_demand((10, 10), (40, 30)),
+        goal_demand((12, 30), (25, 34)),
+        goal_demand((40, 4), (36, 32)),
+        goal_demand((6, 20), (10, 6)),
+    )
+    scene = Scene(cell(*goals, desks=(DESK, 10)))
     scene.assert_sound()
     assert [one.result for one in scene.entries] == [OrderResult.DONE] * 4
     calls = [(time_us, one) for time_us, one in scene.said(CallForProposals) if one.depth == 0]
@@ -86,7 +97,7 @@ def test_c17_several_goals_of_two_managers_at_once() -> None:
 
 def test_c19_a_goal_that_cannot_be_achieved_is_told_and_nothing_moves() -> None:
     apart = (arm(1, (0, 0, 10, 10), (1, 1)), arm(2, (12, 0, 20, 10), (15, 5)))
-    scene = Scene(cell(wish((2, 2), (18, 2)), arms=apart))
+    scene = Scene(cell(goal_demand((2, 2), (18, 2)), arms=apart))
     scene.assert_sound()
     assert scene.entries[0].result is OrderResult.REFUSED
     assert scene.view.text(Reference(DESK, 1)) == "The goal can not be achieved\n"
@@ -108,7 +119,7 @@ def test_c20_the_robots_find_what_the_exhaustive_search_finds(case: int) -> None
     )[case]
     obstacles = ((), (), (tool,), ())[case]
     start, end = (((10, 10), (40, 30)), ((10, 10), (40, 30)), ((10, 10), (40, 30)), ((4, 6), (44, 32)))[case]
-    scene = Scene(cell(wish(start, end), arms=arms, obstacles=obstacles))
+    scene = Scene(cell(goal_demand(start, end), arms=arms, obstacles=obstacles))
     scene.assert_sound()
     homes = {one.node_id: one.home for one in arms}
     goal = Goal(Reference(DESK, 1), Reference(DESK, 1), metres(*start), metres(*end))

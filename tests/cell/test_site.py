@@ -37,7 +37,7 @@ def test_a_cell_is_read() -> None:
     assert (arm.area, arm.home, arm.unit_cost, arm.speed_mm_s) == (
         *(Area(0, 0, 10_000, 10_000), Point(1000, 1000), 1.5, 1000),
     )
-    assert site.obstacles == (Area(4000, 4000, 5000, 5000),) and site.wishes[0].within_ms == 60_000
+    assert site.obstacles == (Area(4000, 4000, 5000, 5000),) and site.goals[0].within_ms == 60_000
     shipped = find_site("cell")
     assert isinstance(shipped, Cell) and len(shipped.arms) == 5 and shipped.digest != site.digest
 

@@ -9,7 +9,7 @@ import pytest
 
 from onboard.config.machine import load_machine
 from onboard.config.problems import ConfigError
-from onboard.config.reader import Table
+from onboard.config.reader import TomlTable
 from onboard.config.site import parse_site
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import car_park
@@ -31,21 +31,21 @@ class Asked:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.keys: dict[str, set[str]] = defaultdict(set)
         self.bounds: dict[tuple[str, str], Bounds] = {}
-        integer, check_unknown = Table.integer, Table.check_unknown
+        integer, check_unknown = TomlTable.integer, TomlTable.check_unknown
 
-        def watched_integer(table: Table, name: str, low: int, high: int, default: int | None = None) -> int:
+        def watched_integer(table: TomlTable, name: str, low: int, high: int, default: int | None = None) -> int:
             self.bounds[section_of(table), name] = Bounds(low, high, default)
             return integer(table, name, low, high, default)
 
-        def watched_check(table: Table) -> None:
+        def watched_check(table: TomlTable) -> None:
             self.keys[section_of(table)] |= table.asked
             check_unknown(table)
 
-        monkeypatch.setattr(Table, "integer", watched_integer)
-        monkeypatch.setattr(Table, "check_unknown", watched_check)
+        monkeypatch.setattr(TomlTable, "integer", watched_integer)
+        monkeypatch.setattr(TomlTable, "check_unknown", watched_check)
 
 
-def section_of(table: Table) -> str:
+def section_of(table: TomlTable) -> str:
     if any(isinstance(part, int) for part in table.path):
         return f"[[{table.path[0]}]]"
     return "[" + ".".join("N" if str(part).isdigit() else str(part) for part in table.path) + "]"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from onboard.config.machine import Interface, load_machine
+from onboard.config.machine import BusInterface, load_machine
 from onboard.config.problems import ConfigError
 from tests.config.support import TWO_FLOORS, changed
 
@@ -40,7 +40,7 @@ def mistakes(folder: Path, text: str) -> list[str]:
 def test_a_short_file_names_machine_site_and_bus_and_the_rest_follows(folder: Path) -> None:
     config = load_machine(write(folder, MACHINE))
     assert (config.machine.node_id, config.machine.name, config.site.name) == (11, "MR1", "two")
-    assert config.fleet_bus == config.device_bus == Interface("socketcan", "can0", 500_000)
+    assert config.fleet_bus == config.device_bus == BusInterface("socketcan", "can0", 500_000)
     assert config.journal == folder / "journal-MR1"
 
 
@@ -49,9 +49,9 @@ def test_every_key_counts(folder: Path) -> None:
     text += 'receive_own_messages = true\n[device_bus]\ninterface = "kvaser"\nchannel = 1\nbitrate = 125_000\n'
     text += 'tseg1 = 5\nhost = "gateway"\ntimeout = 0.5\n'
     config = load_machine(write(folder, text))
-    assert config.fleet_bus == Interface("socketcan", "can0", 500_000, (("receive_own_messages", True),))
+    assert config.fleet_bus == BusInterface("socketcan", "can0", 500_000, (("receive_own_messages", True),))
     extra = (("host", "gateway"), ("timeout", 0.5), ("tseg1", 5))
-    assert config.device_bus == Interface("kvaser", "1", 125_000, extra)
+    assert config.device_bus == BusInterface("kvaser", "1", 125_000, extra)
     assert config.journal == folder / "state" / "journal"
 
 

@@ -9,7 +9,7 @@ from onboard.systems.car_park.site import CarPark, car_park
 from onboard.ways.occupancy import standing_segments
 from onboard.ways.reach import stranded_by
 from onboard.ways.refuges import open_refuges
-from onboard.ways.reservations import FOREVER, Reservations, Window
+from onboard.ways.reservations import FOREVER, Reservations, SlotWindow
 from onboard.ways.sipp import NoRoute, Visit, plan_route
 from onboard.ways.site import TrackKind, WaySite
 
@@ -61,7 +61,7 @@ def route(site: WaySite, robot: Machine, others: list[Segment], goals: tuple[Seg
     """Whether a robot can carry a car between two segments and end in a refuge, the others standing for ever."""
     reservations = Reservations()
     for node_id, home in enumerate(others, start=100):
-        reservations.reserve(node_id, [Window(one, 0, FOREVER) for one in standing_segments(site, home)])
+        reservations.reserve(node_id, [SlotWindow(one, 0, FOREVER) for one in standing_segments(site, home)])
     visits = tuple(Visit(goal, 20 * SECOND) for goal in goals)
     refuges = open_refuges(site, others)
     found = plan_route(site, reservations, robot.node_id, robot.home, 0, visits, refuges, 8_000)

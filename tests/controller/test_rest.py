@@ -5,18 +5,18 @@ from pathlib import Path
 import pytest
 
 from bus_sim.campaign.limits import wall_limit
-from bus_sim.campaign.report import FAILURES, Verdict
+from bus_sim.campaign.report import FAILURES, RunVerdict
 from bus_sim.campaign.trial import play
 from bus_sim.cli import main
-from bus_sim.faults.scenario import Scenario
+from bus_sim.faults.scenario import FaultScenario
 from bus_sim.run import NoWatchdog
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.virtual_time import EventLimitError, StandstillError, VirtualTimeLoop
 from onboard.controller.rest import MOST_WAKES, Rest
 
-RESTLESS = "onboard.systems.car_park.robot.Robot.next_wake"
-SCENE = Scenario("level1", 1, 600.0, Arrivals(1, 5.0, 1.0, 60.0))
+RESTLESS = "onboard.systems.car_park.robot.ParkingRobot.next_wake"
+SCENE = FaultScenario("level1", 1, 600.0, Arrivals(1, 5.0, 1.0, 60.0))
 
 
 def test_a_clock_that_goes_on_does_not_hide_that_a_machine_never_rests() -> None:
@@ -53,7 +53,7 @@ def test_a_run_ends_with_the_machine_that_does_not_rest(
 def test_a_trial_that_hangs_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(RESTLESS, lambda _: 0)
     report = play(find_site("level1"), SCENE)
-    assert report.verdict is Verdict.HUNG
+    assert report.verdict is RunVerdict.HUNG
     assert report.verdict in FAILURES
     assert report.halted[0].startswith("MR1: the machine's wakes")
 
@@ -61,7 +61,7 @@ def test_a_trial_that_hangs_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_a_trial_that_goes_on_ever_slower_runs_into_its_events(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bus_sim.campaign.trial.event_limit", lambda _: 500)
     report = play(find_site("level1"), SCENE)
-    assert (report.verdict, "500 events are over" in report.why()) == (Verdict.HUNG, True)
+    assert (report.verdict, "500 events are over" in report.why()) == (RunVerdict.HUNG, True)
     assert play(find_site("level1"), SCENE) == report, "the same on every machine"
 
 
@@ -73,7 +73,7 @@ def test_a_decision_that_never_ends_is_torn_out(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(RESTLESS, for_ever)
     monkeypatch.setattr("bus_sim.campaign.trial.wall_limit_s", lambda _: 0.2)
     report = play(find_site("level1"), SCENE)
-    assert (report.verdict, "of the wall" in report.why()) == (Verdict.HUNG, True)
+    assert (report.verdict, "of the wall" in report.why()) == (RunVerdict.HUNG, True)
 
 
 def test_a_limit_that_is_kept_leaves_no_alarm_behind() -> None:

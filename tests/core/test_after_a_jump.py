@@ -3,7 +3,7 @@
 from bus_sim.sites import find_site
 from onboard.contract.codes import KindCode, Reason
 from onboard.contract.messages import BusTime, EmergencyStop
-from onboard.holon.holding import STOP_LASTS_US, Hold
+from onboard.holon.holding import STOP_LASTS_US, HoldState
 from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 
@@ -24,13 +24,13 @@ def started() -> Holon:
 def test_an_emergency_stop_is_not_old_because_a_clock_has_jumped() -> None:
     holon = started()
     holon.receive(EmergencyStop(OPERATOR, Reason.OPERATOR), 2_000_000)
-    assert holon.holding.hold is Hold.STOPPED
+    assert holon.holding.hold is HoldState.STOPPED
     holon.wake(DAY_US)
-    assert holon.holding.hold is Hold.STOPPED
+    assert holon.holding.hold is HoldState.STOPPED
     for now_us in range(DAY_US, DAY_US + STOP_LASTS_US + 1, 1_000_000):
-        assert holon.holding.hold is Hold.STOPPED
+        assert holon.holding.hold is HoldState.STOPPED
         holon.wake(now_us)
-    assert holon.holding.hold is Hold.ACTING
+    assert holon.holding.hold is HoldState.ACTING
 
 
 def test_a_machine_that_was_started_again_has_not_heard_everybody_because_its_clock_has_jumped() -> None:

@@ -4,21 +4,21 @@ import pytest
 
 from onboard.contract.codes import Reason
 from onboard.contract.constants import NOBODY
-from onboard.holon.holding import QUIET_BEATS, STOP_LASTS_US, TWIN_BEATS, Hold, Holding, Outcome
+from onboard.holon.holding import QUIET_BEATS, STOP_LASTS_US, TWIN_BEATS, HoldResponse, HoldState, MachineHolds
 
 ME, OTHER = 11, 12
 BEAT_US = 1_000_000
 BOOT = 7
 
 
-def holding() -> Holding:
+def holding() -> MachineHolds:
     """A machine that acts and hears the bus."""
-    held = Holding(ME, BEAT_US)
+    held = MachineHolds(ME, BEAT_US)
     held.heard(0)
     return held
 
 
-def listens(held: Holding, since_us: int, until_us: int) -> list[Outcome]:
+def listens(held: MachineHolds, since_us: int, until_us: int) -> list[HoldResponse]:
     """Others are heard once in each heartbeat period, and the machine looks at the time as often."""
     outcomes = []
     for now_us in range(since_us + BEAT_US, until_us + 1, BEAT_US):
@@ -29,13 +29,13 @@ def listens(held: Holding, since_us: int, until_us: int) -> list[Outcome]:
 
 def test_a_frame_under_its_own_number_holds_it_until_the_bus_was_heard_without_one() -> None:
     held = holding()
-    assert held.own_frame(0, is_right=False) is Outcome.HOLDS
+    assert held.own_frame(0, is_right=False) is HoldResponse.HOLDS
     word = held.word(BOOT)
     assert (word.machine, word.reason, word.cause, word.needs_person, word.boot) == (
         ME, Reason.DUPLICATE_NODE_ID, ME, False, BOOT
     )  # fmt: skip
     outcomes = listens(held, 0, QUIET_BEATS * BEAT_US)
-    assert outcomes == [Outcome.NOTHING] * (QUIET_BEATS - 1) + [Outcome.COMES_BACK]
+    assert outcomes == [HoldResponse.NOTHING] * (QUIET_BEATS - 1) + [HoldResponse.COMES_BACK]
     assert not held.is_held
 
 
@@ -44,12 +44,12 @@ def test_silence_does_not_count_where_nobody_is_heard_or_nothing_of_it_is_taken(
     held.own_frame(0, is_right=False)
     for now_us in range(BEAT_US, 20 * BEAT_US, BEAT_US):
         # Its receiver may be what is broken.
-        assert held.wake(now_us) is Outcome.NOTHING
+        assert held.wake(now_us) is HoldResponse.NOTHING
     for now_us in range(20 * BEAT_US, 40 * BEAT_US, BEAT_US):
         held.heard(now_us)
         # Or its transmitter: a twin on the other half of a cut bus is not heard either.
-        assert held.wake(now_us, acknowledged=False) is Outcome.NOTHING
-    assert listens(held, 39 * BEAT_US, 42 * BEAT_US)[-1] is Outcome.COMES_BACK
+        assert held.wake(now_us, acknowledged=False) is HoldResponse.NOTHING
+    assert listens(held, 39 * BEAT_US, 42 * BEAT_US)[-1] is HoldResponse.COMES_BACK
 
 
 @pytest.mark.parametrize("is_right", [True, False])
@@ -61,10 +61,10 @@ def test_a_right_under_its_number_or_a_twin_needs_a_person(is_right: bool) -> No
         now_us += BEAT_US
         held.own_frame(now_us, is_right=False)
     assert held.why == (Reason.DUPLICATE_NODE_ID, ME, True)
-    assert set(listens(held, now_us, now_us + 100 * BEAT_US)) == {Outcome.NOTHING}
-    assert held.go(OTHER) is Outcome.NOTHING
-    assert held.go(NOBODY) is Outcome.NOTHING, "that lifts emergency stops"
-    assert held.go(ME) is Outcome.COMES_BACK
+    assert set(listens(held, now_us, now_us + 100 * BEAT_US)) == {HoldResponse.NOTHING}
+    assert held.go(OTHER) is HoldResponse.NOTHING
+    assert held.go(NOBODY) is HoldResponse.NOTHING, "that lifts emergency stops"
+    assert held.go(ME) is HoldResponse.COMES_BACK
 
 
 def test_what_a_person_must_decide_outlives_the_process() -> None:
@@ -83,15 +83,15 @@ def test_what_a_person_must_decide_outlives_the_process() -> None:
 
 def test_an_emergency_stop_ends_by_the_persons_word_or_by_its_age() -> None:
     held = holding()
-    assert held.stop(OTHER, 0) is Outcome.HOLDS
-    assert held.stop(250, 1) is Outcome.NOTHING
+    assert held.stop(OTHER, 0) is HoldResponse.HOLDS
+    assert held.stop(250, 1) is HoldResponse.NOTHING
     assert held.why == (Reason.EMERGENCY_STOP, 250, False)
-    assert held.go(250) is Outcome.NOTHING, "the other's stop holds still"
+    assert held.go(250) is HoldResponse.NOTHING, "the other's stop holds still"
     assert held.why.cause == OTHER
-    assert held.wake(STOP_LASTS_US - 1) is Outcome.NOTHING
-    assert held.wake(STOP_LASTS_US) is Outcome.GOES_ON
+    assert held.wake(STOP_LASTS_US - 1) is HoldResponse.NOTHING
+    assert held.wake(STOP_LASTS_US) is HoldResponse.GOES_ON
     held.stop(OTHER, 0)
-    assert held.go(NOBODY) is Outcome.GOES_ON
+    assert held.go(NOBODY) is HoldResponse.GOES_ON
 
 
 def test_an_emergency_stop_goes_on_where_another_hold_ends() -> None:
@@ -99,13 +99,13 @@ def test_an_emergency_stop_goes_on_where_another_hold_ends() -> None:
     held.own_frame(0, is_right=False)
     held.stop(OTHER, 0)
     assert held.why.reason is Reason.DUPLICATE_NODE_ID
-    assert listens(held, 0, QUIET_BEATS * BEAT_US)[-1] is Outcome.COMES_BACK
-    assert (held.hold, held.why.reason) == (Hold.STOPPED, Reason.EMERGENCY_STOP)
+    assert listens(held, 0, QUIET_BEATS * BEAT_US)[-1] is HoldResponse.COMES_BACK
+    assert (held.hold, held.why.reason) == (HoldState.STOPPED, Reason.EMERGENCY_STOP)
 
 
 def test_a_halted_machine_says_why_and_nothing_changes_that() -> None:
     held = holding()
-    assert held.halt(Reason.INVARIANT_BROKEN) is Outcome.ENDS
+    assert held.halt(Reason.INVARIANT_BROKEN) is HoldResponse.ENDS
     for outcome in (held.own_frame(1, is_right=True), held.stop(OTHER, 1), held.go(ME), held.wake(2)):
-        assert outcome is Outcome.NOTHING
+        assert outcome is HoldResponse.NOTHING
     assert held.why == (Reason.INVARIANT_BROKEN, NOBODY, True)

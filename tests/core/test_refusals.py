@@ -7,7 +7,7 @@ from onboard.core.behaviour import Fleet
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Negotiation
 from onboard.core.site import Segment
-from onboard.holon.rights import Rights
+from onboard.holon.rights import RightsTalk
 from onboard.holon.witness import Witness
 from onboard.work.plain import NoEstimator
 from tests.sites import one_floor
@@ -22,7 +22,7 @@ def test_a_refusal_counts_only_from_whom_i_believe_to_hold_the_token() -> None:
     negotiation = Negotiation(ME, machine.kind, SITE.timing, NoEstimator())
     fleet = Fleet(SITE, machine, tokens, mirror, negotiation)
     witness = Witness(tokens, mirror, 1, has_past=False, statements=lambda _: [])
-    hear = Rights(fleet, lambda *_: Reason.NONE, witness).handlers()[TokenRefusal]
+    hear = RightsTalk(fleet, lambda *_: Reason.NONE, witness).handlers()[TokenRefusal]
     tokens.want(KEY, 0)
     hear(TokenRefusal(OTHER, *KEY, 0, ME, Reason.MIRROR_BEHIND), 1_000)
     assert KEY not in tokens.refused

@@ -13,7 +13,7 @@ from bus_sim.systems.car_park.window import (
     EVE_US,
     HOUR_US,
     MINUTE_US,
-    Window,
+    DayWindow,
     busiest_hour,
     choose_window,
     densest,
@@ -41,7 +41,7 @@ def test_p55_the_whole_shipped_day_has_82_cars_at_52_stalls_and_holds_the_day_of
 def test_the_busiest_hour_of_the_shipped_day_is_found_from_its_events() -> None:
     whole = Demand.from_sessions(shipped=WHOLE_DAY)
     window = busiest_hour(whole)
-    assert window.told(whole) == "2019-07-24 06:34 to 07:34"
+    assert window.described(whole) == "2019-07-24 06:34 to 07:34"
     events = [time_us for stay in whole.stays for time_us in (stay.arrival_us, stay.departure_us or 0)]
 
     def busy(begin_us: int) -> int:
@@ -52,14 +52,14 @@ def test_the_busiest_hour_of_the_shipped_day_is_found_from_its_events() -> None:
 
 def test_departures_count_as_much_as_arrivals_and_the_first_of_equal_hours_wins() -> None:
     quiet_morning = demand((0, 300), (10, 310), (200, 320), (500, None))
-    assert busiest_hour(quiet_morning) == Window(261 * MINUTE_US, 261 * MINUTE_US + HOUR_US)
+    assert busiest_hour(quiet_morning) == DayWindow(261 * MINUTE_US, 261 * MINUTE_US + HOUR_US)
     assert busiest_hour(demand((30, None), (400, None))).begin_us == 0
 
 
 def test_the_two_way_hour_of_the_shipped_day_has_cars_that_come_and_cars_that_go() -> None:
     whole = Demand.from_sessions(shipped=WHOLE_DAY)
     window = two_way_hour(whole)
-    assert choose_window(whole, "two-way") == window and window.told(whole) == "2019-07-24 15:31 to 16:31"
+    assert choose_window(whole, "two-way") == window and window.described(whole) == "2019-07-24 15:31 to 16:31"
     assert sum(window.begin_us <= stay.arrival_us < window.end_us for stay in whole.stays) == 9
     assert sum(window.begin_us <= (stay.departure_us or 0) < window.end_us for stay in whole.stays) == 21
     one_way = demand((0, None), (10, None), (200, 900))
@@ -68,7 +68,7 @@ def test_the_two_way_hour_of_the_shipped_day_has_cars_that_come_and_cars_that_go
 
 def test_a_short_eve_brings_who_is_inside_and_leaves_the_window_as_it_is() -> None:
     whole = demand((0, 700), (1, 90), (2, None), (3, 130), (95, 700), (119, 125), (130, 140))
-    window = Window(120 * MINUTE_US, 180 * MINUTE_US)
+    window = DayWindow(120 * MINUTE_US, 180 * MINUTE_US)
     eve = with_short_eve(whole, window, 3)
     assert EVE_US == 3 * MINUTE_US
     arrivals = [stay.arrival_us / MINUTE_US for stay in eve.stays]
@@ -96,7 +96,7 @@ def test_an_hour_without_anybody_is_told() -> None:
 )
 def test_a_window_by_the_clock(text: str, begin_minute: int, end_minute: int) -> None:
     whole = Demand.from_sessions(shipped=WHOLE_DAY)
-    assert choose_window(whole, text) == Window(begin_minute * MINUTE_US, end_minute * MINUTE_US)
+    assert choose_window(whole, text) == DayWindow(begin_minute * MINUTE_US, end_minute * MINUTE_US)
 
 
 @pytest.mark.parametrize("text", ["", "6", "6:3", "25:00", "06:30-", "06:30-noon", "2019-07-25T7", "2019-07-23T07:00"])
@@ -112,17 +112,17 @@ def test_a_window_that_is_none_gets_one_clear_line(text: str) -> None:
 
 def test_a_window_over_midnight_tells_both_days() -> None:
     whole = Demand.from_sessions(shipped=WHOLE_DAY)
-    assert choose_window(whole, "23:30").told(whole) == "2019-07-24 23:30 to 2019-07-25 00:30"
-    assert choose_window(demand((1, None)), "00:00").told(demand()) == "00:00 to 01:00"
+    assert choose_window(whole, "23:30").described(whole) == "2019-07-24 23:30 to 2019-07-25 00:30"
+    assert choose_window(demand((1, None)), "00:00").described(demand()) == "00:00 to 01:00"
 
 
 def test_p55_the_densest_five_minutes_of_arrivals() -> None:
     found = densest(demand((0, None), (3, None), (20, 21), (22, 22.5), (24.9, None), (25, None)))
     assert found is not None
     assert (found.begin_us, found.count) == (20 * MINUTE_US, 3), "five minutes end before the car of minute 25"
-    early = densest(demand((0, None), (3, None), (20, None), (21, None), (22, None)), Window(0, 10 * MINUTE_US))
+    early = densest(demand((0, None), (3, None), (20, None), (21, None), (22, None)), DayWindow(0, 10 * MINUTE_US))
     assert early is not None and (early.begin_us, early.count) == (0, 2)
-    assert densest(demand((0, None)), Window(HOUR_US, DAY_US)) is None
+    assert densest(demand((0, None)), DayWindow(HOUR_US, DAY_US)) is None
 
 
 def test_a_range_of_days_keeps_the_cars_that_stay_over_midnight(tmp_path: Path) -> None:

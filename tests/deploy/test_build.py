@@ -22,7 +22,7 @@ from onboard.config.machine import load_machine
 from onboard.contract.codes import Reason
 from onboard.contract.messages import EmergencyStop, Halted, Heartbeat, Message
 from onboard.core.frame import Frame
-from onboard.io.endings import Ending
+from onboard.io.endings import ExitStatus
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
 from tests.tools import require_tool, run_tool
@@ -97,7 +97,7 @@ async def test_p58_the_single_file_runs_a_controller_to_its_heartbeat(archive: P
         program.terminate()
         _, said = await program.communicate()
         await server.close()
-        assert program.returncode == Ending.STOPPED, said.decode()
+        assert program.returncode == ExitStatus.STOPPED, said.decode()
         return message, held
 
     async with asyncio.timeout(DEADLINE_S):
@@ -142,7 +142,7 @@ def test_the_package_is_one_that_dpkg_unpacks_and_its_service_is_in_order(archiv
     for line in ("Restart=on-failure", "WatchdogSec=10", "Type=notify", "StartLimitIntervalSec=0"):
         assert line in service.splitlines()
     # The statuses of the program that a person must judge.
-    stays = f"RestartPreventExitStatus={Ending.MISTAKE:d} {Ending.WAITS_FOR_PERSON:d}"
+    stays = f"RestartPreventExitStatus={ExitStatus.MISTAKE:d} {ExitStatus.WAITS_FOR_PERSON:d}"
     assert stays in service.splitlines()
     assert "/var/lib/onboard/journal.ended" in service
 

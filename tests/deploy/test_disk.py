@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.image.disk import FAT32_LBA, LINUX, SIGNATURE, Part, boot_record, starts, write_disk
+from deploy.image.disk import FAT32_LBA, LINUX, SIGNATURE, DiskPartition, boot_record, starts, write_disk
 from deploy.wheels import DeployError
 
 
@@ -16,7 +16,7 @@ def table(record: bytes) -> list[tuple[int, int, int]]:
 
 
 def test_the_partitions_follow_each_other_on_whole_megabytes() -> None:
-    parts = [Part(FAT32_LBA, 3), Part(LINUX, 2), Part(LINUX, 2), Part(LINUX, 1)]
+    parts = [DiskPartition(FAT32_LBA, 3), DiskPartition(LINUX, 2), DiskPartition(LINUX, 2), DiskPartition(LINUX, 1)]
     record = boot_record(parts)
     assert len(record) == 512 and record[-2:] == b"\x55\xaa" and record[440:444] == SIGNATURE == b"ONBD"
     assert table(record) == [(12, 2048, 6144), (131, 8192, 4096), (131, 12288, 4096), (131, 16384, 2048)]
@@ -25,14 +25,17 @@ def test_the_partitions_follow_each_other_on_whole_megabytes() -> None:
 
 def test_a_fifth_partition_does_not_fit() -> None:
     with pytest.raises(ValueError, match="four partitions, not 5"):
-        boot_record([Part(LINUX, 1)] * 5)
+        boot_record([DiskPartition(LINUX, 1)] * 5)
 
 
 def test_contents_lie_where_the_table_says(tmp_path: Path) -> None:
     (tmp_path / "a").write_bytes(b"a" * (1 << 20))
     (tmp_path / "b").write_bytes(b"b" * 1000)
     disk = tmp_path / "disk"
-    write_disk([Part(FAT32_LBA, 1, tmp_path / "a"), Part(LINUX, 1), Part(LINUX, 2, tmp_path / "b")], disk)
+    write_disk(
+        [DiskPartition(FAT32_LBA, 1, tmp_path / "a"), DiskPartition(LINUX, 1), DiskPartition(LINUX, 2, tmp_path / "b")],
+        disk,
+    )
     mb = 1 << 20
     whole = disk.read_bytes()
     assert len(whole) == 5 * mb
@@ -43,4 +46,4 @@ def test_contents_lie_where_the_table_says(tmp_path: Path) -> None:
 def test_what_does_not_fit_into_its_partition_is_told(tmp_path: Path) -> None:
     (tmp_path / "root.squashfs").write_bytes(bytes((1 << 20) + 1))
     with pytest.raises(DeployError, match=r"root\.squashfs has 1048577 bytes; its partition takes 1 MiB"):
-        write_disk([Part(LINUX, 1, tmp_path / "root.squashfs")], tmp_path / "disk")
+        write_disk([DiskPartition(LINUX, 1, tmp_path / "root.squashfs")], tmp_path / "disk")

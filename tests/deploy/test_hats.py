@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from deploy.image.config_txt import merged, overlays_of
-from deploy.image.fdt import Node, read_tree, write_tree
+from deploy.image.fdt import DeviceTreeNode, read_tree, write_tree
 from deploy.image.hats import HATS
 from deploy.image.layer import FILES
 from deploy.image.trees import check_config, write_overlays
@@ -47,13 +47,13 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "board.dtb"
 
 
-def referred(root: Node, node: Node, name: str) -> list[Node]:
+def referred(root: DeviceTreeNode, node: DeviceTreeNode, name: str) -> list[DeviceTreeNode]:
     """The nodes that a property of handles names; each must be there."""
     by_handle = {one.cells("phandle")[0]: one for _, one in root.walk() if "phandle" in one.properties}
     return [by_handle[handle] for handle in node.cells(name)]
 
 
-def told(root: Node, bus: str, controller: str) -> tuple[str, int, int, int, int]:
+def told(root: DeviceTreeNode, bus: str, controller: str) -> tuple[str, int, int, int, int]:
     """Chip, select, interrupt pin, crystal and SPI clock, as the kernel's driver finds them; its pins agree."""
     node = root.at(f"{bus}/{controller}")
     (crystal,) = referred(root, node, "clocks")
@@ -65,7 +65,7 @@ def told(root: Node, bus: str, controller: str) -> tuple[str, int, int, int, int
     return node.text("compatible"), select, interrupt, hz, node.cells("spi-max-frequency")[0]
 
 
-def pins_of(root: Node, bus: str) -> list[int]:
+def pins_of(root: DeviceTreeNode, bus: str) -> list[int]:
     """The pins of a bus that is on."""
     node = root.at(bus)
     assert node.text("status") == "okay"

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from deploy.update.health import HEARTBEATS, Health, frame_of
-from deploy.update.slots import ATTEMPTS, SLOTS, STATE_BYTES, Event, Slots, after, from_block, other, to_block
+from deploy.update.slots import ATTEMPTS, SLOTS, STATE_BYTES, BoardEvent, Slots, after, from_block, other, to_block
 from onboard.contract.codes import KindCode, MachineState
 from onboard.contract.messages import Heartbeat
 from onboard.core.frame import Frame
@@ -58,33 +58,33 @@ def test_a_state_that_makes_no_sense_is_that_of_a_fresh_image(was: str, becomes:
 
 
 def test_a_system_that_never_speaks_is_started_three_times_then_the_old_one() -> None:
-    state, seen = after(Slots("a"), Event.INSTALLED, "1.1"), []
+    state, seen = after(Slots("a"), BoardEvent.INSTALLED, "1.1"), []
     for _ in range(5):
         seen.append(state.next_start)
-        state = after(state, Event.STARTED)
+        state = after(state, BoardEvent.STARTED)
     assert seen == ["b", "b", "b", "a", "a"]
-    assert after(state, Event.FELL_BACK) == Slots("a", failed="1.1")
+    assert after(state, BoardEvent.FELL_BACK) == Slots("a", failed="1.1")
 
 
-@given(st.sampled_from(SLOTS), st.lists(st.sampled_from([Event.STARTED, Event.UNHEALTHY]), max_size=8))
-def test_without_a_healthy_word_the_good_slot_stays_the_good_one(good: str, events: list[Event]) -> None:
-    state = after(Slots(good), Event.INSTALLED, "1.1")
+@given(st.sampled_from(SLOTS), st.lists(st.sampled_from([BoardEvent.STARTED, BoardEvent.UNHEALTHY]), max_size=8))
+def test_without_a_healthy_word_the_good_slot_stays_the_good_one(good: str, events: list[BoardEvent]) -> None:
+    state = after(Slots(good), BoardEvent.INSTALLED, "1.1")
     for event in events:
         state = after(state, event)
     assert state.good == good
-    assert after(state, Event.FELL_BACK).next_start == good
+    assert after(state, BoardEvent.FELL_BACK).next_start == good
 
 
 def test_what_cannot_happen_raises() -> None:
     with pytest.raises(KeyError):
-        after(Slots(), Event.HEALTHY)
+        after(Slots(), BoardEvent.HEALTHY)
 
 
 def test_the_boot_loader_counts_as_the_table_does() -> None:
     script = GRUB.read_text()
     steps = dict(re.findall(r'"\$tries" = (\d) \]; then set left=(\d)', script))
     assert {int(now): int(left) for now, left in steps.items()} == {
-        tries: after(Slots("a", "b", tries), Event.STARTED).tries for tries in range(1, ATTEMPTS + 1)
+        tries: after(Slots("a", "b", tries), BoardEvent.STARTED).tries for tries in range(1, ATTEMPTS + 1)
     }
     loaded = re.search(r"^load_env --file /slots\.env (.*)$", script, re.MULTILINE)
     assert loaded is not None

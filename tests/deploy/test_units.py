@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from deploy.package import FILES
-from onboard.io.endings import Ending
+from onboard.io.endings import ExitStatus
 from tests.tools import require_tool, run_tool
 
 UNITS = sorted(FILES.glob("*.service"))
@@ -40,7 +40,7 @@ def test_every_service_comes_back_and_none_after_a_mistake() -> None:
         assert "StartLimitIntervalSec=0" in lines, unit.name
         assert any(line in ("Restart=on-failure", "Restart=always") for line in lines), unit.name
         if unit.stem in ("onboard-gateway", "onboard-web"):
-            assert f"RestartPreventExitStatus={Ending.MISTAKE:d}" in lines
+            assert f"RestartPreventExitStatus={ExitStatus.MISTAKE:d}" in lines
 
 
 def said(folder: Path, *, ntp: str, wait_s: int = 0) -> str:

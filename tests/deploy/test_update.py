@@ -12,13 +12,13 @@ import pytest
 
 from deploy.fleet import write_fleet
 from deploy.update.__main__ import last_update, status
-from deploy.update.board import Place
+from deploy.update.board import BoardFiles
 from deploy.update.bundle import MANIFEST, write_bundle
 from deploy.update.install import install as install_telling
 from deploy.update.judge import judge
 from deploy.update.manifest import INITRD, KERNEL, ROOT, Manifest, UpdateError
 from deploy.update.signature import make_keys, public_key
-from deploy.update.slots import ATTEMPTS, Event, Slots, after
+from deploy.update.slots import ATTEMPTS, BoardEvent, Slots, after
 from tests.tools import require_tool
 
 SITE = Path(__file__).parents[2] / "bus_sim" / "sites" / "small.toml"
@@ -35,7 +35,7 @@ def secret(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def place(secret: Path, tmp_path: Path) -> Place:
+def place(secret: Path, tmp_path: Path) -> BoardFiles:
     """MR1's board of the small site: slot A runs version 1.0, slot B is empty."""
     write_fleet(SITE, tmp_path / "fleet")
     boot = tmp_path / "fleet" / "MR1"
@@ -45,7 +45,7 @@ def place(secret: Path, tmp_path: Path) -> Place:
     (tmp_path / "release.json").write_text('{"board": "arm64", "version": "1.0"}')
     (tmp_path / "update.pem").write_bytes(public_key(secret))
     devices = {slot: tmp_path / slot for slot in "ab"}
-    made = Place("a", devices, boot, tmp_path / "release.json", tmp_path / "update.pem", contextlib.nullcontext)
+    made = BoardFiles("a", devices, boot, tmp_path / "release.json", tmp_path / "update.pem", contextlib.nullcontext)
     made.keep(Slots())
     return made
 
@@ -66,27 +66,27 @@ def make(secret: Path, tmp_path: Path) -> Callable[..., Path]:
     return update
 
 
-def install(file: Path, place: Place) -> Manifest:
+def install(file: Path, place: BoardFiles) -> Manifest:
     said: list[str] = []
     manifest = install_telling(file, place, said.append)
     assert said == [f"version {manifest.version} is in order; writing it into slot b"]
     return manifest
 
 
-def image_of(place: Place) -> list[bytes]:
+def image_of(place: BoardFiles) -> list[bytes]:
     """Everything on the board that an update could change."""
     return [file.read_bytes() for file in (*place.devices.values(), *sorted(place.boot.rglob("*"))) if file.is_file()]
 
 
-def started(place: Place, slot: str, version: str) -> Place:
+def started(place: BoardFiles, slot: str, version: str) -> BoardFiles:
     """The board after its boot loader has started a slot, with the system that is in it."""
     assert place.state().next_start == slot
-    place.keep(after(place.state(), Event.STARTED))
+    place.keep(after(place.state(), BoardEvent.STARTED))
     place.release.write_text(json.dumps({"board": "arm64", "version": version}))
     return replace(place, running=slot)
 
 
-def refused(file: Path, place: Place) -> str:
+def refused(file: Path, place: BoardFiles) -> str:
     before = image_of(place)
     with pytest.raises(UpdateError) as why:
         install(file, place)
@@ -95,7 +95,7 @@ def refused(file: Path, place: Place) -> str:
     return str(why.value)
 
 
-def test_a_good_update_is_written_tried_and_stays(place: Place, make: Callable[..., Path]) -> None:
+def test_a_good_update_is_written_tried_and_stays(place: BoardFiles, make: Callable[..., Path]) -> None:
     install(make(), place)
     assert place.devices["b"].read_bytes().startswith(PARTS[ROOT]) and place.devices["a"].read_bytes()[:3] == b"old"
     assert (place.boot / "b" / KERNEL).read_bytes() == PARTS[KERNEL]
@@ -108,7 +108,7 @@ def test_a_good_update_is_written_tried_and_stays(place: Place, make: Callable[.
 
 
 def test_a_system_that_is_not_healthy_is_left_at_once_and_never_tried_again(
-    place: Place, make: Callable[..., Path]
+    place: BoardFiles, make: Callable[..., Path]
 ) -> None:
     install(make(), place)
     verdict = judge(started(place, "b", "1.1"), lambda: False)
@@ -121,7 +121,7 @@ def test_a_system_that_is_not_healthy_is_left_at_once_and_never_tried_again(
 
 
 def test_a_system_that_never_says_anything_is_started_so_often_and_no_more(
-    place: Place, make: Callable[..., Path]
+    place: BoardFiles, make: Callable[..., Path]
 ) -> None:
     install(make(), place)
     for _ in range(ATTEMPTS):
@@ -129,7 +129,7 @@ def test_a_system_that_never_says_anything_is_started_so_often_and_no_more(
     assert "did not work" in judge(started(place, "a", "1.0"), lambda: False).line
 
 
-def test_a_system_without_an_update_is_not_judged(place: Place) -> None:
+def test_a_system_without_an_update_is_not_judged(place: BoardFiles) -> None:
     before = image_of(place)
     assert judge(place, lambda: False).line == "" and image_of(place) == before
 
@@ -142,18 +142,18 @@ def test_a_system_without_an_update_is_not_judged(place: Place) -> None:
     ],
 )
 def test_an_update_that_is_not_newer_is_refused(
-    place: Place, make: Callable[..., Path], version: str, why: str
+    place: BoardFiles, make: Callable[..., Path], version: str, why: str
 ) -> None:
     assert refused(make(version), place) == why
 
 
-def test_an_update_of_another_key_is_refused(place: Place, make: Callable[..., Path], tmp_path: Path) -> None:
+def test_an_update_of_another_key_is_refused(place: BoardFiles, make: Callable[..., Path], tmp_path: Path) -> None:
     make_keys(tmp_path / "other.pem", tmp_path / "other.pub.pem")
     why = "it is not signed with the key that this system trusts"
     assert refused(make(key=tmp_path / "other.pem"), place) == why
 
 
-def test_an_update_for_another_site_or_board_is_refused(place: Place, make: Callable[..., Path]) -> None:
+def test_an_update_for_another_site_or_board_is_refused(place: BoardFiles, make: Callable[..., Path]) -> None:
     assert refused(make(site="harbour"), place) == "it is for site harbour, and this machine's is small"
     assert install(make(site="small"), place).site == "small"
     place.keep(Slots())
@@ -162,13 +162,15 @@ def test_an_update_for_another_site_or_board_is_refused(place: Place, make: Call
 
 
 @pytest.mark.parametrize("length", [0, 1, 500, 1500, 5000, 600_000, -20_000])
-def test_a_torn_file_is_refused(place: Place, make: Callable[..., Path], length: int) -> None:
+def test_a_torn_file_is_refused(place: BoardFiles, make: Callable[..., Path], length: int) -> None:
     file = make()
     file.write_bytes(file.read_bytes()[:length])
     assert refused(file, place)
 
 
-def test_a_file_that_was_changed_is_refused_wherever_the_change_is(place: Place, make: Callable[..., Path]) -> None:
+def test_a_file_that_was_changed_is_refused_wherever_the_change_is(
+    place: BoardFiles, make: Callable[..., Path]
+) -> None:
     whole = make().read_bytes()
     for needle, what in ((b'"version": "1.1"', "not signed"), (b"kernel 2", "vmlinuz"), (b"root 2", "root.squashfs")):
         changed = bytearray(whole)
@@ -179,7 +181,7 @@ def test_a_file_that_was_changed_is_refused_wherever_the_change_is(place: Place,
 
 
 def test_a_file_with_a_signed_manifest_and_missing_parts_is_refused(
-    place: Place, make: Callable[..., Path], tmp_path: Path
+    place: BoardFiles, make: Callable[..., Path], tmp_path: Path
 ) -> None:
     with tarfile.open(make()) as whole, tarfile.open(tmp_path / "part.update", "w") as part:
         for entry in whole:
@@ -190,7 +192,7 @@ def test_a_file_with_a_signed_manifest_and_missing_parts_is_refused(
     )
 
 
-def test_a_file_that_is_something_else_is_refused(place: Place, tmp_path: Path) -> None:
+def test_a_file_that_is_something_else_is_refused(place: BoardFiles, tmp_path: Path) -> None:
     (tmp_path / "cat.jpg").write_bytes(b"\xff\xd8\xff" * 5000)
     assert refused(tmp_path / "cat.jpg", place) == "it is not an update file, or not a whole one"
     with tarfile.open(tmp_path / "other.tar", "w") as other:
@@ -200,23 +202,23 @@ def test_a_file_that_is_something_else_is_refused(place: Place, tmp_path: Path) 
     assert refused(tmp_path / "other.tar", place) == "it is not an update file"
 
 
-def test_a_root_file_system_larger_than_the_slot_is_refused(place: Place, make: Callable[..., Path]) -> None:
+def test_a_root_file_system_larger_than_the_slot_is_refused(place: BoardFiles, make: Callable[..., Path]) -> None:
     why = refused(make(root=bytes(SLOT_BYTES + 1)), place)
     assert why == f"its root file system has {SLOT_BYTES + 1} bytes, and slot b takes {SLOT_BYTES}"
 
 
-def test_a_system_on_trial_takes_no_update(place: Place, make: Callable[..., Path]) -> None:
+def test_a_system_on_trial_takes_no_update(place: BoardFiles, make: Callable[..., Path]) -> None:
     install(make(), place)
     assert "is itself on trial" in refused(make("1.2"), started(place, "b", "1.1"))
 
 
-def test_an_image_without_a_key_takes_no_update(place: Place, make: Callable[..., Path]) -> None:
+def test_an_image_without_a_key_takes_no_update(place: BoardFiles, make: Callable[..., Path]) -> None:
     place.key.write_bytes(b"")
     assert refused(make(), place) == "this image was built without a key, so it takes no updates; flash the card anew"
 
 
 def test_power_that_fails_while_a_newer_update_replaces_one_that_waits_starts_the_old_system(
-    place: Place, make: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+    place: BoardFiles, make: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The slot is half written, so the loader must not try what was there before."""
     install(make(), place)
@@ -231,7 +233,7 @@ def test_power_that_fails_while_a_newer_update_replaces_one_that_waits_starts_th
 
 
 def test_a_medium_that_does_not_give_back_what_was_written_is_told(
-    place: Place, make: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+    place: BoardFiles, make: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("deploy.update.install._overwrite", lambda *_: None)
     with pytest.raises(UpdateError, match="the medium has failed"):
@@ -248,7 +250,7 @@ def test_of_several_files_on_a_stick_the_last_is_taken(tmp_path: Path) -> None:
 
 
 def test_a_board_without_a_valid_machine_file_takes_updates_for_any_site_only(
-    place: Place, make: Callable[..., Path]
+    place: BoardFiles, make: Callable[..., Path]
 ) -> None:
     (place.boot / "machine.toml").write_text("nonsense")
     assert refused(make(site="small"), place) == "it is for site small, and this machine's is not known"

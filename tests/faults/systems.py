@@ -5,32 +5,31 @@ from pathlib import Path
 
 import bus_sim
 from bus_sim.campaign.profiles import draw_faults
-from bus_sim.campaign.report import Report, Verdict
+from bus_sim.campaign.report import RunVerdict, TrialReport
 from bus_sim.campaign.trial import play
-from bus_sim.faults.scenario import Scenario
+from bus_sim.faults.scenario import FaultScenario
 from onboard.contract.messages import Message
 from onboard.core.site import Site
-from onboard.trace.check.checks import Checks
-from onboard.trace.check.checks import Verdict as CheckVerdict
+from onboard.trace.check.checks import Checks, LogVerdict
 from onboard.trace.check.systems import rules_for
 
 #: Plants that ship for import.
 PLANTS = Path(bus_sim.__file__).parent / "data" / "plants"
 
 
-def withstands(site: Site, seed: int, span_s: tuple[float, float], limit_s: float) -> Report:
+def withstands(site: Site, seed: int, span_s: tuple[float, float], limit_s: float) -> TrialReport:
     """Play the site's own orders under faults of the bus or crashes, turn and turn about, begun in a span of time.
 
     Nothing unsafe happens, nobody halts, every order is carried out, and all mirrors are equal in the end.
     """
     faults = draw_faults(("bus", "crash")[seed % 2], seed, site, span_s)
-    report = play(site, Scenario(site.name, seed, limit_s, faults=faults))
-    assert report.verdict is Verdict.SERVED, (report.why(), [str(fault) for fault in faults])
+    report = play(site, FaultScenario(site.name, seed, limit_s, faults=faults))
+    assert report.verdict is RunVerdict.SERVED, (report.why(), [str(fault) for fault in faults])
     assert report.halted == ()
     return report
 
 
-def judged(site: Site, messages: Iterable[tuple[int, Message]]) -> CheckVerdict:
+def judged(site: Site, messages: Iterable[tuple[int, Message]]) -> LogVerdict:
     """What the rules of the site's system say to messages of its fleet bus, each with its time in us."""
     checks = Checks(site, rules=rules_for(site))
     for time_us, message in messages:

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from bus_sim.campaign.profiles import draw_faults
-from bus_sim.campaign.report import FAILURES, Report, Verdict
-from bus_sim.campaign.runner import Plan, Result, run_campaign, run_seed
+from bus_sim.campaign.report import FAILURES, RunVerdict, TrialReport
+from bus_sim.campaign.runner import CampaignSettings, TrialResult, run_campaign, run_seed
 from bus_sim.campaign.table import lines, to_json
 from bus_sim.campaign.trial import play
 from bus_sim.cli import main
 from bus_sim.faults.injection import parse_injection
-from bus_sim.faults.scenario import Scenario, load_scenario
+from bus_sim.faults.scenario import FaultScenario, load_scenario
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Arrivals
 from onboard.core.site import Site
@@ -32,15 +32,15 @@ def test_a_site_withstands_its_bus(name: str, seed: int) -> None:
     """Safe for the oracle and for the checkers; nothing stands still, and all mirrors agree in the end."""
     site = find_site(name)
     arrivals = Arrivals(CAMPAIGNS[name], 60.0, 20.0, 100.0)
-    report = play(site, Scenario(name, seed, 3_600.0, arrivals, draw_faults("bus", seed, site)))
+    report = play(site, FaultScenario(name, seed, 3_600.0, arrivals, draw_faults("bus", seed, site)))
     assert (report.violations, report.halted, report.error, report.waiting) == ((), (), "", 0)
     assert (report.stalls, report.is_apart) == ((), False)
 
 
 @pytest.mark.parametrize("name", CAMPAIGNS)
 def test_without_faults_no_checker_finds_anything(name: str) -> None:
-    report = play(find_site(name), Scenario(name, 3, 3_600.0, Arrivals(6, 60.0, 20.0, 100.0)))
-    assert (report.verdict, report.violations, report.stalls, report.told) == (Verdict.SERVED, (), (), 0)
+    report = play(find_site(name), FaultScenario(name, 3, 3_600.0, Arrivals(6, 60.0, 20.0, 100.0)))
+    assert (report.verdict, report.violations, report.stalls, report.told) == (RunVerdict.SERVED, (), (), 0)
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_what_a_campaign_once_found_does_not_come_back(name: str) -> None:
 
 
 def test_a_seed_plays_the_same_in_every_process() -> None:
-    plan = Plan("small", "bus", 3_600.0, Arrivals(cars=1))
+    plan = CampaignSettings("small", "bus", 3_600.0, Arrivals(cars=1))
     here = {result.seed: result.report for result in run_campaign(plan, [1, 2], 1)}
     there = {result.seed: result.report for result in run_campaign(plan, [2, 1], 2)}
     assert here == there
@@ -71,8 +71,8 @@ def test_a_failure_is_shrunk_and_kept_with_its_trace(tmp_path: Path, monkeypatch
         for text in ("burst:at_s=5", "actuator_stuck:target=IOC1,at_s=1,for_s=3000", "drift:target=MR1,at_s=9")
     )
     monkeypatch.setattr("bus_sim.campaign.runner.draw_faults", lambda *_: faults)
-    result = run_seed(Plan("small", "all", 200.0, Arrivals(cars=1), tmp_path), 3)
-    assert result.report.verdict is Verdict.NOT_SERVED
+    result = run_seed(CampaignSettings("small", "all", 200.0, Arrivals(cars=1), tmp_path), 3)
+    assert result.report.verdict is RunVerdict.NOT_SERVED
     assert result.shrunk is not None
     assert result.shrunk.faults == faults[1:2]
     kept, _ = load_scenario(tmp_path / "small-all-3.toml")
@@ -81,16 +81,16 @@ def test_a_failure_is_shrunk_and_kept_with_its_trace(tmp_path: Path, monkeypatch
 
 
 def test_the_table_counts_a_run_under_every_kind_that_it_had() -> None:
-    scenario = Scenario("small", 1, faults=(parse_injection("burst:at_s=5"), parse_injection("burst:at_s=9")))
-    good = Report(scenario, Verdict.SERVED)
-    bad = replace(good, verdict=Verdict.VIOLATION, violations=("5 s: two cars are in one place",))
-    results = [Result(1, good), Result(2, bad, scenario, ("x.toml",))]
+    scenario = FaultScenario("small", 1, faults=(parse_injection("burst:at_s=5"), parse_injection("burst:at_s=9")))
+    good = TrialReport(scenario, RunVerdict.SERVED)
+    bad = replace(good, verdict=RunVerdict.VIOLATION, violations=("5 s: two cars are in one place",))
+    results = [TrialResult(1, good), TrialResult(2, bad, scenario, ("x.toml",))]
     text = lines(results)
     row = next(line for line in text if line.startswith("burst")).split()
     assert row == ["burst", "4", "1", *["."] * 10, "1"]
     assert any(line.startswith("2 runs, ") for line in text)
     assert "seed 2: VIOLATION: 5 s: two cars are in one place" in text
-    assert to_json(Plan("small", "bus"), results)["verdicts"] == {"served": 1, "VIOLATION": 1}
+    assert to_json(CampaignSettings("small", "bus"), results)["verdicts"] == {"served": 1, "VIOLATION": 1}
 
 
 def test_the_command_tells_and_answers_by_its_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -106,16 +106,16 @@ def test_the_command_tells_and_answers_by_its_status(tmp_path: Path, capsys: pyt
 def test_of_a_run_that_broke_off_only_what_was_before_is_played_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """A day that goes wrong in its first hour costs the shrinking no days."""
     faults = tuple(parse_injection(f"burst:at_s={at_s}") for at_s in (100, 200, 3_000, 4_000, 80_000))
-    played: list[Scenario] = []
+    played: list[FaultScenario] = []
 
-    def broken(site: Site, scenario: Scenario, **_: object) -> Report:
+    def broken(site: Site, scenario: FaultScenario, **_: object) -> TrialReport:
         played.append(scenario)
         is_bad = faults[1] in scenario.faults
-        return Report(scenario, Verdict.VIOLATION if is_bad else Verdict.SERVED, simulated_s=3_500.0)
+        return TrialReport(scenario, RunVerdict.VIOLATION if is_bad else RunVerdict.SERVED, simulated_s=3_500.0)
 
     monkeypatch.setattr("bus_sim.campaign.runner.play", broken)
     monkeypatch.setattr("bus_sim.campaign.runner.draw_faults", lambda *_: faults)
-    result = run_seed(Plan("small", "bus", 86_400.0, has_baseline=False), 1)
+    result = run_seed(CampaignSettings("small", "bus", 86_400.0, has_baseline=False), 1)
     assert [one.limit_s for one in played] == [86_400.0, *[4_100] * (len(played) - 1)]
     assert played[1].faults == faults[:3]
     assert result.shrunk is not None and result.shrunk.faults == faults[1:2]
@@ -134,13 +134,13 @@ def test_long_runs_bring_customers_and_faults_at_a_rate(tmp_path: Path) -> None:
 def test_without_a_baseline_each_seed_is_played_once(monkeypatch: pytest.MonkeyPatch) -> None:
     played: list[int] = []
 
-    def counted(site: Site, scenario: Scenario, **_: object) -> Report:
+    def counted(site: Site, scenario: FaultScenario, **_: object) -> TrialReport:
         played.append(len(scenario.faults))
-        return Report(scenario, Verdict.SERVED, longest_wait_s=500.0)
+        return TrialReport(scenario, RunVerdict.SERVED, longest_wait_s=500.0)
 
     monkeypatch.setattr("bus_sim.campaign.runner.play", counted)
     for has_baseline, profile in ((True, "bus"), (False, "bus"), (True, "none"), (False, "none")):
-        run_seed(Plan("small", profile, has_baseline=has_baseline), 1)
+        run_seed(CampaignSettings("small", profile, has_baseline=has_baseline), 1)
     faults = played[1]
     assert faults > 0 and played == [0, faults, faults, 0, 0]
 

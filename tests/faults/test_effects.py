@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import pytest
 
-from bus_sim.systems.car_park.plant.customer import Outcome, State
+from bus_sim.systems.car_park.plant.customer import CustomerState, VisitOutcome
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import DeskInput, DoorName, DoorPosition, MachineState, Reason
 from onboard.contract.messages import DeskEvent, DriveOrder, DriveState, Halted, Heartbeat
@@ -311,15 +311,15 @@ def test_a_drive_can_stop_halfway() -> None:
 # --- people ----------------------------------------------------------------------------------------------------
 
 
-def _customer(seen: Seen) -> tuple[State, Outcome]:
+def _customer(seen: Seen) -> tuple[CustomerState, VisitOutcome]:
     customer = seen.simulation.plant.street.customers[0]
     return customer.state, customer.visit.outcome
 
 
 def test_who_has_lost_the_ticket_stands_at_the_desk() -> None:
     seen = watch("lost_ticket:car=1", seconds=600, leave_s=200)
-    assert _customer(seen) == (State.AT_DESK, Outcome.STAYING)
-    assert _customer(watch(seconds=600, leave_s=200)) == (State.GONE, Outcome.SERVED)
+    assert _customer(seen) == (CustomerState.AT_DESK, VisitOutcome.STAYING)
+    assert _customer(watch(seconds=600, leave_s=200)) == (CustomerState.GONE, VisitOutcome.SERVED)
 
 
 def test_the_key_can_be_pressed_again_and_again() -> None:
@@ -330,18 +330,21 @@ def test_the_key_can_be_pressed_again_and_again() -> None:
 
 def test_a_customer_can_cancel() -> None:
     state, _ = _customer(watch("cancel:car=1,at_s=300", seconds=320))
-    assert state is not State.PARKED
-    assert _customer(watch(seconds=320))[0] is State.PARKED
+    assert state is not CustomerState.PARKED
+    assert _customer(watch(seconds=320))[0] is CustomerState.PARKED
 
 
 def test_a_car_can_stay_in_the_compartment_for_long() -> None:
     seen = watch("linger:car=1,for_s=400", seconds=500, leave_s=200)
-    assert _customer(seen)[0] is State.DRIVING_OUT
-    assert _customer(watch(seconds=500, leave_s=200))[0] is State.GONE
+    assert _customer(seen)[0] is CustomerState.DRIVING_OUT
+    assert _customer(watch(seconds=500, leave_s=200))[0] is CustomerState.GONE
 
 
 def test_a_car_that_is_too_long_is_refused() -> None:
-    assert _customer(watch("oversize:car=1,length_mm=7000", seconds=120)) == (State.GONE, Outcome.TOO_LARGE)
+    assert _customer(watch("oversize:car=1,length_mm=7000", seconds=120)) == (
+        CustomerState.GONE,
+        VisitOutcome.TOO_LARGE,
+    )
 
 
 def test_a_door_is_forced_when_both_are_locked() -> None:

@@ -6,11 +6,11 @@ from functools import partial
 import pytest
 
 from bus_sim.campaign.engine import on_cores, on_dask
-from bus_sim.campaign.runner import Plan, run_seed
+from bus_sim.campaign.runner import CampaignSettings, run_seed
 from bus_sim.cli import main
 from bus_sim.systems.car_park.demand import Arrivals
 
-PLAN = Plan("level1", "bus", 3_600.0, Arrivals(cars=1))
+PLAN = CampaignSettings("level1", "bus", 3_600.0, Arrivals(cars=1))
 
 
 def test_a_campaign_over_a_scheduler_comes_to_the_same() -> None:

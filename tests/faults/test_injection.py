@@ -3,7 +3,7 @@
 import pytest
 
 from bus_sim.campaign.profiles import PROFILES, draw_at_rate, draw_faults
-from bus_sim.can.faults import Fault
+from bus_sim.can.faults import InjectedFault
 from bus_sim.faults.arm import actions_for, check_targets
 from bus_sim.faults.bus import frame_faults
 from bus_sim.faults.injection import Injection, parse_injection
@@ -59,7 +59,7 @@ def test_every_kind_of_the_table_does_something() -> None:
 
 
 def test_frame_faults_keep_their_own_settings() -> None:
-    assert isinstance(parse_injection("omission:receivers=11,probability=0.5"), Fault)
+    assert isinstance(parse_injection("omission:receivers=11,probability=0.5"), InjectedFault)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from bus_sim.campaign.ledger import Ledger, state
-from bus_sim.campaign.report import Verdict
+from bus_sim.campaign.report import RunVerdict
 from bus_sim.cli import main
 from bus_sim.demand import DemandError
 
@@ -29,7 +29,7 @@ def test_a_campaign_goes_on_where_its_file_ends(
 
 def test_results_of_another_state_or_campaign_do_not_count(tmp_path: Path) -> None:
     path = tmp_path / "all.jsonl"
-    Ledger.read(path, "one").add(7, Verdict.SERVED, "")
+    Ledger.read(path, "one").add(7, RunVerdict.SERVED, "")
     path.write_text(path.read_text() + path.read_text().replace(state(), "old"))
     assert Ledger.read(path, "other").open_of([7]) == [7]
     ledger = Ledger.read(path, "one")
@@ -38,7 +38,7 @@ def test_results_of_another_state_or_campaign_do_not_count(tmp_path: Path) -> No
 
 def test_a_failure_of_before_still_fails_the_whole(tmp_path: Path) -> None:
     path = tmp_path / "all.jsonl"
-    Ledger.read(path, "one").add(7, Verdict.HUNG, "why")
+    Ledger.read(path, "one").add(7, RunVerdict.HUNG, "why")
     ledger = Ledger.read(path, "one")
     assert ledger.has_failed
     assert any("7: hung: why" in line for line in ledger.lines())

@@ -3,7 +3,7 @@
 import pytest
 
 from bus_sim.campaign.points import reference
-from bus_sim.campaign.trial import Verdict, play
+from bus_sim.campaign.trial import RunVerdict, play
 from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from tests.faults.world import watch
@@ -17,7 +17,7 @@ DEAF = {"IOC1": (37, 61, 133, 165, 181, 189), "MR1": (45, 69, 149, 173)}
 def test_an_order_that_no_actuator_heard_is_said_again(name: str, at_s: int) -> None:
     fault = parse_injection(f"actuator_stuck:target={name},at_s={at_s},for_s=8")
     report = play(SITE, reference("level1", 1_200.0).with_faults([fault]))
-    assert (report.verdict, report.served) == (Verdict.SERVED, 1), report.why()
+    assert (report.verdict, report.served) == (RunVerdict.SERVED, 1), report.why()
 
 
 def test_a_ticket_comes_late_and_once_where_the_desk_was_deaf() -> None:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from bus_sim.campaign.points import Counts, Single, count, points, reference
-from bus_sim.campaign.report import Verdict
-from bus_sim.campaign.runner import Plan, Point, run_point
-from bus_sim.can.faults import Fault
+from bus_sim.campaign.points import SceneCounts, Single, count, points, reference
+from bus_sim.campaign.report import RunVerdict
+from bus_sim.campaign.runner import CampaignSettings, FaultPoint, run_point
+from bus_sim.can.faults import InjectedFault
 from bus_sim.cli import main
 from bus_sim.faults.injection import AnyFault, Injection, parse_injection
 from bus_sim.faults.journals import HARMS
@@ -19,7 +19,7 @@ SITE = "level1"
 
 
 @cache
-def counts() -> Counts:
+def counts() -> SceneCounts:
     return count(find_site(SITE), reference(SITE, 3_600.0))
 
 
@@ -28,7 +28,7 @@ def every(single: Single) -> list[AnyFault]:
 
 
 def test_each_frame_is_lost_once_at_each_of_its_receivers() -> None:
-    omissions = [one for one in every(Single.OMISSION) if isinstance(one, Fault)]
+    omissions = [one for one in every(Single.OMISSION) if isinstance(one, InjectedFault)]
     assert len(omissions) == len(counts().fleet_senders), "two machines: one receiver a frame"
     assert [one.nth for one in omissions] == list(range(1, len(omissions) + 1))
     assert all(one.receivers != (sender,) for one, sender in zip(omissions, counts().fleet_senders, strict=True))
@@ -47,17 +47,17 @@ def test_each_machine_is_killed_at_each_frame_and_around_each_journal_write() ->
 def test_a_sample_of_single_frames_lost_or_doubled_costs_nobody_the_car(single: Single) -> None:
     # Of the last frames the run hardly shows the effect; they are in the whole, not in the sample.
     chosen = random.Random(5).sample(list(enumerate(every(single)[:400], start=1)), 25)
-    plan = Plan(SITE, single, 3_600.0, usual_wait_s=counts().longest_wait_s)
+    plan = CampaignSettings(SITE, single, 3_600.0, usual_wait_s=counts().longest_wait_s)
     for number, fault in chosen:
-        report = run_point(plan, Point(number, fault)).report
+        report = run_point(plan, FaultPoint(number, fault)).report
         assert (report.violations, report.error, report.waiting) == ((), "", 0), str(fault)
 
 
 def test_a_point_that_fails_is_kept_and_can_be_played_again(tmp_path: Path) -> None:
-    plan = Plan(SITE, "crash", 200.0, out=tmp_path)
+    plan = CampaignSettings(SITE, "crash", 200.0, out=tmp_path)
     fault = parse_injection("actuator_stuck:target=IOC1,at_s=1,for_s=3000")
-    result = run_point(plan, Point(7, fault))
-    assert result.report.verdict is Verdict.NOT_SERVED
+    result = run_point(plan, FaultPoint(7, fault))
+    assert result.report.verdict is RunVerdict.NOT_SERVED
     assert (tmp_path / "level1-crash-7.log").stat().st_size > 0
     assert main(["run", "--scenario", str(tmp_path / "level1-crash-7.toml"), "--trace", str(tmp_path / "t.log")]) == 1
 
@@ -89,13 +89,13 @@ def test_every_write_of_every_machine_is_a_point_for_every_harm_to_its_journal()
 def test_what_a_medium_loses_at_the_end_costs_nobody_the_car(harm: str) -> None:
     durable = "no" if harm == "torn" else "yes"
     fault = parse_injection(f"crash:target=MR1,at_s=0,restart_s=5,write=24,durable={durable},journal={harm}")
-    report = run_point(Plan(SITE, "journal", 3_600.0), Point(1, fault)).report
-    assert report.verdict is Verdict.SERVED, report.why()
+    report = run_point(CampaignSettings(SITE, "journal", 3_600.0), FaultPoint(1, fault)).report
+    assert report.verdict is RunVerdict.SERVED, report.why()
 
 
 @pytest.mark.parametrize("harm", ["cut,entries=45", "unsealed", "foreign"])
 def test_a_machine_that_cannot_rely_on_its_journal_holds_and_is_told_of(harm: str) -> None:
     fault = parse_injection(f"crash:target=MR1,at_s=0,restart_s=5,write=46,durable=yes,journal={harm}")
-    report = run_point(Plan(SITE, "journal", 3_600.0), Point(1, fault)).report
-    assert report.verdict is Verdict.HELD, report.why()
+    report = run_point(CampaignSettings(SITE, "journal", 3_600.0), FaultPoint(1, fault)).report
+    assert report.verdict is RunVerdict.HELD, report.why()
     assert report.halted == (), "it lives, and comes back by a person's word"

@@ -6,7 +6,7 @@ import pytest
 
 from bus_sim.cli import main
 from bus_sim.faults.injection import parse_injection
-from bus_sim.faults.scenario import Scenario, load_scenario
+from bus_sim.faults.scenario import FaultScenario, load_scenario
 from bus_sim.systems.car_park.demand import Arrivals
 from onboard.config.problems import ConfigError
 
@@ -17,7 +17,7 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
         parse_injection("omission:receivers=11|12,probability=0.25,id=0x100:0x7F0"),
         parse_injection("partition:members=MR1|ER1,at_s=3,for_s=2.5"),
     )
-    scenario = Scenario("small", 7, 3600.0, Arrivals(3, 100.0, 20.0, 60.0), faults)
+    scenario = FaultScenario("small", 7, 3600.0, Arrivals(3, 100.0, 20.0, 60.0), faults)
     path = tmp_path / "one.toml"
     path.write_text(scenario.to_toml("found by chance"), encoding="utf-8")
     read, site = load_scenario(path)
@@ -75,7 +75,9 @@ def test_options_that_the_file_decides_are_refused(tmp_path: Path, capsys: pytes
 
 def test_a_scenario_is_played_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, trace, figures = tmp_path / "one.toml", tmp_path / "one.log", tmp_path / "one.json"
-    text = Scenario("small", 1, 900.0, Arrivals(cars=1), (parse_injection("lossy:receivers=MR1,at_s=5"),)).to_toml()
+    text = FaultScenario(
+        "small", 1, 900.0, Arrivals(cars=1), (parse_injection("lossy:receivers=MR1,at_s=5"),)
+    ).to_toml()
     path.write_text(text, encoding="utf-8")
     assert main(["run", "--scenario", str(path), "--trace", str(trace), "--json", str(figures)]) == 0
     told = capsys.readouterr().out

@@ -7,12 +7,17 @@ import pytest
 from bus_sim.campaign.strangers import StrangerPlan, play_pair
 from bus_sim.cli import main
 from bus_sim.sites import find_site
-from bus_sim.systems.orders import Orders
+from bus_sim.systems.orders import OrderArrivals
 from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.stranger import Stranger
 from tests.mapd.sites import site_text
 
-ORDERS = {"graph": Orders(3, 20.0), "terminal": Orders(2, 30.0), "cell": Orders(3, 20.0), "turning": Orders(2, 30.0)}
+ORDERS = {
+    "graph": OrderArrivals(3, 20.0),
+    "terminal": OrderArrivals(2, 30.0),
+    "cell": OrderArrivals(3, 20.0),
+    "turning": OrderArrivals(2, 30.0),
+}
 
 
 @pytest.mark.parametrize("how", list(Stranger))

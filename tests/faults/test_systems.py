@@ -7,17 +7,17 @@ from typing import Any
 import pytest
 
 from bus_sim.campaign.profiles import draw_at_rate, draw_faults, kinds_for
-from bus_sim.campaign.report import Verdict
-from bus_sim.campaign.runner import Plan, run_seed
+from bus_sim.campaign.report import RunVerdict
+from bus_sim.campaign.runner import CampaignSettings, run_seed
 from bus_sim.campaign.trial import play
 from bus_sim.cli import main
 from bus_sim.faults.injection import parse_injection
-from bus_sim.faults.scenario import Scenario, load_scenario
+from bus_sim.faults.scenario import FaultScenario, load_scenario
 from bus_sim.sites import find_site
 from bus_sim.systems.mapd.importers.command import import_files
 from bus_sim.systems.mapd.importers.draft import site_text
-from bus_sim.systems.mapd.importers.mapf import Wanted
-from bus_sim.systems.orders import DRAWN, OrderedSystem, Orders
+from bus_sim.systems.mapd.importers.mapf import DrawnDemand
+from bus_sim.systems.orders import DRAWN, OrderArrivals, OrderedSystem
 from bus_sim.systems.registry import simulated_names, simulated_of
 from onboard.core.site import Site
 from onboard.systems.registry import system_names
@@ -30,7 +30,7 @@ SHIPPED = ("cell", "graph", "terminal", "turning")
 def hotel(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The file of an imported plant."""
     path = tmp_path_factory.mktemp("hotel") / "hotel.toml"
-    path.write_text(site_text(import_files([PLANTS / "hotel.building.yaml"], Wanted(tasks=3, seed=7))), "utf-8")
+    path.write_text(site_text(import_files([PLANTS / "hotel.building.yaml"], DrawnDemand(tasks=3, seed=7))), "utf-8")
     return str(path)
 
 
@@ -49,12 +49,12 @@ def test_every_system_of_the_boards_can_be_simulated() -> None:
 def test_a_seed_draws_orders_of_its_own_and_they_are_carried_out(name: str, hotel: str) -> None:
     site = find_site(hotel if name == "hotel" else name)
     system = ordered(site)
-    orders = Orders(3, system.most(site).apart_s)
+    orders = OrderArrivals(3, system.most(site).apart_s)
     drawn = [system.with_orders(site, orders, seed) for seed in (1, 1, 2)]
     assert drawn[0] == drawn[1] != drawn[2]
-    assert system.with_orders(site, Orders(0, 1.0), 1) is site
-    report = play(site, Scenario(site.name, 1, 4 * 3_600.0, demand=orders))
-    assert report.verdict is Verdict.SERVED, report.why()
+    assert system.with_orders(site, OrderArrivals(0, 1.0), 1) is site
+    report = play(site, FaultScenario(site.name, 1, 4 * 3_600.0, demand=orders))
+    assert report.verdict is RunVerdict.SERVED, report.why()
     assert report.served >= 3 and report.waiting == 0
     assert report.simulated_s < 3 * system.span_s(drawn[0])[1]
 
@@ -62,7 +62,7 @@ def test_a_seed_draws_orders_of_its_own_and_they_are_carried_out(name: str, hote
 @pytest.mark.parametrize("name", SHIPPED)
 def test_faults_strike_while_orders_are_carried_out(name: str) -> None:
     system = ordered(find_site(name))
-    site = system.with_orders(find_site(name), Orders(4, 30.0), 1)
+    site = system.with_orders(find_site(name), OrderArrivals(4, 30.0), 1)
     first_s, last_s = system.span_s(site)
     for profile in ("bus", "crash", "all"):
         assert kinds_for(profile, site).keys() <= DRAWN
@@ -100,10 +100,10 @@ def test_a_failure_is_shrunk_kept_and_played_again(
         for text in ("burst:at_s=14", "crash:target=OD,at_s=16,restart=no", "drift:target=R1,at_s=9")
     )
     monkeypatch.setattr("bus_sim.campaign.runner.draw_faults", lambda *_: faults)
-    result = run_seed(Plan("graph", "all", 120.0, out=tmp_path, demand=Orders(2, 5.0)), 3)
-    assert result.report.verdict is Verdict.NOT_SERVED
+    result = run_seed(CampaignSettings("graph", "all", 120.0, out=tmp_path, demand=OrderArrivals(2, 5.0)), 3)
+    assert result.report.verdict is RunVerdict.NOT_SERVED
     kept, site = load_scenario(tmp_path / "graph-all-3.toml")
-    assert kept == result.shrunk and kept.faults == faults[1:2] and kept.demand == Orders(2, 5.0)
+    assert kept == result.shrunk and kept.faults == faults[1:2] and kept.demand == OrderArrivals(2, 5.0)
     assert play(site, kept).waiting == result.report.waiting
     trace = tmp_path / "again.log"
     assert main(["run", "--scenario", str(tmp_path / "graph-all-3.toml"), "--trace", str(trace)]) == 1

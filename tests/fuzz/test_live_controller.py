@@ -73,5 +73,5 @@ def test_an_exception_in_a_controller_is_seen(monkeypatch: pytest.MonkeyPatch) -
 
 def test_a_controller_that_wakes_for_ever_at_one_moment_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     fuzzer = Fuzzer(find_site("small"), find_site("small").machine("MR1"))
-    monkeypatch.setattr("onboard.systems.car_park.robot.Robot.next_wake", lambda _: 0)
+    monkeypatch.setattr("onboard.systems.car_park.robot.ParkingRobot.next_wake", lambda _: 0)
     assert any("wakes do not come to rest" in one for one in fuzzer.run(500).errors)

@@ -5,7 +5,7 @@ from typing import Any
 
 from bus_sim.options import RunOptions
 from bus_sim.session import play
-from bus_sim.systems.stage import Stage
+from bus_sim.systems.stage import SystemStage
 from onboard.config.site import parse_site
 from onboard.systems.graph.network import Graph, grid
 from onboard.systems.graph.rules import Rules
@@ -53,6 +53,6 @@ def hall(length_mm: int = 6000) -> Graph:
     return grid(3, 3, length_mm)
 
 
-def played(site: FactoryGraph, **options: object) -> Stage[Any]:
+def played(site: FactoryGraph, **options: object) -> SystemStage[Any]:
     """A run to its end, quiet and without a trace."""
     return play(site, RunOptions(quiet=True, **options))  # type: ignore[arg-type]  # options by name

@@ -8,8 +8,8 @@ import pytest
 
 from bus_sim.cli import main
 from bus_sim.systems.graph.certify.certificate import certify, count_stuck, sampled
-from bus_sim.systems.graph.certify.model import Model
-from bus_sim.systems.graph.certify.search import Search, Tasks, task_sets
+from bus_sim.systems.graph.certify.model import GraphModel
+from bus_sim.systems.graph.certify.search import DeadlockSearch, TaskSet, task_sets
 from bus_sim.systems.graph.certify.throughput import Pace, measure
 from onboard.systems.graph.network import Graph, complete, edge, grid, ring
 from onboard.systems.graph.rules import Rules
@@ -37,9 +37,9 @@ def test_g21_g29_the_exhaustive_rows_to_the_last_integer(
 
 
 def test_g21_the_ring_where_the_rule_itself_sticks() -> None:
-    tasks = Tasks((0, 3), (2, 1))
-    assert not Search(Model(ring(6), Rules.PAPER)).can_stick(tasks)
-    stuck = Search(Model(ring(6), Rules.KEEP)).counterexample(tasks)
+    tasks = TaskSet((0, 3), (2, 1))
+    assert not DeadlockSearch(GraphModel(ring(6), Rules.PAPER)).can_stick(tasks)
+    stuck = DeadlockSearch(GraphModel(ring(6), Rules.KEEP)).counterexample(tasks)
     assert stuck is not None
     assert [(move.robot, move.node) for move in stuck.moves] == [(0, 1), (1, 2)]
     assert {(robot.start, robot.node) for robot in stuck.state} == {(0, 1), (3, 2)}
@@ -60,7 +60,7 @@ def test_g29_a_search_of_its_own_agrees_on_other_graphs(seed: int) -> None:
     graph = _some_graph(chance)
     edges = frozenset(frozenset(ends) for ends in graph.lengths_mm)
     for rules in (Rules.PAPER, Rules.KEEP):
-        search = Search(Model(graph, rules))
+        search = DeadlockSearch(GraphModel(graph, rules))
         for robots, most in ((2, 60), (3, 40)):
             every = list(task_sets(graph, robots))
             for tasks in chance.sample(every, most):
@@ -85,7 +85,7 @@ def test_g24_g29_what_is_certified_and_what_is_not(graph: Graph, robots: int, ru
     if not certified:
         # The counterexample is one: all moves are allowed, one after the other, and then nobody has one.
         assert found.stuck is not None
-        model = Model(graph, rules)
+        model = GraphModel(graph, rules)
         state = model.start(*found.stuck.tasks)
         for move in found.stuck.moves:
             state = dict(model.moves(state))[move]
@@ -130,13 +130,13 @@ def test_g30_the_best_number_of_robots_is_measured_and_certified(capsys: pytest.
     said = capsys.readouterr().out
     assert "deadlock-free under these rules" in said
     assert "proposed: 2 robots" in said  # three are not certified, and two do more than one
-    one, two = (measure(Model(grid(3, 3), Rules.KEEP), robots, Pace(1, 0.5)) for robots in (1, 2))
+    one, two = (measure(GraphModel(grid(3, 3), Rules.KEEP), robots, Pace(1, 0.5)) for robots in (1, 2))
     assert one.per_hour < two.per_hour < 2 * one.per_hour
     assert one.stuck_at_s is two.stuck_at_s is None
 
 
 def test_g30_robots_that_stick_have_no_throughput_afterwards() -> None:
-    result = measure(Model(ring(6), Rules.PAPER), 2, Pace(1, 0.5))
+    result = measure(GraphModel(ring(6), Rules.PAPER), 2, Pace(1, 0.5))
     assert result.stuck_at_s is not None
     assert result.stuck_at_s < 600
 

@@ -7,15 +7,15 @@ import pytest
 from bus_sim.cli import main
 from bus_sim.options import RunOptions
 from bus_sim.systems.graph.certify.certificate import certify
-from bus_sim.systems.graph.certify.on_the_bus import Scene, play_scene
+from bus_sim.systems.graph.certify.on_the_bus import TimedTaskSet, play_scene
 from onboard.systems.graph.network import Graph, grid, ring
 from onboard.systems.graph.rules import Rules
 
 
-def scene_of(graph: Graph, robots: int, rules: Rules) -> Scene:
+def scene_of(graph: Graph, robots: int, rules: Rules) -> TimedTaskSet:
     stuck = certify(graph, robots, rules, 1).stuck
     assert stuck is not None
-    return Scene(graph, rules, 1, *stuck.tasks, stuck.moves)
+    return TimedTaskSet(graph, rules, 1, *stuck.tasks, stuck.moves)
 
 
 @pytest.mark.parametrize(

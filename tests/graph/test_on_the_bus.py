@@ -11,7 +11,7 @@ from bus_sim.run import BusRun
 from bus_sim.session import play
 from bus_sim.sites import find_site
 from bus_sim.systems.graph.plant import GraphPlant
-from bus_sim.systems.stage import Stage
+from bus_sim.systems.stage import SystemStage
 from onboard.contract.codes import KindCode, OrderResult, TokenKind
 from onboard.contract.graph import (
     BodyPlace,
@@ -42,7 +42,7 @@ class Scene:
 
     def __init__(self, site: FactoryGraph, limit_s: float = 600, seed: int = 1) -> None:
         self.site = site
-        self.played: Stage[Any] = play(site, RunOptions(seed=seed, limit_s=limit_s))
+        self.played: SystemStage[Any] = play(site, RunOptions(seed=seed, limit_s=limit_s))
         assert isinstance(self.played.plant, GraphPlant)
         self.plant: GraphPlant = self.played.plant
 

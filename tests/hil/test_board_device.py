@@ -15,7 +15,7 @@ from bus_sim.virtual_time import LoopClock
 from hil.bench import load_bench
 from hil.board_device import read_counters
 from hil.device import BenchError
-from hil.play import Outcome, play
+from hil.play import ScenarioOutcome, play
 from hil.scenarios.registry import SCENARIOS
 from onboard.ports.bus import BusHealth, ErrorState
 from tests.hil.bench_files import write_bench
@@ -99,7 +99,7 @@ read = ["echo", {words(json.dumps([link]))}]
     )
 
 
-def play_on(file: Path, name: str, directory: Path) -> Outcome:
+def play_on(file: Path, name: str, directory: Path) -> ScenarioOutcome:
     bench = load_bench(file)
     return play(bench, bench.targets[0], next(one for one in SCENARIOS if one.name == name), directory)
 

@@ -9,10 +9,10 @@ from bus_sim.can.node import SimulatedBus
 from bus_sim.options import RunOptions
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
-from hil.commission.listener import BusListener
+from hil.commission.listener import CommissionListener
 from hil.commission.person import NoAnswerError
-from hil.commission.protocol import Protocol, Verdict
-from hil.commission.setting import Setting
+from hil.commission.protocol import Protocol, StepVerdict
+from hil.commission.setting import CommissionSetting
 from hil.commission.walk import walk
 from hil.play import stop_fleet
 from onboard.config.site import parse_site
@@ -69,11 +69,11 @@ class Scene:
         self.spoke = [fleet, devices]
         protocol = Protocol(self.name, self.site.name, "2026-01-01 12:00:00+00:00")
         await walk(
-            Setting(
+            CommissionSetting(
                 self.site,
                 machine,
-                BusListener(fleet, codecs.fleet),
-                BusListener(devices, codecs.device),
+                CommissionListener(fleet, codecs.fleet),
+                CommissionListener(devices, codecs.device),
                 self,
                 protocol,
             )
@@ -128,7 +128,7 @@ def commission(
         loop.close()
 
 
-def verdicts(protocol: Protocol) -> dict[str, Verdict]:
+def verdicts(protocol: Protocol) -> dict[str, StepVerdict]:
     return {entry.step: entry.verdict for entry in protocol.entries}
 
 
@@ -171,9 +171,9 @@ def test_a_compartment_opens_its_doors_one_by_one_and_hears_its_key() -> None:
 
 def test_nothing_is_said_on_either_bus_before_listening_is_over() -> None:
     protocol, scene = commission(answers={"Is that so": "GONE"})
-    assert verdicts(protocol)["digests"] is Verdict.PASSED
+    assert verdicts(protocol)["digests"] is StepVerdict.PASSED
     assert [bus.health().sent for bus in scene.spoke] == [0, 0]
-    assert verdicts(protocol)["all further steps"] is Verdict.NOT_DONE
+    assert verdicts(protocol)["all further steps"] is StepVerdict.NOT_DONE
     assert "NOT in order" in protocol.text()
 
 
@@ -183,13 +183,13 @@ def test_nothing_is_said_on_either_bus_before_listening_is_over() -> None:
 )
 def test_a_wrong_termination_is_recorded_with_its_remedy(reading: str, said: str) -> None:
     protocol, _ = commission(answers={"ohms": reading, "Is that so": "GONE"})
-    assert verdicts(protocol)["termination"] is Verdict.FAILED
+    assert verdicts(protocol)["termination"] is StepVerdict.FAILED
     assert said in detail(protocol, "termination")
 
 
 def test_a_node_id_that_is_taken_ends_the_walk() -> None:
     protocol, scene = commission(deeds={"Switch the fleet on": Scene.switch_on})
-    assert verdicts(protocol)["node-ID"] is Verdict.FAILED
+    assert verdicts(protocol)["node-ID"] is StepVerdict.FAILED
     assert "11 is taken" in detail(protocol, "node-ID")
     assert [bus.health().sent for bus in scene.spoke] == [0, 0], "whoever has the node-ID is not spoken over"
     assert list(verdicts(protocol))[-1] == "all further steps"
@@ -198,7 +198,7 @@ def test_a_node_id_that_is_taken_ends_the_walk() -> None:
 def test_another_site_file_ends_the_walk_and_names_the_machines() -> None:
     slow = parse_site((BENCHES / "bench.toml").read_text().replace("door_ms = 500", "door_ms = 600"), "bench.toml")
     protocol, _ = commission(site=slow)
-    assert verdicts(protocol)["digests"] is Verdict.FAILED
+    assert verdicts(protocol)["digests"] is StepVerdict.FAILED
     assert f"IOC1 contract {CONTRACT_VERSION}, site {SITE.digest:04X}" in detail(protocol, "digests")
     assert f"here contract {CONTRACT_VERSION}, site {slow.digest:04X}" in detail(protocol, "digests")
 
@@ -206,7 +206,7 @@ def test_another_site_file_ends_the_walk_and_names_the_machines() -> None:
 def test_an_emergency_stop_that_does_not_stop_the_drive_is_found() -> None:
     nothing: Deed = lambda scene: None  # noqa: E731  a deed like the others
     protocol, _ = commission(deeds={"PRESS THE EMERGENCY STOP": nothing, "Release the emergency stop": nothing})
-    assert verdicts(protocol)["emergency stop"] is Verdict.FAILED
+    assert verdicts(protocol)["emergency stop"] is StepVerdict.FAILED
     assert not protocol.is_passed
 
 
@@ -227,24 +227,24 @@ def test_a_drive_that_goes_on_without_orders_is_found() -> None:
         link.incoming.append(keep)
 
     protocol, _ = commission(deeds={"left without orders": deaf_timeout})
-    assert verdicts(protocol)["drive without orders"] is Verdict.FAILED
+    assert verdicts(protocol)["drive without orders"] is StepVerdict.FAILED
 
 
 def test_whoever_stands_in_the_way_is_not_driven_at() -> None:
     protocol, scene = commission(answers={"Is nobody in its way": "n", "Are you ready": "n"})
-    assert verdicts(protocol)["drive"] is Verdict.NOT_DONE
-    assert verdicts(protocol)["emergency stop"] is Verdict.NOT_DONE
+    assert verdicts(protocol)["drive"] is StepVerdict.NOT_DONE
+    assert verdicts(protocol)["emergency stop"] is StepVerdict.NOT_DONE
     assert scene.simulation.plant.carriers[11].state(0).position_mm == 4800
     assert "NOT in order: 0 failed, 3 not done" in protocol.text()
 
 
 def test_what_the_person_denies_fails() -> None:
     protocol, _ = commission(answers={"drive's position says": "n"})
-    assert verdicts(protocol)["drive's position"] is Verdict.FAILED
+    assert verdicts(protocol)["drive's position"] is StepVerdict.FAILED
     assert "not so" in detail(protocol, "drive's position")
 
 
 def test_a_controller_that_says_nothing_does_not_pass() -> None:
     protocol, _ = commission(deeds={"Switch the controller": lambda scene: None})
-    assert verdicts(protocol)["joins"] is Verdict.FAILED
+    assert verdicts(protocol)["joins"] is StepVerdict.FAILED
     assert "no heartbeat within 180 s" in detail(protocol, "joins")

@@ -8,9 +8,9 @@ import pytest
 
 from hil.bench import Bench, Target
 from hil.device import Device
-from hil.play import Outcome, play
+from hil.play import ScenarioOutcome, play
 from hil.scenarios.registry import SCENARIOS
-from hil.scenarios.scenario import Scenario
+from hil.scenarios.scenario import BenchScenario
 from hil.simulated_device import SimulatedDevice
 from onboard.contract.codes import Reason
 from onboard.contract.messages import Bid, Diagnostic, DriveOrder, Heartbeat, Message
@@ -22,11 +22,11 @@ from tests.hil.bench_files import simulated
 Change = Callable[[Controller, Effect], Effect | None]
 
 
-def named(name: str) -> Scenario:
+def named(name: str) -> BenchScenario:
     return next(one for one in SCENARIOS if one.name == name)
 
 
-def play_with(name: str, directory: Path, change: Change | None = None) -> Outcome:
+def play_with(name: str, directory: Path, change: Change | None = None) -> ScenarioOutcome:
     """Play a scenario with a device whose effects are changed."""
 
     def prepare(device: Device) -> None:
@@ -49,7 +49,7 @@ def spoil(controller: Controller, change: Change) -> None:
     controller._perform = changed  # type: ignore[method-assign]  # a controller that is broken, for this test
 
 
-def cases_of(bench: Bench) -> Iterator[tuple[Target, Scenario]]:
+def cases_of(bench: Bench) -> Iterator[tuple[Target, BenchScenario]]:
     """Every machine of the site in turn is the device."""
     for machine in bench.site.machines.values():
         for scenario in SCENARIOS:
@@ -69,7 +69,7 @@ NAMES = [f"{bench.name} {target.machine.name} {scenario.name}" for bench, target
 
 
 @pytest.mark.parametrize(("bench", "target", "scenario"), TESTS, ids=NAMES)
-def test_a_good_controller_passes(bench: Bench, target: Target, scenario: Scenario, tmp_path: Path) -> None:
+def test_a_good_controller_passes(bench: Bench, target: Target, scenario: BenchScenario, tmp_path: Path) -> None:
     outcome = play(bench, target, scenario, tmp_path)
     assert outcome.is_good, "\n".join(outcome.lines())
     assert (tmp_path / "trace.log").stat().st_size > 0

@@ -5,16 +5,16 @@ from pathlib import Path
 import pytest
 
 from onboard.contract.codes import Reason
-from onboard.io.endings import Ending, ending_of
-from onboard.io.lives import HEALTHY_US, LIMIT, LastLife, Lives
+from onboard.io.endings import ExitStatus, ending_of
+from onboard.io.lives import HEALTHY_US, LIMIT, LastLife, LifeBook
 
 
 def test_a_first_life_and_one_that_ended_well_tell_nothing(tmp_path: Path) -> None:
-    assert Lives(tmp_path / "journal").begin() == LastLife()
-    lives = Lives(tmp_path / "journal")
+    assert LifeBook(tmp_path / "journal").begin() == LastLife()
+    lives = LifeBook(tmp_path / "journal")
     lives.begin()
-    assert lives.end(Ending.STOPPED, HEALTHY_US) is Ending.STOPPED
-    assert Lives(tmp_path / "journal").begin() == LastLife()
+    assert lives.end(ExitStatus.STOPPED, HEALTHY_US) is ExitStatus.STOPPED
+    assert LifeBook(tmp_path / "journal").begin() == LastLife()
 
 
 @pytest.mark.parametrize(
@@ -26,34 +26,34 @@ def test_a_first_life_and_one_that_ended_well_tell_nothing(tmp_path: Path) -> No
     ],
 )
 def test_a_life_that_could_say_no_last_word_is_told(tmp_path: Path, result: str, told: str, reason: Reason) -> None:
-    Lives(tmp_path / "journal").begin()
+    LifeBook(tmp_path / "journal").begin()
     if result:
         (tmp_path / "journal.ended").write_text(result + "\n")
-    assert Lives(tmp_path / "journal").begin() == LastLife(f"the last life: {told}", reason)
+    assert LifeBook(tmp_path / "journal").begin() == LastLife(f"the last life: {told}", reason)
     assert not (tmp_path / "journal.ended").exists(), "the next life has its own"
 
 
 def test_an_own_fault_comes_back_but_not_for_ever(tmp_path: Path) -> None:
-    def life(lived_us: int, *, own_fault: bool = True) -> Ending:
-        lives = Lives(tmp_path / "journal")
+    def life(lived_us: int, *, own_fault: bool = True) -> ExitStatus:
+        lives = LifeBook(tmp_path / "journal")
         lives.begin()
-        return lives.end(Ending.COMES_BACK, lived_us, own_fault=own_fault)
+        return lives.end(ExitStatus.COMES_BACK, lived_us, own_fault=own_fault)
 
-    assert [life(1) for _ in range(LIMIT)] == [*[Ending.COMES_BACK] * (LIMIT - 1), Ending.WAITS_FOR_PERSON]
+    assert [life(1) for _ in range(LIMIT)] == [*[ExitStatus.COMES_BACK] * (LIMIT - 1), ExitStatus.WAITS_FOR_PERSON]
     # A person has started it again; a long life is a new beginning.
-    assert [life(1), life(1), life(HEALTHY_US), life(1), life(1)] == [Ending.COMES_BACK] * 5
+    assert [life(1), life(1), life(HEALTHY_US), life(1), life(1)] == [ExitStatus.COMES_BACK] * 5
     # A full disk is no fault of its own.
-    assert [life(1, own_fault=False) for _ in range(9)] == [Ending.COMES_BACK] * 9
+    assert [life(1, own_fault=False) for _ in range(9)] == [ExitStatus.COMES_BACK] * 9
 
 
 def test_files_that_cannot_be_read_or_written_stop_nobody(tmp_path: Path) -> None:
     (tmp_path / "journal.life").write_text("not json")
-    assert Lives(tmp_path / "journal").begin() == LastLife()
-    lives = Lives(tmp_path / "no folder" / "journal")
+    assert LifeBook(tmp_path / "journal").begin() == LastLife()
+    lives = LifeBook(tmp_path / "no folder" / "journal")
     assert lives.begin() == LastLife()
-    assert lives.end(Ending.STOPPED, 0) is Ending.STOPPED
+    assert lives.end(ExitStatus.STOPPED, 0) is ExitStatus.STOPPED
 
 
 def test_what_only_a_person_can_know_waits_for_one() -> None:
-    by_itself = {reason for reason in Reason if ending_of(reason) is Ending.COMES_BACK}
+    by_itself = {reason for reason in Reason if ending_of(reason) is ExitStatus.COMES_BACK}
     assert by_itself == {Reason.INVARIANT_BROKEN, Reason.RUNAWAY, Reason.WATCHDOG, Reason.BUS_LOST}

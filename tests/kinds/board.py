@@ -18,7 +18,7 @@ from onboard.contract.messages import (
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.site import Station
 from onboard.holon.holon import Holon
-from onboard.systems.car_park.program import Handling, Work
+from onboard.systems.car_park.program import CarHandling, StationWork
 from onboard.systems.car_park.recovery import award_record, handled_record
 from onboard.systems.registry import factory_for
 from tests.sites import one_floor
@@ -45,7 +45,7 @@ CALL = CallForProposals(
 )
 BOOT: Entry = {"record": "boot", "boot": 1}
 AWARDED: tuple[Entry, Entry] = BOOT, award_record(CALL, BAY, PLACE, 1).entry
-TAKEN = handled_record(Work(Handling.TAKE, BAY, TASK, 2_700, CALL)).entry
+TAKEN = handled_record(StationWork(CarHandling.TAKE, BAY, TASK, 2_700, CALL)).entry
 MOVED_US = 20_000_000
 
 

@@ -12,7 +12,7 @@ import pytest
 from bus_sim.campaign.trial import STEP_US, stage_of
 from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
-from bus_sim.faults.scenario import Scenario
+from bus_sim.faults.scenario import FaultScenario
 from bus_sim.run import run_until
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Arrivals
@@ -41,10 +41,10 @@ def played(name: str) -> tuple[Site, dict[int, list[Entry]]]:
         faults = [
             parse_injection(f"crash:target={one},at_s={40 + 9 * at},restart_s=2") for at, one in enumerate(victims)
         ]
-        scenario = Scenario(name, 1, simulated_of(site).patience_s(site, None, 1), faults=tuple(faults))
+        scenario = FaultScenario(name, 1, simulated_of(site).patience_s(site, None, 1), faults=tuple(faults))
     else:
         faults = [parse_injection(f"crash:target={one},at_s={at},restart_s=2") for one, at in CRASHES]
-        scenario = Scenario(name, 3, 3_600, Arrivals(4, 60.0, 20.0, 90.0), faults=tuple(faults))
+        scenario = FaultScenario(name, 3, 3_600, Arrivals(4, 60.0, 20.0, 90.0), faults=tuple(faults))
     loop = VirtualTimeLoop()
 
     async def play() -> dict[int, list[Entry]]:
@@ -194,7 +194,7 @@ def test_a_machine_at_rest_writes_its_journal_anew_and_goes_on(at_s: float) -> N
     faults = tuple(
         parse_injection(f"crash:target={one.name},at_s={at_s},restart_s=2") for one in site.machines.values()
     )
-    scenario = Scenario("small", 3, 3_600, Arrivals(4, 60.0, 20.0, 90.0), faults=faults)
+    scenario = FaultScenario("small", 3, 3_600, Arrivals(4, 60.0, 20.0, 90.0), faults=faults)
     loop = VirtualTimeLoop()
     identities: dict[int, set[str]] = {node: set() for node in site.machines}
 

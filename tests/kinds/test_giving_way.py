@@ -10,8 +10,8 @@ from onboard.contract.messages import CallForProposals, Itinerary, Stamp, TokenG
 from onboard.core.authority import TokenBook
 from onboard.core.negotiation import Negotiation, Proposal
 from onboard.core.site import Machine, Segment, Site
-from onboard.systems.car_park.giving_way import Answer, GivingWay
-from onboard.systems.car_park.program import Program, Step
+from onboard.systems.car_park.giving_way import GivingWay, YieldDecision
+from onboard.systems.car_park.program import CarStep, Program
 from onboard.ways.mirror import WayFleet, WayMirror
 from onboard.ways.reservations import FOREVER
 from onboard.ways.sipp import Route, Visit, plan_route
@@ -48,13 +48,13 @@ class Robot(NamedTuple):
     def told(self, now_us: int = 0) -> Itinerary:
         return self.program.itinerary(self.fleet.node_id, now_us)
 
-    def hears(self, itinerary: Itinerary, now_us: int = 0) -> Answer:
+    def hears(self, itinerary: Itinerary, now_us: int = 0) -> YieldDecision:
         """As the holon does it: into the mirror, then heeded."""
         assert self.fleet.mirror.on_itinerary(itinerary, now_us)
         return self.giving_way.heed(itinerary.sender, now_us)
 
 
-def robot(site: WaySite, node: int, steps: list[Step], *, award_ms: int = 0) -> Robot:
+def robot(site: WaySite, node: int, steps: list[CarStep], *, award_ms: int = 0) -> Robot:
     machine = Machine(node, f"MR{node}", KindCode.ROBOT, Segment(ALLEY, 1))
     mirror = WayMirror(site, node)
     negotiation = Negotiation(node, KindCode.ROBOT, site.timing, Nobody(), boot=1)
@@ -73,12 +73,12 @@ def tell_all(robots: list[Robot]) -> None:
                 other.fleet.mirror.on_itinerary(one.told(), 0)
 
 
-def travel(from_index: int, to_index: int, begin_ms: int, end_ms: int) -> Step:
-    return Step(LegAction.TRAVEL, ALLEY, from_index, to_index, begin_ms * MS, end_ms * MS)
+def travel(from_index: int, to_index: int, begin_ms: int, end_ms: int) -> CarStep:
+    return CarStep(LegAction.TRAVEL, ALLEY, from_index, to_index, begin_ms * MS, end_ms * MS)
 
 
-def stand(index: int, begin_ms: int, end_ms: int) -> Step:
-    return Step(LegAction.STAND, ALLEY, index, index, begin_ms * MS, end_ms * MS)
+def stand(index: int, begin_ms: int, end_ms: int) -> CarStep:
+    return CarStep(LegAction.STAND, ALLEY, index, index, begin_ms * MS, end_ms * MS)
 
 
 def pair(first_ms: int = 200, second_ms: int = 300) -> tuple[Robot, Robot]:
@@ -97,23 +97,23 @@ def begins_ms(one: Robot) -> list[int]:
 def test_p44_whoever_comes_behind_is_late_by_exactly_what_is_missing() -> None:
     one, two = pair()
     one.program.delay(1, 140 * MS)
-    assert two.hears(one.told()) is Answer.LATER
+    assert two.hears(one.told()) is YieldDecision.LATER
     # The first leaves p(1,6) 45 ms after its begin, at 385 ms; so does the second enter it after its own.
     assert begins_ms(two) == [0, 340]
-    assert one.hears(two.told()) is Answer.NOTHING
+    assert one.hears(two.told()) is YieldDecision.NOTHING
 
 
 def test_a_delay_that_still_leaves_room_moves_nobody() -> None:
     one, two = pair()
     one.program.delay(1, 80 * MS)
-    assert two.hears(one.told()) is Answer.NOTHING
+    assert two.hears(one.told()) is YieldDecision.NOTHING
     assert begins_ms(two) == [0, 300]
 
 
 def test_whoever_comes_first_goes_on_though_the_other_is_late_too() -> None:
     one, two = pair()
     two.program.delay(0, 500 * MS)
-    assert one.hears(two.told()) is Answer.NOTHING
+    assert one.hears(two.told()) is YieldDecision.NOTHING
     assert begins_ms(one) == [0, 200]
 
 
@@ -121,22 +121,22 @@ def test_a_run_in_hand_lasts_longer_and_is_not_made_longer_twice() -> None:
     one, two = pair()
     two.program.current = 1
     one.program.delay(1, 140 * MS)
-    assert two.hears(one.told()) is Answer.LATER
+    assert two.hears(one.told()) is YieldDecision.LATER
     two.fleet.mirror.on_itinerary(two.told(), 0)
     assert two.program.remaining[0].end_us == 400 * MS
     one.program.delay(1, 20 * MS)
-    assert two.hears(one.told()) is Answer.LATER
+    assert two.hears(one.told()) is YieldDecision.LATER
     assert two.program.remaining[0].end_us == 420 * MS
     two.fleet.mirror.on_itinerary(two.told(), 0)
-    assert two.giving_way.heed(FIRST, 0) is Answer.NOTHING
+    assert two.giving_way.heed(FIRST, 0) is YieldDecision.NOTHING
 
 
 def test_of_two_plans_made_at_the_same_time_the_lower_stamp_keeps_its_windows() -> None:
     site = line_site(9, 10, QUICK, 10)
     old = robot(site, SECOND, [travel(1, 6, 0, 60)], award_ms=5)
     young = robot(site, FIRST, [travel(8, 3, 0, 60)], award_ms=6)
-    assert old.hears(young.told()) is Answer.NOTHING
-    assert young.hears(old.told()) is Answer.ANEW
+    assert old.hears(young.told()) is YieldDecision.NOTHING
+    assert young.hears(old.told()) is YieldDecision.ANEW
 
 
 def test_a_token_in_hand_outranks_the_stamp() -> None:
@@ -149,24 +149,24 @@ def test_a_token_in_hand_outranks_the_stamp() -> None:
     for index in range(2, 8):
         grant = TokenGrant(9, TokenKind.SEGMENT, Segment(ALLEY, index).number, 4, FIRST)
         young.fleet.tokens.on_grant(grant, 0)
-    assert young.hears(old.told()) is Answer.NOTHING
-    assert old.hears(young.told()) is Answer.ANEW
+    assert young.hears(old.told()) is YieldDecision.NOTHING
+    assert old.hears(young.told()) is YieldDecision.ANEW
 
 
 def test_p38_who_only_stands_gives_way_whatever_its_stamp() -> None:
     site = line_site(9, 10, QUICK, 10)
     idle = robot(site, FIRST, [stand(5, 0, 1)], award_ms=1)
     busy = robot(site, SECOND, [travel(1, 8, 100, 180)], award_ms=90)
-    assert busy.hears(idle.told()) is Answer.NOTHING
-    assert idle.hears(busy.told()) is Answer.ANEW
+    assert busy.hears(idle.told()) is YieldDecision.NOTHING
+    assert idle.hears(busy.told()) is YieldDecision.ANEW
 
 
 def test_where_there_is_no_other_way_one_comes_behind_on_the_old() -> None:
     site = line_site(9, 10, QUICK, 10)
     first = robot(site, FIRST, [stand(3, 0, 30), travel(3, 8, 30, 90)], award_ms=1)
     second = robot(site, SECOND, [stand(1, 0, 10), travel(1, 6, 10, 70)], award_ms=2)
-    assert second.hears(first.told()) is Answer.ANEW
-    assert second.giving_way.fall_back(FIRST, 0) is Answer.LATER
+    assert second.hears(first.told()) is YieldDecision.ANEW
+    assert second.giving_way.fall_back(FIRST, 0) is YieldDecision.LATER
     second.fleet.mirror.on_itinerary(second.told(), 0)
     assert second.fleet.mirror.order.meetings(SECOND, FIRST) == []
 
@@ -174,13 +174,13 @@ def test_where_there_is_no_other_way_one_comes_behind_on_the_old() -> None:
 def test_what_is_over_means_nothing() -> None:
     one, two = pair()
     one.program.delay(1, 140 * MS)
-    assert two.hears(one.told(), 5_000 * MS) is Answer.NOTHING
+    assert two.hears(one.told(), 5_000 * MS) is YieldDecision.NOTHING
 
 
 # --- any plans, any delays -------------------------------------------------------------------------------------------
 
 
-def planned(chance: random.Random, node: int, robots: list[Robot], place: Site) -> list[Step] | None:
+def planned(chance: random.Random, node: int, robots: list[Robot], place: Site) -> list[CarStep] | None:
     """A route of one robot around all others': to work somewhere, and to stand on a floor of its own."""
     mirror = WayMirror(way_site(place), node)
     for other in robots:
@@ -195,7 +195,9 @@ def planned(chance: random.Random, node: int, robots: list[Robot], place: Site) 
     )
     if not isinstance(route, Route):
         return None
-    return [Step(leg.action, leg.track, leg.from_index, leg.to_index, leg.begin_us, leg.end_us) for leg in route.legs]
+    return [
+        CarStep(leg.action, leg.track, leg.from_index, leg.to_index, leg.begin_us, leg.end_us) for leg in route.legs
+    ]
 
 
 @pytest.mark.parametrize("seed", range(80))
@@ -220,8 +222,8 @@ def test_any_delay_runs_through_all_plans_and_leaves_them_without_conflict(seed:
         for other in robots:
             if other is not speaker:
                 answer = other.hears(word)
-                assert answer is not Answer.ANEW, "a delay never makes anybody turn"
-                if answer is Answer.LATER and other not in to_tell:
+                assert answer is not YieldDecision.ANEW, "a delay never makes anybody turn"
+                if answer is YieldDecision.LATER and other not in to_tell:
                     to_tell.append(other)
     assert not to_tell, "the delays never come to rest"
     for one in robots:
@@ -235,7 +237,7 @@ def test_a_hop_out_of_a_spur_has_no_time_to_spare() -> None:
     # It holds the mouth from its very begin: a delay of who passes there before is answered in full.
     site = line_site(9, 10, QUICK, 10, spur_at=3)
     one = robot(site, FIRST, [stand(1, 0, 200), travel(1, 8, 200, 280)])
-    inside = Step(LegAction.STAND, SPUR, 1, 1, 0, 300 * MS)
+    inside = CarStep(LegAction.STAND, SPUR, 1, 1, 0, 300 * MS)
     two = robot(site, SECOND, [inside, travel(3, 3, 300, 320)])
     tell_all([one, two])
     two.program.current = 1
@@ -243,5 +245,5 @@ def test_a_hop_out_of_a_spur_has_no_time_to_spare() -> None:
     for each in (one, two):
         each.fleet.mirror.on_itinerary(two.told(), 0)
     one.program.delay(1, 80 * MS)
-    assert two.hears(one.told()) is Answer.LATER
+    assert two.hears(one.told()) is YieldDecision.LATER
     assert two.program.remaining[-1].end_us > 330 * MS

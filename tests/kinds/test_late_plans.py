@@ -4,21 +4,21 @@ from bus_sim.sites import find_site
 from onboard.contract.codes import LegAction
 from onboard.contract.messages import Stamp
 from onboard.core.site import Segment
-from onboard.systems.car_park.program import Program, Step
+from onboard.systems.car_park.program import CarStep, Program
 from onboard.ways.site import way_site
 
 SECOND = 1_000_000
 
 
-def step(begin_s: int, end_s: int, action: LegAction = LegAction.TRAVEL) -> Step:
-    return Step(action, 1, 1, 5, begin_s * SECOND, end_s * SECOND)
+def step(begin_s: int, end_s: int, action: LegAction = LegAction.TRAVEL) -> CarStep:
+    return CarStep(action, 1, 1, 5, begin_s * SECOND, end_s * SECOND)
 
 
 def times(program: Program) -> list[tuple[float, float]]:
     return [(one.begin_us / SECOND, one.end_us / SECOND) for one in program.remaining]
 
 
-def planned(*steps: Step) -> Program:
+def planned(*steps: CarStep) -> Program:
     program = Program(way_site(find_site("small")))
     program.begin(Segment(1, 1), list(steps), Stamp(0, 1, 1))
     return program

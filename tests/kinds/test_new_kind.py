@@ -19,7 +19,7 @@ from onboard.contract.messages import NO_REFERENCE, Award, Bid, Message, Referen
 from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.effects import Effect
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import CallTerms, Estimator
+from onboard.core.negotiation import Estimator, RequestedTerms
 from onboard.core.site import Machine, Segment, Site
 from onboard.systems.registry import add_system, remove_system
 from onboard.systems.system import System
@@ -45,7 +45,7 @@ class Desk(Plain):
         if due_us is None or now_us < due_us:
             return []
         number = self.left.pop(0)
-        terms = CallTerms(
+        terms = RequestedTerms(
             Reference(DESK, number), Operation.MACHINE, KindCode.LATHE, Criterion.FINISH_TIME, 0, 0, NO_REFERENCE, 0
         )
         return self.fleet.negotiation.open(terms, now_us)

@@ -6,8 +6,8 @@ from onboard.core.authority import station_token
 from onboard.core.effects import Record
 from onboard.core.site import Station
 from onboard.holon.holon import Holon
-from onboard.systems.car_park.program import Handling, Step, Work, to_itinerary
-from onboard.systems.car_park.recovery import Recovery
+from onboard.systems.car_park.program import CarHandling, CarStep, StationWork, to_itinerary
+from onboard.systems.car_park.recovery import JournalRecovery
 from onboard.systems.registry import factory_for
 from tests.kinds.board import AWARDED, CALL, OTHER, PLACE, ROBOT, SITE, STEWARD, TAKEN, TASK, Board
 
@@ -32,12 +32,12 @@ def places_of(plan: Itinerary) -> list[Station]:
 
 def rival(stamp_ms: int) -> Itinerary:
     """The other brings its car to the same place."""
-    work = Work(Handling.LEAVE, PLACE, RIVAL, 2_700, CALL)
+    work = StationWork(CarHandling.LEAVE, PLACE, RIVAL, 2_700, CALL)
     at = PLACE.index
     steps = [
-        Step(LegAction.TRAVEL, 1, 11, at, 60_000_000, 70_000_000),
-        Step(LegAction.WORK, 1, at, at, 70_000_000, 90_000_000, work),
-        Step(LegAction.TRAVEL, 1, at, 12, 90_000_000, 99_000_000),
+        CarStep(LegAction.TRAVEL, 1, 11, at, 60_000_000, 70_000_000),
+        CarStep(LegAction.WORK, 1, at, at, 70_000_000, 90_000_000, work),
+        CarStep(LegAction.TRAVEL, 1, at, 12, 90_000_000, 99_000_000),
     ]
     return to_itinerary(OTHER, 1, Grade.FIRM, Stamp(stamp_ms, OTHER, 0), steps)
 
@@ -50,7 +50,7 @@ def test_of_two_plans_for_one_place_the_lower_stamp_keeps_it() -> None:
     assert place != PLACE
     sinks = [dict(one.entry) for one in board.said if isinstance(one, Record) and one.entry.get("record") == "sink"]
     assert [one["station"] for one in sinks] == [place.number]
-    works = Recovery.read(ROBOT, [*AWARDED, TAKEN, *sinks]).works
+    works = JournalRecovery.read(ROBOT, [*AWARDED, TAKEN, *sinks]).works
     assert [work.station for work in works] == [place], "so it is after another restart"
 
 

@@ -23,7 +23,7 @@ from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.site import Segment
 from onboard.holon.holon import Holon
 from onboard.systems.car_park.lift import Lift
-from onboard.systems.car_park.robot import Robot
+from onboard.systems.car_park.robot import ParkingRobot
 from onboard.systems.car_park.site import car_park
 from onboard.systems.registry import factory_for
 from onboard.ways.lifts import gate, platform, says_standing, under_gate
@@ -53,7 +53,7 @@ class AtTheSill:
         self.holon.tokens.trust()
         self.holon.sense(ShuttleState(ROBOT, 0, ShuttleMode.HOME, 0, Side.NEAR, 0, 2_500), 5)
         self.holon.sense(DriveState(ROBOT, 0, 0, 0, DriveMode.STANDING, True), 10)
-        assert isinstance(self.holon.behaviour, Robot)
+        assert isinstance(self.holon.behaviour, ParkingRobot)
         self.carriage = self.holon.behaviour.carriage
         self.fleet: Fleet = self.holon.fleet
         self.grant(Segment(FLOOR, 1), 1)

@@ -5,13 +5,16 @@ import pytest
 from onboard.contract.codes import CallResult, Grade, LegAction, MachineState, Reason, ShuttleMode
 from onboard.contract.messages import Award, Itinerary, Reference, Stamp
 from onboard.core.site import Segment
-from onboard.systems.car_park.program import Phase, Program, Step, to_itinerary
+from onboard.systems.car_park.program import CarStep, HandlingPhase, Program, to_itinerary
 from tests.kinds.board import AWARDED, BOOT, MOVED_US, OTHER, PLACE, ROBOT, SITE, STEWARD, TAKEN, Board, Entry
 
 
 def through(index: int) -> Itinerary:
     """The other's plan leads through a position, and stamps it before all others."""
-    steps = [Step(LegAction.TRAVEL, 1, 11, 1, 0, 15_000_000), Step(LegAction.STAND, 1, 1, 1, 15_000_000, 16_000_000)]
+    steps = [
+        CarStep(LegAction.TRAVEL, 1, 11, 1, 0, 15_000_000),
+        CarStep(LegAction.STAND, 1, 1, 1, 15_000_000, 16_000_000),
+    ]
     assert 1 <= index <= 11
     return to_itinerary(OTHER, 1, Grade.FIRM, Stamp(0, OTHER, 0), steps)
 
@@ -49,7 +52,13 @@ def test_a_shuttle_that_is_out_without_a_handling_holds_the_robot_for_a_person()
 
 
 def test_with_the_shuttle_out_at_another_place_than_the_journals_nothing_moves() -> None:
-    step: Entry = {"record": "step", "phase": Phase.REACH.value, "handling": "leave", "station": PLACE.number, "car": 1}
+    step: Entry = {
+        "record": "step",
+        "phase": HandlingPhase.REACH.value,
+        "handling": "leave",
+        "station": PLACE.number,
+        "car": 1,
+    }
     board = Board(*AWARDED, TAKEN, step)
     board.stands(6)
     board.shuttle(ShuttleMode.REACHED, load_kg=1_400)
@@ -100,7 +109,7 @@ def test_pushed_away_while_it_listens_it_says_where_it_is_then() -> None:
 
 def test_a_program_without_a_place_refuses_to_be_changed() -> None:
     program = Program(SITE)
-    step = Step(LegAction.TRAVEL, 1, 1, 5, 0, 1)
+    step = CarStep(LegAction.TRAVEL, 1, 1, 5, 0, 1)
     for change in (
         lambda: program.replace([step], program.stamp),
         lambda: program.shift(1),

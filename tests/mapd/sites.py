@@ -6,7 +6,7 @@ from typing import Any
 from bus_sim.options import RunOptions
 from bus_sim.session import play
 from bus_sim.systems.mapd.plant import UnitPlant
-from bus_sim.systems.stage import Stage
+from bus_sim.systems.stage import SystemStage
 from onboard.config.site import parse_site
 from onboard.systems.mapd.site import Mapd
 
@@ -45,7 +45,7 @@ def made(robots: int, tasks: list[tuple[int, str, str]]) -> Mapd:
     return site
 
 
-def played(site: Mapd, **options: object) -> tuple[Stage[Any], UnitPlant]:
+def played(site: Mapd, **options: object) -> tuple[SystemStage[Any], UnitPlant]:
     """A run to its end, quiet and judged, and its plant."""
     run = play(site, RunOptions(quiet=True, **options))  # type: ignore[arg-type]  # options by name
     assert isinstance(run.plant, UnitPlant)

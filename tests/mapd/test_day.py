@@ -9,11 +9,11 @@ import pytest
 import bus_sim
 from bus_sim.systems.mapd.importers.command import import_files
 from bus_sim.systems.mapd.importers.draft import site_text
-from bus_sim.systems.mapd.importers.mapf import Wanted
+from bus_sim.systems.mapd.importers.mapf import DrawnDemand
 from bus_sim.systems.mapd.published import TOKEN_PASSING
-from bus_sim.systems.mapd.steps import Day
+from bus_sim.systems.mapd.steps import SteppedDay
 from onboard.config.site import parse_site
-from onboard.systems.mapd.auction import Offer, Rule, Task, cost, winners
+from onboard.systems.mapd.auction import Availability, BidWeights, TransportTask, cost, winners
 from onboard.systems.mapd.floor import grid_floor
 from onboard.systems.mapd.site import Mapd
 
@@ -21,17 +21,17 @@ DATA = Path(bus_sim.__file__).parent / "data" / "mapd"
 
 
 def kiva(robots: int, rate: str) -> Mapd:
-    draft = import_files([DATA / f"kiva-{robots}-500-5.map", DATA / f"kiva-{rate}.task"], Wanted())
+    draft = import_files([DATA / f"kiva-{robots}-500-5.map", DATA / f"kiva-{rate}.task"], DrawnDemand())
     site = parse_site(site_text(draft), "kiva.toml")
     assert isinstance(site, Mapd)
     return site
 
 
-def played(site: Mapd, tasks: Sequence[Task] | None = None) -> Day:
-    return Day(site.floor, list(site.homes.values()), site.rests, site.tasks if tasks is None else tasks).run()
+def played(site: Mapd, tasks: Sequence[TransportTask] | None = None) -> SteppedDay:
+    return SteppedDay(site.floor, list(site.homes.values()), site.rests, site.tasks if tasks is None else tasks).run()
 
 
-def judge(site: Mapd, day: Day, tasks: Sequence[Task]) -> None:
+def judge(site: Mapd, day: SteppedDay, tasks: Sequence[TransportTask]) -> None:
     """From where the robots stood alone."""
     width = len(site.rows[0])
     for step, (before, now) in enumerate(pairwise(day.history), start=1):
@@ -65,24 +65,24 @@ def test_thirty_robots_serve_a_trickle_of_tasks() -> None:
 
 def test_the_lowest_bid_of_all_wins_first_and_its_robot_falls_silent() -> None:
     floor = grid_floor(["........"])
-    tasks = [Task(1, 0, 3, 4), Task(2, 0, 6, 7)]
-    won = winners(floor, Rule(), [Offer(11, 0, 0), Offer(12, 4, 0)], tasks)
+    tasks = [TransportTask(1, 0, 3, 4), TransportTask(2, 0, 6, 7)]
+    won = winners(floor, BidWeights(), [Availability(11, 0, 0), Availability(12, 4, 0)], tasks)
     assert {robot: task.number for robot, (task, _) in won.items()} == {12: 1, 11: 2}
 
 
 def test_short_work_comes_before_long_work_equally_far() -> None:
     floor = grid_floor(["........."])
-    near, far = Task(1, 0, 3, 8), Task(2, 0, 5, 4)
-    offer = Offer(11, 4, 0)
-    assert cost(floor, Rule(), offer, far) == 150
-    assert cost(floor, Rule(), offer, near) == 350
+    near, far = TransportTask(1, 0, 3, 8), TransportTask(2, 0, 5, 4)
+    offer = Availability(11, 4, 0)
+    assert cost(floor, BidWeights(), offer, far) == 150
+    assert cost(floor, BidWeights(), offer, near) == 350
 
 
 def test_who_still_carries_bids_from_where_and_when_it_will_be_free() -> None:
     floor = grid_floor(["........."])
-    assert cost(floor, Rule(), Offer(11, 4, 6), Task(1, 0, 5, 4)) == 750
+    assert cost(floor, BidWeights(), Availability(11, 4, 6), TransportTask(1, 0, 5, 4)) == 750
 
 
 def test_a_task_that_nobody_can_reach_gets_no_bid() -> None:
     floor = grid_floor(["..@.."])
-    assert cost(floor, Rule(), Offer(11, 0, 0), Task(1, 0, 3, 4)) is None
+    assert cost(floor, BidWeights(), Availability(11, 0, 0), TransportTask(1, 0, 3, 4)) is None

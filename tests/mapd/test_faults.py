@@ -4,11 +4,11 @@ import pytest
 
 from bus_sim.systems.mapd.importers.command import import_files
 from bus_sim.systems.mapd.importers.draft import site_text
-from bus_sim.systems.mapd.importers.mapf import Wanted
+from bus_sim.systems.mapd.importers.mapf import DrawnDemand
 from onboard.config.site import parse_site
 from onboard.contract.mapd import PathHead, PathMoves, StepRound, StepState
 from onboard.contract.messages import Bid, Message
-from onboard.systems.mapd.auction import Task
+from onboard.systems.mapd.auction import TransportTask
 from onboard.systems.mapd.calls import award_of, call_of
 from onboard.systems.mapd.fields import NO_TASK
 from tests.faults.systems import PLANTS, judged, withstands
@@ -25,7 +25,7 @@ def test_pick_up_and_delivery_under_faults(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("plant_file", ["hotel.building.yaml", "Demo-01.xml"])
 def test_an_imported_plant_under_faults(plant_file: str, seed: int) -> None:
-    draft = import_files([PLANTS / plant_file], Wanted(tasks=3, seed=7))
+    draft = import_files([PLANTS / plant_file], DrawnDemand(tasks=3, seed=7))
     site = parse_site(site_text(draft), plant_file)
     assert withstands(site, seed, (4.0, 28.64), 900).served == 3
 
@@ -42,7 +42,7 @@ def _path(robot: int, cell: int, *codes: int, step: int = 0) -> list[Message]:
     return [PathHead(robot, step, cell, len(codes), 1, False), *moves]
 
 
-_CALL = call_of(1, Task(3, 0, 12, 15), 0)
+_CALL = call_of(1, TransportTask(3, 0, 12, 15), 0)
 
 
 @pytest.mark.parametrize(

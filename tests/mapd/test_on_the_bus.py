@@ -11,7 +11,7 @@ from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
 from bus_sim.session import play
 from bus_sim.systems.mapd.published import token_passing
-from bus_sim.systems.mapd.steps import Day
+from bus_sim.systems.mapd.steps import SteppedDay
 from onboard.cli import main as onboard
 from onboard.contract.mapd import StepRound, StepState
 from onboard.contract.messages import Award, Bid, CallForProposals, Reference
@@ -22,8 +22,8 @@ from tests.mapd.sites import drawn, made, played, site_text
 from tests.wire.samples import frames_of, message_of, random_value
 
 
-def without_bus(site: Mapd) -> Day:
-    return Day(site.floor, list(site.homes.values()), site.rests, site.tasks).run()
+def without_bus(site: Mapd) -> SteppedDay:
+    return SteppedDay(site.floor, list(site.homes.values()), site.rests, site.tasks).run()
 
 
 @pytest.mark.parametrize(("robots", "seed"), [(1, 1), (4, 2), (6, 3)])

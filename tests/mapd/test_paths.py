@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from onboard.systems.mapd.floor import Floor, Line, flood, grid_floor, lasting_rests, network_floor
+from onboard.systems.mapd.floor import Floor, NetworkLine, flood, grid_floor, lasting_rests, network_floor
 from onboard.systems.mapd.paths import Path, Paths
 from onboard.systems.mapd.search import find_path
 
@@ -60,7 +60,7 @@ def test_a_path_taken_out_leaves_nothing_behind() -> None:
 
 
 def test_a_zone_takes_one_robot_at_a_time() -> None:
-    floor = network_floor(["A", "B", "C"], [Line("A", "B", 3), Line("B", "C", 1)], [["A>B", "B"]])
+    floor = network_floor(["A", "B", "C"], [NetworkLine("A", "B", 3), NetworkLine("B", "C", 1)], [["A>B", "B"]])
     first = [floor.names.index(name) for name in ("A", "A>B/1", "A>B/2", "B", "C")]
     others = paths_of(floor, Path(0, tuple(first)))
     assert not others.may_move(first[4], first[3], 1)
@@ -68,7 +68,7 @@ def test_a_zone_takes_one_robot_at_a_time() -> None:
 
 
 def test_a_one_way_line_is_not_passed_backwards() -> None:
-    floor = network_floor(["A", "B"], [Line("A", "B", 2, one_way=True)], [])
+    floor = network_floor(["A", "B"], [NetworkLine("A", "B", 2, one_way=True)], [])
     assert find_path(floor, Paths(floor.resources), 1, 0, (0,), frozenset([0])) is None
     way = find_path(floor, Paths(floor.resources), 0, 0, (1,), frozenset([1]))
     assert way is not None

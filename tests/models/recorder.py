@@ -11,10 +11,8 @@ from onboard.contract.codes import TokenKind
 from onboard.contract.messages import Bid, TokenGrant, TokenHeld
 from onboard.core.authority import TokenBook, TokenKey, genesis_holder
 from onboard.core.effects import Effect, Record, Send
-from onboard.core.negotiation.initiator import Event as InitiatorEvent
-from onboard.core.negotiation.initiator import Initiator
-from onboard.core.negotiation.initiator import State as InitiatorState
-from onboard.core.negotiation.participant import Event, Participant, State
+from onboard.core.negotiation.initiator import Initiator, InitiatorEvent, InitiatorState
+from onboard.core.negotiation.participant import Participant, ParticipantEvent, ParticipantState
 
 #: What each event of an initiator is called in the model.
 _INITIATOR_STEPS = {
@@ -42,7 +40,7 @@ def _is_about(key: TokenKey, entry: Mapping[str, str | int]) -> bool:
     return entry.get("record") in kinds and (entry["kind"], entry["number"]) == (int(key.kind), key.number)
 
 
-_WAITING = (State.WAITING_BOUND, State.WAITING_COST, State.ASKING)
+_WAITING = (ParticipantState.WAITING_BOUND, ParticipantState.WAITING_COST, ParticipantState.ASKING)
 Call = tuple[int, int]
 
 
@@ -145,7 +143,7 @@ class Recorder:
     # --- calls -------------------------------------------------------------------------------------------------
 
     def _participant_listener(self, fire: Callable[..., Any]) -> Callable[..., Any]:
-        def listen(one: Participant, event: Event, now_us: int) -> Any:
+        def listen(one: Participant, event: ParticipantEvent, now_us: int) -> Any:
             before = one.state
             outcome = fire(one, event, now_us)
             if one.call.hold_ms == 0 and one.state is not before:
@@ -154,30 +152,30 @@ class Recorder:
 
         return listen
 
-    def _participant_steps(self, one: Participant, before: State, event: Event) -> None:
+    def _participant_steps(self, one: Participant, before: ParticipantState, event: ParticipantEvent) -> None:
         call = one.key
         steps, i = self.calls.setdefault(call, []), self.index(call, one.node_id)
         if before in _WAITING and one.state in _WAITING:
             return
-        if one.state is State.PRE_ASSIGNED:
+        if one.state is ParticipantState.PRE_ASSIGNED:
             assert one.proposal is not None
             self.costs.setdefault(call, {})[i] = one.proposal.cost
             steps.append(f"bid({i})")
-        elif event in (Event.AWARD_ME, Event.AWARD_OTHER):
+        elif event in (ParticipantEvent.AWARD_ME, ParticipantEvent.AWARD_OTHER):
             steps.append(f"hear_closing({i})")
-        elif event is Event.SUPERSEDED:
+        elif event is ParticipantEvent.SUPERSEDED:
             steps.append(f"superseded({i})")
-        elif event is Event.LAPSE:
+        elif event is ParticipantEvent.LAPSE:
             steps.append(f"lapse({i})")
-        elif before is State.PRE_ASSIGNED and event is Event.DEADLINE:
+        elif before is ParticipantState.PRE_ASSIGNED and event is ParticipantEvent.DEADLINE:
             self._miss(call, i)
             steps.append(f"deadline({i})")
-        elif event is Event.BEATEN and before is State.PRE_ASSIGNED:
+        elif event is ParticipantEvent.BEATEN and before is ParticipantState.PRE_ASSIGNED:
             return
         elif before in _WAITING:
             steps.append(f"quiet({i})")
         steps.append(f"expect({i}, {one.state.name})")
-        if one.state is State.ASSIGNED:
+        if one.state is ParticipantState.ASSIGNED:
             steps.append(f"act({i})")
 
     def _miss(self, call: Call, receiver: int | str) -> None:

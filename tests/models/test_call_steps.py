@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bus_sim.can.faults import Fault, FaultKind
+from bus_sim.can.faults import FaultKind, InjectedFault
 from bus_sim.sites import find_site
 from onboard.core.negotiation import participant
 from tests.models.recorder import Call, Recorder
@@ -15,7 +15,7 @@ from tests.system.scene import play, stays
 def _refused(folder: Path, seed: int) -> tuple[int, dict[Call, str]]:
     """How many calls a run of the small site had, and the first refused step of each."""
     recorder = Recorder()
-    faults = [Fault(FaultKind.OMISSION, probability=0.03, seed=seed)]
+    faults = [InjectedFault(FaultKind.OMISSION, probability=0.03, seed=seed)]
     with pytest.MonkeyPatch.context() as patch:
         recorder.attach(patch)
         play(find_site("small"), stays((0, 120)), seed=seed, limit_s=240, faults=faults, extra_s=0)
@@ -32,8 +32,8 @@ def test_the_calls_of_a_run_with_lost_frames_go_as_in_the_model(seed: int, tmp_p
 def test_a_participant_that_takes_its_belief_for_an_award_is_caught(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before = (participant.State.PRE_ASSIGNED, participant.Event.DEADLINE)
-    hasty = (participant.State.ASSIGNED, participant.Participant.assign)
+    before = (participant.ParticipantState.PRE_ASSIGNED, participant.ParticipantEvent.DEADLINE)
+    hasty = (participant.ParticipantState.ASSIGNED, participant.Participant.assign)
     monkeypatch.setitem(participant.TABLE, before, hasty)
     _, refused = _refused(tmp_path, 1)
     assert refused

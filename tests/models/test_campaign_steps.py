@@ -6,7 +6,7 @@ import pytest
 
 from bus_sim.campaign.profiles import draw_faults
 from bus_sim.campaign.trial import play
-from bus_sim.faults.scenario import Scenario
+from bus_sim.faults.scenario import FaultScenario
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Arrivals
 from onboard.core.authority import TokenBook
@@ -19,7 +19,7 @@ def _recorded(profile: str, seed: int) -> Recorder:
     arrivals = Arrivals(2, 60.0, 20.0, 100.0)
     with pytest.MonkeyPatch.context() as patch:
         recorder.attach(patch)
-        play(site, Scenario("small", seed, 1_200.0, arrivals, draw_faults(profile, seed, site)))
+        play(site, FaultScenario("small", seed, 1_200.0, arrivals, draw_faults(profile, seed, site)))
     return recorder
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bus_sim.can.faults import Fault, FaultKind
+from bus_sim.can.faults import FaultKind, InjectedFault
 from bus_sim.sites import find_site
 from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.effects import Effect
@@ -17,8 +17,8 @@ def _refused(folder: Path, seed: int) -> tuple[int, dict[TokenKey, str]]:
     """How many token steps a run of the small site made, and the first refused step of each token."""
     recorder = Recorder()
     faults = [
-        Fault(FaultKind.OMISSION, probability=0.01, seed=seed),
-        Fault(FaultKind.DUPLICATE, probability=0.02, delay_us=3_000, seed=seed + 100),
+        InjectedFault(FaultKind.OMISSION, probability=0.01, seed=seed),
+        InjectedFault(FaultKind.DUPLICATE, probability=0.02, delay_us=3_000, seed=seed + 100),
     ]
     with pytest.MonkeyPatch.context() as patch:
         recorder.attach(patch)

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 
-from onboard.ports.broker import BrokerError, Delivery, Publication
+from onboard.ports.broker import BrokerError, Publication, ReceivedPublication
 
 
 def fits(pattern: str, topic: str) -> bool:
@@ -131,7 +131,7 @@ class DoubleSession:
     def __init__(self, broker: DoubleBroker, will: Publication | None, waiting: list[Publication]) -> None:
         """``waiting`` is what the client has not taken, with QoS 1."""
         self.will = will
-        self._arrived: asyncio.Queue[Delivery] = asyncio.Queue()
+        self._arrived: asyncio.Queue[ReceivedPublication] = asyncio.Queue()
         self._brought: list[Publication] = []
         self._broker, self._waiting = broker, waiting
         self._lost = asyncio.Event()
@@ -156,15 +156,15 @@ class DoubleSession:
         """One publication comes in."""
         self._brought.append(told)
         number = len(self._brought) - 1
-        self._arrived.put_nowait(Delivery(told.topic, told.payload, told.qos, told.retain, number))
+        self._arrived.put_nowait(ReceivedPublication(told.topic, told.payload, told.qos, told.retain, number))
 
-    def taken(self, delivery: Delivery) -> None:
+    def taken(self, delivery: ReceivedPublication) -> None:
         """As in the port."""
         if not self._lost.is_set():
             told = self._brought[delivery.number]
             self._waiting[:] = [one for one in self._waiting if one is not told]
 
-    async def incoming(self) -> AsyncIterator[Delivery]:
+    async def incoming(self) -> AsyncIterator[ReceivedPublication]:
         """As in the port."""
         while True:
             next_one, lost = asyncio.ensure_future(self._arrived.get()), asyncio.ensure_future(self._lost.wait())

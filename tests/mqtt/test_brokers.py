@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import pytest
 
 from onboard.io.mqtt import MqttBroker, MqttSession
-from onboard.ports.broker import Broker, BrokerError, Publication, Session
+from onboard.ports.broker import Broker, BrokerError, BrokerSession, Publication
 from tests.mqtt.double import DoubleBroker, DoubleSession, fits
 from tests.mqtt.mosquitto import Mosquitto
 
@@ -23,7 +23,7 @@ class Case(Protocol):
     async def start(self) -> None: ...
     async def freeze(self) -> None: ...
     async def thaw(self) -> None: ...
-    def cut(self, name: str, session: Session) -> None: ...
+    def cut(self, name: str, session: BrokerSession) -> None: ...
 
 
 class DoubleCase:
@@ -42,7 +42,7 @@ class DoubleCase:
     async def thaw(self) -> None:
         self.broker.thaw()
 
-    def cut(self, name: str, session: Session) -> None:
+    def cut(self, name: str, session: BrokerSession) -> None:
         assert isinstance(session, DoubleSession)
         self.broker.cut(name)
 
@@ -64,7 +64,7 @@ class RealCase:
     async def thaw(self) -> None:
         self.mosquitto.thaw()
 
-    def cut(self, name: str, session: Session) -> None:
+    def cut(self, name: str, session: BrokerSession) -> None:
         assert isinstance(session, MqttSession)
         wire = session.client._client.socket()
         assert wire is not None
@@ -86,7 +86,7 @@ def said(text: str, topic: str = "a/b", **options: Any) -> Publication:
     return Publication(topic, text.encode(), **options)
 
 
-async def arrives(session: Session, count: int) -> list[Publication]:
+async def arrives(session: BrokerSession, count: int) -> list[Publication]:
     found: list[Publication] = []
     async with asyncio.timeout(20):
         async for one in session.incoming():

@@ -11,7 +11,7 @@ from bus_sim.faults.injection import parse_injection
 from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
 from bus_sim.session import play
-from bus_sim.systems.stage import Stage
+from bus_sim.systems.stage import SystemStage
 from onboard.contract.codes import TaskPhase
 from onboard.contract.graph import RobotAt, RobotMode, VisitList
 from onboard.contract.messages import TaskReport
@@ -65,7 +65,7 @@ def topic(name: str = "order", serial: str = "R1", version: str = "2.1") -> str:
 
 def run(
     orders: Sequence[tuple[float, str, Any]], *, faults: Sequence[str] = (), **options: Any
-) -> tuple[Stage[Any], Ordered]:
+) -> tuple[SystemStage[Any], Ordered]:
     ordered = Ordered(orders, **options)
 
     def prepare(simulated: BusRun[Any]) -> None:
@@ -79,7 +79,7 @@ def run(
     ), ordered
 
 
-def ends(played: Stage[Any]) -> list[tuple[int, TaskPhase]]:
+def ends(played: SystemStage[Any]) -> list[tuple[int, TaskPhase]]:
     """Ends of the gateway's tasks as robots told them, each once."""
     reports = [one for _, one in played.messages if isinstance(one, TaskReport) and one.task.origin == NODE]
     over = [(one.sender, one.phase) for one in reports if one.phase in (TaskPhase.DONE, TaskPhase.REFUSED)]
@@ -171,7 +171,7 @@ def update(number: int, start: int, *nodes: tuple[int, str], horizon: int = 0) -
     return told
 
 
-def loadings(played: Stage[Any]) -> list[int]:
+def loadings(played: SystemStage[Any]) -> list[int]:
     """Nodes at which R1 loaded, in turn."""
     told = [one for _, one in played.messages if isinstance(one, RobotAt) and one.sender == 21]
     nodes = [one.node for one in told if one.robot_mode is RobotMode.LOADING]

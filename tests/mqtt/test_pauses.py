@@ -11,7 +11,7 @@ from bus_sim.run import BusRun
 from bus_sim.session import play
 from bus_sim.systems.graph.plant import make_plant as graph_plant
 from bus_sim.systems.mapd.plant import make_plant as mapd_plant
-from bus_sim.systems.stage import Stage
+from bus_sim.systems.stage import SystemStage
 from bus_sim.systems.terminal.playing import play as play_terminal
 from bus_sim.systems.terminal.run import TerminalRun
 from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode
@@ -50,7 +50,7 @@ def actions(ordered: Ordered, serial: str, version: str = "2.1") -> list[tuple[s
 
 def on(
     site: Site, make_plant: Any, orders: Sequence[tuple[float, str, Any]], stop_s: float = 140.0
-) -> tuple[Stage[Any], Ordered]:
+) -> tuple[SystemStage[Any], Ordered]:
     ordered = Ordered(orders)
 
     def prepare(run: BusRun[Any]) -> None:

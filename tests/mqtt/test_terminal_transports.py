@@ -8,7 +8,7 @@ import pytest
 
 from bus_sim.options import RunOptions
 from bus_sim.systems.terminal.playing import play
-from bus_sim.systems.terminal.run import Outcome, TerminalRun
+from bus_sim.systems.terminal.run import TerminalOutcome, TerminalRun
 from onboard.contract.codes import TaskPhase
 from onboard.contract.messages import CallForProposals, Message, TaskReport
 from onboard.contract.terminal import BoxOrder, TaskTerms
@@ -37,7 +37,7 @@ def run(
     crash_s: float | None = None,
     deaths_s: Sequence[float] = (),
     mission_s: int = 300,
-) -> tuple[Outcome, Said, Ordered]:
+) -> tuple[TerminalOutcome, Said, Ordered]:
     site, said = short(MISSION.format(mission_s)), Said()
     ordered = Ordered([(at_s, orders_topic(site), one) for at_s, one in told], deaths_s=deaths_s)
 

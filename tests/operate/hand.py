@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from bus_sim.sites import find_site
 from onboard.contract.codes import CONTRACT_VERSION, MachineState, Reason
 from onboard.contract.messages import Halted, Heartbeat, Message
-from onboard.operate.order import Order
+from onboard.operate.commands import Maker
+from onboard.operate.order import OperatorCommand
 from onboard.operate.park import Park
-from onboard.operate.wishes import Maker
 
 SITE = find_site("small")
 ALL = tuple(SITE.machines)
@@ -21,7 +21,7 @@ class Hand:
         self.park, self.now_us = Park(SITE), SECOND
         for message in before:
             self.park.feed(message, self.now_us)
-        self.order: Order = make(self.park, 251)
+        self.order: OperatorCommand = make(self.park, 251)
         self.said: list[Message] = []
         self.lines: list[str] = []
 

@@ -4,9 +4,9 @@ import asyncio
 from dataclasses import dataclass, field
 
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.operate.order import Order
-from onboard.operate.station import Station
-from onboard.operate.wishes import Maker
+from onboard.operate.commands import Maker
+from onboard.operate.order import OperatorCommand
+from onboard.operate.station import OperatorStation
 
 
 @dataclass
@@ -40,11 +40,11 @@ async def _operate(simulation: Simulation, played: Played, at_s: float, make: Ma
     def tell(line: str) -> None:
         played.lines.append((loop.now_us(), line))
 
-    async def agrees(order: Order) -> bool:
+    async def agrees(order: OperatorCommand) -> bool:
         played.asked = order.question
         return True
 
-    station = Station(simulation.site, simulation.codecs.fleet, bus, tell)
+    station = OperatorStation(simulation.site, simulation.codecs.fleet, bus, tell)
     played.status = await station.operate(make, node, agrees)
     played.ended_us = loop.now_us()
     await bus.close()

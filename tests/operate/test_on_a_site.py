@@ -9,9 +9,9 @@ from onboard.contract.codes import MachineState, ManualMode, Reason
 from onboard.contract.messages import Blocked, Clear, Heartbeat, ManualOrder
 from onboard.core.site import Segment
 from onboard.operate.blocks import Mark
-from onboard.operate.holds import Hold
+from onboard.operate.commands import Maker
+from onboard.operate.holds import HoldCommand
 from onboard.operate.status import Status
-from onboard.operate.wishes import Maker
 from tests.operate.played import Played, operates
 from tests.system.scene import Scene, play, stays
 
@@ -45,8 +45,8 @@ def test_status_of_a_sound_site_ends_with_0() -> None:
 
 
 def test_a_machine_is_held_and_released_by_its_own_word() -> None:
-    hold = partial(Hold, machine=MR1, holds=True, seed=5)
-    release = partial(Hold, machine=MR1, holds=False, seed=9)
+    hold = partial(HoldCommand, machine=MR1, holds=True, seed=5)
+    release = partial(HoldCommand, machine=MR1, holds=False, seed=9)
     scene, (held, let_go) = played((21, hold), (90, release))
     assert held.status == 0 and held.lines[-1][1] == "MR1 is held, and stands"
     assert held.lines[-2][1] == "MR1 has answered: it begins nothing more, and comes to rest"
@@ -62,7 +62,7 @@ def test_a_machine_is_held_and_released_by_its_own_word() -> None:
 
 
 def test_a_machine_that_is_off_does_not_confirm_and_is_named() -> None:
-    scene, (told,) = played((21, partial(Hold, machine=MR1, holds=True, seed=5)), without=frozenset({"MR1"}))
+    scene, (told,) = played((21, partial(HoldCommand, machine=MR1, holds=True, seed=5)), without=frozenset({"MR1"}))
     assert told.status == 1
     assert told.lines[-2][1] == "MR1 does not answer; it is not heard: off, or not on this bus"
     assert told.lines[-1][1] == "not confirmed by MR1"
@@ -72,7 +72,10 @@ def test_a_machine_that_is_off_does_not_confirm_and_is_named() -> None:
 
 def test_a_machine_in_the_same_mode_under_the_same_number_is_asked_under_another() -> None:
     """Another life of the station: the machine takes the order for the one it knows."""
-    hold, release = partial(Hold, machine=MR1, holds=True, seed=5), partial(Hold, machine=MR1, holds=False, seed=5)
+    hold, release = (
+        partial(HoldCommand, machine=MR1, holds=True, seed=5),
+        partial(HoldCommand, machine=MR1, holds=False, seed=5),
+    )
     scene, (held, let_go) = played((21, hold), (90, release))
     assert (held.status, let_go.status) == (0, 0)
     modes = [one.manual_mode for _, one in scene.all(ManualOrder)]

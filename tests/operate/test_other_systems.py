@@ -7,13 +7,13 @@ import pytest
 from bus_sim.campaign.trial import stage_of
 from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
-from bus_sim.faults.scenario import Scenario
+from bus_sim.faults.scenario import FaultScenario
 from bus_sim.run import run_until
 from bus_sim.sites import find_site
 from bus_sim.systems.mapd.importers.command import import_files
 from bus_sim.systems.mapd.importers.draft import site_text
-from bus_sim.systems.mapd.importers.mapf import Wanted
-from bus_sim.systems.orders import Orders
+from bus_sim.systems.mapd.importers.mapf import DrawnDemand
+from bus_sim.systems.orders import OrderArrivals
 from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.system import Occasion
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
@@ -32,10 +32,10 @@ from onboard.contract.messages import (
     TokenRequest,
 )
 from onboard.core.site import Site
+from onboard.operate.commands import CommandRequest, maker_of
 from onboard.operate.names import OperateError
 from onboard.operate.park import Park
 from onboard.operate.status import Status
-from onboard.operate.wishes import Wish, maker_of
 from tests.faults.systems import PLANTS
 
 AT_S, OFF_S, END_S = 30, 3, 60
@@ -46,7 +46,7 @@ OF_RIGHTS = (CallForProposals, Bid, Award, TokenRequest, TokenGrant, TokenHeld, 
 @pytest.fixture(scope="module")
 def hotel(tmp_path_factory: pytest.TempPathFactory) -> str:
     path: Path = tmp_path_factory.mktemp("hotel") / "hotel.toml"
-    path.write_text(site_text(import_files([PLANTS / "hotel.building.yaml"], Wanted(tasks=3, seed=7))), "utf-8")
+    path.write_text(site_text(import_files([PLANTS / "hotel.building.yaml"], DrawnDemand(tasks=3, seed=7))), "utf-8")
     return str(path)
 
 
@@ -54,8 +54,8 @@ def said_by(site: Site, name: str, journal: str) -> tuple[list[tuple[int, Messag
     """What a machine says after it came back with its journal so, and what an operator's station heard of all."""
     loop, said, park = VirtualTimeLoop(), list[tuple[int, Message]](), Park(site)
     faults = (parse_injection(f"crash:target={name},at_s={AT_S},restart_s={OFF_S},journal={journal}"),)
-    orders = Orders(4, simulated_of(site).on(Occasion.FEW, site).apart_s)
-    stage = stage_of(site, Scenario(site.name, 1, END_S, orders, faults), loop)
+    orders = OrderArrivals(4, simulated_of(site).on(Occasion.FEW, site).apart_s)
+    stage = stage_of(site, FaultScenario(site.name, 1, END_S, orders, faults), loop)
 
     async def play() -> None:
         arm(stage.run, faults)
@@ -104,7 +104,7 @@ def test_a_machine_of_any_system_holds_for_its_journal_and_tells_the_remedy(
     assert not [one for one in after if isinstance(one, OF_RIGHTS)]
     remedy = "put all their journals away together, start them, and give open orders again"
     with pytest.raises(OperateError, match=f"only a car park's rights can be made anew; .*{remedy}"):
-        maker_of(site, Wish("regenerate", machine=name), 1)
+        maker_of(site, CommandRequest("regenerate", machine=name), 1)
     order = Status(park, 251, 1)
     order.begin(END_S * 1_000_000)
     order.wake(END_S * 1_000_000 + 1)

@@ -21,8 +21,8 @@ from onboard.contract.messages import (
 from onboard.core.assignments import assignment_digest
 from onboard.core.authority import TokenKey, genesis_holder, segment_token
 from onboard.core.site import Segment
+from onboard.operate.commands import CommandRequest, maker_of
 from onboard.operate.names import OperateError
-from onboard.operate.wishes import Wish, maker_of
 from onboard.ways.site import way_site
 from tests.operate.hand import ALL, SECOND, SITE, Hand, beat, halted
 
@@ -109,8 +109,10 @@ WORDS = (
 )
 
 
-def started(*words: Message, wish: Wish | None = None, without: tuple[int, ...] = ()) -> tuple[Hand, Machines]:
-    make = maker_of(SITE, wish or Wish("regenerate", machine="MR1", body=("p(1,3)", "p(1,4)")), 1)
+def started(
+    *words: Message, command: CommandRequest | None = None, without: tuple[int, ...] = ()
+) -> tuple[Hand, Machines]:
+    make = maker_of(SITE, command or CommandRequest("regenerate", machine="MR1", body=("p(1,3)", "p(1,4)")), 1)
     hand = Hand(make, [beat(node) for node in ALL if node not in without]).begin()
     return hand, Machines(hand, *(words or WORDS), without=without)
 
@@ -156,7 +158,7 @@ def test_the_lost_rights_are_made_anew_above_every_version_and_nobody_elses() ->
     ids=["another robot's", "its steward's, that never moved"],
 )
 def test_a_body_where_somebody_else_has_the_right_to_be_is_a_mistake(body: Segment, wrong: str, whose: str) -> None:
-    hand, machines = started(wish=Wish("regenerate", machine="MR1", body=("p(1,3)", str(body))))
+    hand, machines = started(command=CommandRequest("regenerate", machine="MR1", body=("p(1,3)", str(body))))
     machines.turn(5)
     told = f"--body {wrong}: {whose} holds it, so MR1 cannot be there: look again; "
     assert told + "by the words of the others it may be in p(1,2), p(1,3), p(1,4)" in hand.lines
@@ -164,13 +166,13 @@ def test_a_body_where_somebody_else_has_the_right_to_be_is_a_mistake(body: Segme
 
 
 def test_a_body_where_another_machine_says_to_be_is_refused_before_anything_is_said() -> None:
-    make = maker_of(SITE, Wish("regenerate", machine="MR1", body=("p(1,8)",)), 1)
+    make = maker_of(SITE, CommandRequest("regenerate", machine="MR1", body=("p(1,8)",)), 1)
     with pytest.raises(OperateError, match=r"--body p\(1,8\): MR2 is there by its own word; look again"):
         Hand(make, [*(beat(node) for node in ALL), Progress(MR2, 1, 0, 1, 8, 0, 0)])
 
 
 def test_a_machine_with_somebody_elses_journal_cannot_be_regenerated() -> None:
-    make = maker_of(SITE, Wish("regenerate", machine="MR1", body=("p(1,3)",)), 1)
+    make = maker_of(SITE, CommandRequest("regenerate", machine="MR1", body=("p(1,3)",)), 1)
     with pytest.raises(OperateError, match="MR2: its journal is another machine's: put the right board"):
         Hand(make, [*(beat(node) for node in ALL), halted(MR2, Reason.JOURNAL_FOREIGN, needs_person=True)])
 
@@ -218,7 +220,7 @@ def test_a_car_goes_to_who_keeps_its_place() -> None:
 def test_an_absent_body_on_a_platform_keeps_platform_and_gate_from_all() -> None:
     lift = SITE.machine("ER1").home.track
     words = (seen(ER1, Segment(lift, 0), 4, MR1), seen(ER1, Segment(lift, 255), 5, MR1))
-    hand, machines = started(*words, wish=absent("ER1"), without=(MR1,))
+    hand, machines = started(*words, command=absent("ER1"), without=(MR1,))
     machines.turn(2)
     hand.order.answered(hand.now_us, agrees=True)
     machines.turn(5)
@@ -227,8 +229,8 @@ def test_an_absent_body_on_a_platform_keeps_platform_and_gate_from_all() -> None
 
 def test_a_lost_steward_gets_back_what_it_did_not_give_away() -> None:
     given = Segment(1, 6)
-    wish = Wish("regenerate", machine=SITE.machines[STEWARD].name)
-    hand, machines = started(held(MR2, given, 3), wish=wish)
+    command = CommandRequest("regenerate", machine=SITE.machines[STEWARD].name)
+    hand, machines = started(held(MR2, given, 3), command=command)
     machines.turn(2)
     hand.order.answered(hand.now_us, agrees=True)
     machines.turn(10)
@@ -322,12 +324,12 @@ def test_who_missed_a_frame_is_told_the_list_again() -> None:
     assert max(map(hand.said.count, hand.all(TokenAssigned))) == 2
 
 
-def absent(body: str = "p(1,3)") -> Wish:
-    return Wish("regenerate", machine="MR1", absent="MR1", body=(body,))
+def absent(body: str = "p(1,3)") -> CommandRequest:
+    return CommandRequest("regenerate", machine="MR1", absent="MR1", body=(body,))
 
 
 def test_an_absent_machine_is_typed_by_name_and_its_slots_stay_blocked_and_nobodys() -> None:
-    hand, machines = started(*WORDS[1:], wish=absent(), without=(MR1,))
+    hand, machines = started(*WORDS[1:], command=absent(), without=(MR1,))
     assert hand.order.answer == "MR1" and "padlock" in hand.order.question
     machines.turn(2)
     assert hand.order.answer == ""
@@ -340,7 +342,7 @@ def test_an_absent_machine_is_typed_by_name_and_its_slots_stay_blocked_and_nobod
 
 
 def test_an_absent_machine_that_lives_is_found_out() -> None:
-    hand, machines = started(*WORDS[1:], wish=absent(), without=(MR1,))
+    hand, machines = started(*WORDS[1:], command=absent(), without=(MR1,))
     machines.turn(2)
     hand.hear(Progress(MR1, 1, 0, 1, 3, 0, 0))
     machines.turn(5)
@@ -354,7 +356,7 @@ def test_an_absent_machine_that_lives_at_the_beginning_is_found_out_before_a_wor
 
 
 def test_a_machine_that_is_only_silent_is_not_passed_over() -> None:
-    make = maker_of(SITE, Wish("regenerate", machine="MR1", body=("p(1,3)",)), 1)
+    make = maker_of(SITE, CommandRequest("regenerate", machine="MR1", body=("p(1,3)",)), 1)
     hand = Hand(make, [beat(node) for node in ALL if node != MR2])
     hand.begin()
     assert hand.order.status == 1
@@ -378,16 +380,16 @@ def test_who_does_not_take_up_the_new_epoch_is_named() -> None:
 
 
 MISTAKES = [
-    (Wish("regenerate", machine="MR1", absent="MR1"), "MR1: where does it stand"),
-    (Wish("regenerate", machine="MR1"), "MR1: where does it stand"),
-    (Wish("regenerate", machine="MR1", body=("gone",)), "must stand on one track"),
-    (Wish("regenerate", machine="MR1", body=("ER1",)), "must stand on one track"),
-    (Wish("regenerate", machine="MR1", body=("p(1,3)",), absent="MR2"), "MR2: where does it stand"),
-    (Wish("regenerate", machine="MR1", absent="MR1", body=("p(7,3)",)), "no segment"),
+    (CommandRequest("regenerate", machine="MR1", absent="MR1"), "MR1: where does it stand"),
+    (CommandRequest("regenerate", machine="MR1"), "MR1: where does it stand"),
+    (CommandRequest("regenerate", machine="MR1", body=("gone",)), "must stand on one track"),
+    (CommandRequest("regenerate", machine="MR1", body=("ER1",)), "must stand on one track"),
+    (CommandRequest("regenerate", machine="MR1", body=("p(1,3)",), absent="MR2"), "MR2: where does it stand"),
+    (CommandRequest("regenerate", machine="MR1", absent="MR1", body=("p(7,3)",)), "no segment"),
 ]
 
 
-@pytest.mark.parametrize(("wish", "told"), MISTAKES)
-def test_a_mistake_is_told_before_anything_is_said(wish: Wish, told: str) -> None:
+@pytest.mark.parametrize(("command", "told"), MISTAKES)
+def test_a_mistake_is_told_before_anything_is_said(command: CommandRequest, told: str) -> None:
     with pytest.raises(OperateError, match=told):
-        maker_of(SITE, wish, 1)
+        maker_of(SITE, command, 1)

@@ -6,7 +6,7 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import Reason
 from onboard.contract.messages import EmergencyStop, Go, Halted, Progress
-from onboard.operate.wishes import Wish, maker_of
+from onboard.operate.commands import CommandRequest, maker_of
 from tests.operate.played import Played, operates
 from tests.system.scene import Scene, play, stays
 
@@ -14,11 +14,11 @@ SITE = find_site("small")
 CARS = stays((0, 300), (40, 400), (80, None))
 
 
-def played(*orders: tuple[float, Wish], faults: tuple[str, ...] = ()) -> tuple[Scene, list[Played]]:
+def played(*orders: tuple[float, CommandRequest], faults: tuple[str, ...] = ()) -> tuple[Scene, list[Played]]:
     told: list[Played] = []
 
     def before(simulation: Simulation) -> None:
-        told.extend(operates(simulation, at_s, maker_of(SITE, wish, 1)) for at_s, wish in orders)
+        told.extend(operates(simulation, at_s, maker_of(SITE, command, 1)) for at_s, command in orders)
 
     def plant(simulation: Simulation) -> None:
         arm(simulation, [parse_injection(fault) for fault in faults])
@@ -38,7 +38,7 @@ def assert_all_served(scene: Scene) -> None:
 
 def test_stop_is_confirmed_by_all_and_holds_until_go() -> None:
     """The stop is still said when another person says go: it is lifted, and the first tool ends."""
-    scene, (stop, go) = played((45, Wish("stop")), (150, Wish("go")))
+    scene, (stop, go) = played((45, CommandRequest("stop")), (150, CommandRequest("go")))
     assert_all_served(scene)
     assert (stop.status, go.status) == (0, 0)
     names = [machine.name for machine in SITE.machines.values()]
@@ -54,7 +54,7 @@ def test_stop_is_confirmed_by_all_and_holds_until_go() -> None:
 
 
 def test_a_stop_that_is_no_longer_said_ends_by_itself() -> None:
-    scene, (stop,) = played((45, Wish("stop", for_us=0)))
+    scene, (stop,) = played((45, CommandRequest("stop", for_us=0)))
     assert_all_served(scene)
     last_us = scene.all(EmergencyStop)[-1][0]
     assert stop.status == 0 and stop.ended_us < 48_000_000
@@ -64,7 +64,7 @@ def test_a_stop_that_is_no_longer_said_ends_by_itself() -> None:
 
 
 def test_a_machine_that_is_off_has_not_confirmed_the_stop() -> None:
-    scene, (stop,) = played((45, Wish("stop", for_us=0)), faults=("crash:target=MR2,at_s=20,restart_s=100",))
+    scene, (stop,) = played((45, CommandRequest("stop", for_us=0)), faults=("crash:target=MR2,at_s=20,restart_s=100",))
     assert_all_served(scene)
     assert stop.status == 1 and "not confirmed by MR2" in stop.text
 

@@ -4,8 +4,8 @@ import pytest
 
 from onboard.contract.codes import MachineState, Reason
 from onboard.contract.messages import EmergencyStop, Go, ManualOrder
+from onboard.operate.commands import CommandRequest, maker_of
 from onboard.operate.names import OperateError
-from onboard.operate.wishes import Wish, maker_of
 from tests.operate.hand import ALL, SITE, Hand, beat, halted
 
 STOPPED = Reason.EMERGENCY_STOP
@@ -13,7 +13,7 @@ MR1 = SITE.machine("MR1").node_id
 
 
 def test_stop_is_said_each_second_until_all_hold_and_then_on() -> None:
-    hand = Hand(maker_of(SITE, Wish("stop"), 1)).begin()
+    hand = Hand(maker_of(SITE, CommandRequest("stop"), 1)).begin()
     hand.turn(3, *(halted(node, STOPPED, 251) for node in ALL[:-1]))
     assert not hand.is_over() and hand.lines.count("MR1 holds by it") == 1
     hand.turn(7, *(halted(node, STOPPED, 251) for node in ALL))
@@ -24,13 +24,13 @@ def test_stop_is_said_each_second_until_all_hold_and_then_on() -> None:
 
 
 def test_stop_for_0_s_ends_once_all_hold() -> None:
-    hand = Hand(maker_of(SITE, Wish("stop", for_us=0), 1)).begin()
+    hand = Hand(maker_of(SITE, CommandRequest("stop", for_us=0), 1)).begin()
     hand.turn(5, *(halted(node, STOPPED, 251) for node in ALL))
     assert hand.order.status == 0 and len(hand.said) < 5
 
 
 def test_who_does_not_say_that_it_holds_is_named_and_the_status_is_1() -> None:
-    hand = Hand(maker_of(SITE, Wish("stop", for_us=0), 1)).begin()
+    hand = Hand(maker_of(SITE, CommandRequest("stop", for_us=0), 1)).begin()
     hand.turn(
         12, beat(MR1, MachineState.WORKING), *(halted(node, STOPPED, 251) for node in ALL if node not in (MR1, 12))
     )
@@ -41,14 +41,14 @@ def test_who_does_not_say_that_it_holds_is_named_and_the_status_is_1() -> None:
 
 
 def test_a_machine_that_holds_for_another_reason_has_not_confirmed() -> None:
-    hand = Hand(maker_of(SITE, Wish("stop", for_us=0), 1)).begin()
+    hand = Hand(maker_of(SITE, CommandRequest("stop", for_us=0), 1)).begin()
     others = [halted(node, STOPPED, 251) for node in ALL if node != MR1]
     hand.turn(12, halted(MR1, Reason.DUPLICATE_NODE_ID, MR1), *others)
     assert hand.order.status == 1
 
 
 def test_another_tool_lifts_the_stop() -> None:
-    hand = Hand(maker_of(SITE, Wish("stop"), 1)).begin()
+    hand = Hand(maker_of(SITE, CommandRequest("stop"), 1)).begin()
     hand.turn(2, *(halted(node, STOPPED, 251) for node in ALL))
     hand.hear(Go(252, 253))
     assert not hand.is_over(), "it lifts somebody else's"
@@ -58,7 +58,7 @@ def test_another_tool_lifts_the_stop() -> None:
 
 def test_go_shows_who_stands_and_why_and_is_said_until_they_go_on() -> None:
     standing = [halted(node, STOPPED, 253) for node in ALL]
-    hand = Hand(maker_of(SITE, Wish("go"), 1), standing)
+    hand = Hand(maker_of(SITE, CommandRequest("go"), 1), standing)
     shown = hand.order.preview(hand.now_us)
     assert "MR1 stands: emergency stop by node 253; goes on by itself" in shown
     assert "shall the emergency stop be lifted?" in hand.order.question
@@ -72,13 +72,13 @@ def test_go_shows_who_stands_and_why_and_is_said_until_they_go_on() -> None:
 
 def test_go_of_one_stopper_is_not_waited_for_by_who_stands_for_another() -> None:
     before = [halted(MR1, STOPPED, 240), halted(12, STOPPED, 253)]
-    hand = Hand(maker_of(SITE, Wish("go", of="240"), 1), before).begin()
+    hand = Hand(maker_of(SITE, CommandRequest("go", of="240"), 1), before).begin()
     hand.turn(6, beat(MR1), beat(12), halted(12, STOPPED, 253))
     assert hand.order.status == 0 and set(hand.said) == {Go(251, 240)}
 
 
 def test_go_against_a_stop_that_is_still_said_names_who_says_it() -> None:
-    hand = Hand(maker_of(SITE, Wish("go"), 1), [halted(MR1, STOPPED, 252)]).begin()
+    hand = Hand(maker_of(SITE, CommandRequest("go"), 1), [halted(MR1, STOPPED, 252)]).begin()
     hand.turn(1)
     hand.hear(EmergencyStop(252, Reason.OPERATOR))
     assert not hand.is_over(), "it had not heard the Go yet"
@@ -88,14 +88,14 @@ def test_go_against_a_stop_that_is_still_said_names_who_says_it() -> None:
 
 
 def test_who_does_not_go_on_is_named_with_its_reason() -> None:
-    hand = Hand(maker_of(SITE, Wish("go"), 1), [halted(MR1, STOPPED, 253)]).begin()
+    hand = Hand(maker_of(SITE, CommandRequest("go"), 1), [halted(MR1, STOPPED, 253)]).begin()
     hand.turn(12, beat(MR1), halted(MR1, STOPPED, 253))
     assert hand.order.status == 1 and "not confirmed by MR1" in hand.lines
 
 
 def test_a_machine_that_holds_for_a_person_is_released_by_go_under_its_number() -> None:
     twin = halted(MR1, Reason.DUPLICATE_NODE_ID, MR1, needs_person=True)
-    hand = Hand(maker_of(SITE, Wish("release", machine="MR1"), 1), [twin])
+    hand = Hand(maker_of(SITE, CommandRequest("release", machine="MR1"), 1), [twin])
     assert "needs a person" in hand.order.preview(hand.now_us)[0]
     hand.begin()
     hand.turn(2, twin)
@@ -105,7 +105,7 @@ def test_a_machine_that_holds_for_a_person_is_released_by_go_under_its_number() 
 
 
 def test_any_other_machine_is_released_by_an_order_of_its_own() -> None:
-    hand = Hand(maker_of(SITE, Wish("release", machine="MR1"), 6), [beat(MR1, MachineState.OBSTACLE)]).begin()
+    hand = Hand(maker_of(SITE, CommandRequest("release", machine="MR1"), 6), [beat(MR1, MachineState.OBSTACLE)]).begin()
     hand.turn(2)
     assert hand.all(ManualOrder)
 
@@ -116,4 +116,4 @@ def test_any_other_machine_is_released_by_an_order_of_its_own() -> None:
 )
 def test_what_release_cannot_mend_is_refused_with_the_command_that_can(reason: Reason, told: str) -> None:
     with pytest.raises(OperateError, match=told):
-        Hand(maker_of(SITE, Wish("release", machine="MR1"), 1), [halted(MR1, reason, needs_person=True)])
+        Hand(maker_of(SITE, CommandRequest("release", machine="MR1"), 1), [halted(MR1, reason, needs_person=True)])

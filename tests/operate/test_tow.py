@@ -8,7 +8,7 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import MachineState, TaskPhase
 from onboard.contract.messages import Award, Heartbeat, Progress, TaskReport
-from onboard.operate.wishes import Wish, maker_of
+from onboard.operate.commands import CommandRequest, maker_of
 from tests.operate.played import Played, operates
 from tests.system.scene import Scene, play, stays
 
@@ -29,10 +29,10 @@ def towed() -> tuple[Scene, dict[str, Played]]:
 
     def before(simulation: Simulation) -> None:
         give = partial(operates, simulation)
-        told["hold"] = give(HOLD_S, maker_of(SITE, Wish("hold", machine="MR1"), 1))
-        told["block"] = give(BLOCK_S, maker_of(SITE, Wish("block", segment="p(1,1)"), 1))
-        told["clear"] = give(CLEAR_S, maker_of(SITE, Wish("clear", segment="p(1,1)"), 1))
-        told["release"] = give(RELEASE_S, maker_of(SITE, Wish("release", machine="MR1"), 9))
+        told["hold"] = give(HOLD_S, maker_of(SITE, CommandRequest("hold", machine="MR1"), 1))
+        told["block"] = give(BLOCK_S, maker_of(SITE, CommandRequest("block", segment="p(1,1)"), 1))
+        told["clear"] = give(CLEAR_S, maker_of(SITE, CommandRequest("clear", segment="p(1,1)"), 1))
+        told["release"] = give(RELEASE_S, maker_of(SITE, CommandRequest("release", machine="MR1"), 9))
 
     def plant(simulation: Simulation) -> None:
         arm(simulation, [parse_injection(fault) for fault in FAULTS])

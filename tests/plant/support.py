@@ -8,12 +8,12 @@ from typing import TypeVar
 from bus_sim.devices.link import MessageHandler
 from bus_sim.systems.car_park.plant.bodies import CarBody
 from bus_sim.systems.car_park.plant.carrier import Carrier
-from bus_sim.systems.car_park.plant.compartment import Compartment
+from bus_sim.systems.car_park.plant.compartment import CompartmentPlant
 from bus_sim.systems.car_park.plant.lift import LiftDrive
 from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.shuttle import Shuttle
 from bus_sim.systems.car_park.plant.street import Street
-from bus_sim.systems.car_park.plant.world import World
+from bus_sim.systems.car_park.plant.world import CarParkWorld
 from onboard.config.site import parse_site
 from onboard.contract.codes import DoorAction, DoorName, LightColour, ShuttleAction, Side
 from onboard.contract.messages import DoorOrder, DriveOrder, LightOrder, Message, ShuttleOrder
@@ -140,11 +140,11 @@ class Bench:
 
     def __post_init__(self) -> None:
         self.links: dict[int, ListLink] = {node: ListLink(self.timers) for node in self.site.machines}
-        self.world = World(self.site, self.timers)
+        self.world = CarParkWorld(self.site, self.timers)
         self.oracle = Oracle(self.world)
         self.shuttles: dict[int, Shuttle] = {}
         self.carriers: dict[int, Carrier] = {}
-        self.compartments: dict[int, Compartment] = {}
+        self.compartments: dict[int, CompartmentPlant] = {}
         self.lifts: dict[int, LiftDrive] = {}
         for node in self.world.robots:
             link = self.links[node]
@@ -156,7 +156,7 @@ class Bench:
             self.lifts[node] = LiftDrive(node, self.site, self.world, self.timers, self.links[node])
             self.lifts[node].start()
         for node in self.world.bays:
-            self.compartments[node] = Compartment(node, self.site, self.world, self.timers, self.links[node])
+            self.compartments[node] = CompartmentPlant(node, self.site, self.world, self.timers, self.links[node])
             self.compartments[node].start()
         self.street = Street(self.compartments, self.world, self.oracle, self.timers, seed=5)
 

@@ -6,7 +6,7 @@ import pytest
 
 from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.plant.bodies import CarBody, random_car
-from bus_sim.systems.car_park.plant.customer import Outcome, State
+from bus_sim.systems.car_park.plant.customer import CustomerState, VisitOutcome
 from onboard.contract.codes import DeskText
 from onboard.contract.messages import DeskOrder, Reference
 from tests.plant.support import COMPARTMENT, SECOND, Bench
@@ -24,14 +24,14 @@ def test_a_customer_comes_parks_and_fetches_their_car() -> None:
     Valet(bench)
     customer = bench.street.add(Stay(10 * SECOND, 600 * SECOND, car("blue")))
     bench.timers.run_until(300 * SECOND)
-    assert customer.state is State.PARKED
+    assert customer.state is CustomerState.PARKED
     assert customer.ticket == Reference(COMPARTMENT, 1)
     # Reaction 1 s, driving 10 to 30 s, walking 4 to 8 s, and the script's tick.
     assert customer.visit.in_wait_us is not None
     assert 15 * SECOND <= customer.visit.in_wait_us <= 40 * SECOND
     assert bench.world.where["blue"] in bench.site.places
     bench.timers.run_until(900 * SECOND)
-    assert (customer.state, customer.visit.outcome) == (State.GONE, Outcome.SERVED)
+    assert (customer.state, customer.visit.outcome) == (CustomerState.GONE, VisitOutcome.SERVED)
     assert customer.visit.asked_us == 600 * SECOND
     assert bench.world.where["blue"] is None
     assert bench.rules == []
@@ -42,7 +42,7 @@ def test_nobody_drives_in_on_red_or_through_a_shut_door() -> None:
     bench = Bench()
     customer = bench.street.add(Stay(0, None, car("blue")))
     bench.timers.run_until(HOUR)
-    assert customer.state is State.QUEUEING
+    assert customer.state is CustomerState.QUEUEING
     assert bench.street.summary().queueing == 1
     assert bench.rules == []
 
@@ -65,7 +65,7 @@ def test_who_finds_the_park_full_drives_out_again_and_is_counted() -> None:
     bench.street.add(Stay(0, None, car("first")))
     late = bench.street.add(Stay(SECOND, 2000 * SECOND, car("late")))
     bench.timers.run_until(HOUR)
-    assert late.visit.outcome is Outcome.FULL
+    assert late.visit.outcome is VisitOutcome.FULL
     summary = bench.street.summary()
     assert (summary.refused_full, summary.parked, summary.inside) == (1, 1, 1)
     assert bench.compartments[COMPARTMENT].is_empty
@@ -77,7 +77,7 @@ def test_a_car_too_large_drives_out_again_and_is_counted() -> None:
     Valet(bench)
     long = bench.street.add(Stay(0, 2000 * SECOND, car("long", 5400)))
     bench.timers.run_until(HOUR)
-    assert long.visit.outcome is Outcome.TOO_LARGE
+    assert long.visit.outcome is VisitOutcome.TOO_LARGE
     assert bench.street.summary().refused_too_large == 1
     assert bench.street.is_over
     assert bench.rules == []
@@ -88,13 +88,13 @@ def test_told_full_after_walking_away_the_customer_comes_back_for_the_car() -> N
     valet = Valet(bench)
     customer = bench.street.add(Stay(0, None, car("blue")))
     bench.timers.run_until(SECOND)
-    while customer.state is not State.PARKED:
+    while customer.state is not CustomerState.PARKED:
         bench.timers.run_for(50_000)
     assert customer.ticket is not None
     valet.condition = lambda: False
     bench.links[COMPARTMENT].order(DeskOrder(COMPARTMENT, 200, DeskText.FULL, customer.ticket))
     bench.timers.run_for(60 * SECOND)
-    assert customer.visit.outcome is Outcome.FULL
+    assert customer.visit.outcome is VisitOutcome.FULL
     assert bench.world.where["blue"] is None
 
 
@@ -109,7 +109,7 @@ def test_cancelled_in_time_the_car_comes_out_at_once() -> None:
     assert parked.visit.parked_us is not None
     customer = bench.street.add(Stay(0, HOUR, car("blue"), cancel_us=parked.visit.parked_us + 2 * SECOND))
     bench.timers.run_until(200 * SECOND)
-    assert customer.visit.outcome is Outcome.CANCELLED
+    assert customer.visit.outcome is VisitOutcome.CANCELLED
     assert bench.street.summary().cancelled == 1
     assert bench.rules == []
 
@@ -120,7 +120,7 @@ def test_cancelled_too_late_or_unheard_the_ticket_brings_the_car(deaf: bool) -> 
     Valet(bench, deaf_to_cancel=deaf)
     customer = bench.street.add(Stay(0, HOUR, car("blue"), cancel_us=(40 if deaf else 300) * SECOND))
     bench.timers.run_until(1200 * SECOND)
-    assert customer.visit.outcome is Outcome.SERVED
+    assert customer.visit.outcome is VisitOutcome.SERVED
     assert bench.rules == []
 
 
@@ -145,7 +145,7 @@ def test_another_car_in_the_bay_is_not_taken_but_reported() -> None:
     one, two = list(valet.parked)
     valet.parked[one], valet.parked[two] = valet.parked[two], valet.parked[one]
     bench.timers.run_until(2500 * SECOND)
-    assert bench.street.customers[0].visit.outcome is Outcome.WRONG_CAR
+    assert bench.street.customers[0].visit.outcome is VisitOutcome.WRONG_CAR
     assert bench.rules == ["OWN_CAR"]
 
 
@@ -156,7 +156,7 @@ def test_an_unknown_ticket_is_tried_again_and_then_given_up() -> None:
     bench.timers.run_until(500 * SECOND)
     valet.parked.clear()
     bench.timers.run_until(HOUR)
-    assert customer.visit.outcome is Outcome.TICKET_UNKNOWN
+    assert customer.visit.outcome is VisitOutcome.TICKET_UNKNOWN
 
 
 def test_a_key_that_nobody_answered_is_pressed_again() -> None:
@@ -178,11 +178,11 @@ def test_a_car_by_hand_leaves_when_it_is_told_to() -> None:
     bench.street.add_all(Demand.one_car(car("blue")), origin_us=5 * SECOND)
     customer = bench.street.customers[0]
     bench.timers.run_until(HOUR)
-    assert customer.state is State.PARKED
+    assert customer.state is CustomerState.PARKED
     assert bench.street.is_over
     customer.leave_now()
     bench.timers.run_until(2 * HOUR)
-    assert customer.visit.outcome is Outcome.SERVED
+    assert customer.visit.outcome is VisitOutcome.SERVED
 
 
 def test_the_same_seed_gives_the_same_day() -> None:

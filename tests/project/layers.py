@@ -193,7 +193,7 @@ LAYERS: dict[str, Layer] = {
             "onboard.gateway.edge",
             "onboard.ways.tokens",
             "onboard.gateway.pauses",
-            "onboard.gateway.whereabouts",
+            "onboard.gateway.positions",
             "onboard.ports",
             "onboard.wire",
         ),

@@ -41,7 +41,7 @@ def test_there_is_one_options_class_one_run_and_one_stage() -> None:
     classes = plugins.classes("bus_sim")
     options = [file for name, file in classes if name.endswith("Options") and name != "NodeOptions"]
     assert options == ["bus_sim/options.py"]
-    assert [file for name, file in classes if name == "Stage"] == ["bus_sim/systems/stage.py"]
+    assert [file for name, file in classes if name == "SystemStage"] == ["bus_sim/systems/stage.py"]
     makers = [file for file, tree in plugins.files().items() if plugins.makes_loop(tree) and not plugins.home(file)]
     assert [file for file in makers if file.startswith("bus_sim/")] == ["bus_sim/session.py"]
 

@@ -3,7 +3,7 @@
 import json
 import sys
 
-from hil.guest.listener import BusListener
+from hil.guest.listener import CandumpListener
 from hil.guest.mesh import run
 from hil.guest.site_run import TOOLS, SiteRun, play
 
@@ -13,7 +13,7 @@ def scene(site: SiteRun) -> dict[str, object]:
     site.prepare()
     site.connect_boards(bitrate)
     site.record()
-    listener = BusListener(TOOLS)
+    listener = CandumpListener(TOOLS)
     site.start_machines()
     site.start_plant()
     site.wait(

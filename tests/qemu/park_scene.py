@@ -4,7 +4,7 @@ import json
 import sys
 import time
 
-from hil.guest.listener import BusListener
+from hil.guest.listener import CandumpListener
 from hil.guest.mesh import inside
 from hil.guest.site_run import TOOLS, SiteRun, play
 
@@ -22,7 +22,7 @@ def scene(site: SiteRun) -> dict[str, object]:
     site.tell("the bus is there")
     site.record()
     site.record_outside()
-    listener = BusListener(TOOLS)
+    listener = CandumpListener(TOOLS)
     site.start_machines()
     site.start_plant()
 
@@ -59,7 +59,7 @@ def scene(site: SiteRun) -> dict[str, object]:
 
     part = site.share / "part.log"
     part.write_text("".join((site.share / "fleet.log").read_text().splitlines(keepends=True)[:REPLAYED]))
-    other = BusListener(UNPLUGGED)
+    other = CandumpListener(UNPLUGGED)
     site.tool("canplayer", "-I", str(part), "-g", "5", "-t", "can0=can0")
     site.wait(other, "canplayer's frames", lambda: len(other.frames) >= REPLAYED, 20)
     return {"status": status, "unplugged": out, "replayed": other.frames}

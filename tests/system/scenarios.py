@@ -2,17 +2,17 @@
 
 from pathlib import Path
 
-from bus_sim.campaign.report import Report
+from bus_sim.campaign.report import TrialReport
 from bus_sim.campaign.trial import play
 from bus_sim.faults.injection import parse_injection
-from bus_sim.faults.scenario import Scenario
+from bus_sim.faults.scenario import FaultScenario
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Arrivals
 
 
 def played(
     site: str, seed: int, arrivals: Arrivals, *faults: str, limit_s: float = 1_650, trace: Path | None = None
-) -> Report:
+) -> TrialReport:
     """What came of a shipped site's seed; ``faults`` as `bus-sim run --fault` takes them."""
-    scenario = Scenario(site, seed, limit_s, arrivals, tuple(parse_injection(fault) for fault in faults))
+    scenario = FaultScenario(site, seed, limit_s, arrivals, tuple(parse_injection(fault) for fault in faults))
     return play(find_site(site), scenario, trace=trace)

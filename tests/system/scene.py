@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from bus_sim.can.faults import Fault
+from bus_sim.can.faults import InjectedFault
 from bus_sim.options import RunOptions
 from bus_sim.run import FLEET, run_until
 from bus_sim.systems.car_park.demand import Demand, Stay
@@ -15,7 +15,7 @@ from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.contract.messages import Message
 from onboard.core.frame import Frame
 from onboard.core.site import Site
-from onboard.trace.check.checks import Checks, Verdict
+from onboard.trace.check.checks import Checks, LogVerdict
 from onboard.wire.codec import Codec, device_codec, fleet_codec
 from onboard.wire.decoder import Decoder
 
@@ -61,7 +61,7 @@ class Scene:
             c.holon.machine.name: c.holon.halted for c in self.simulation.controllers.values() if c.holon.halted
         } == {}
 
-    def verdict(self) -> Verdict:
+    def verdict(self) -> LogVerdict:
         """What the checkers say, which see only what was on the buses; frames that faults took away count as such."""
         checks = Checks(self.simulation.site, disturbed=bool(self.simulation.options.faults))
         for said in self.said:
@@ -90,7 +90,7 @@ def play(
     *,
     seed: int = 1,
     limit_s: float = 3_600,
-    faults: Sequence[Fault] = (),
+    faults: Sequence[InjectedFault] = (),
     before: Callable[[Simulation], None] | None = None,
     extra_s: float = 60,
     plant: Callable[[Simulation], None] | None = None,

@@ -11,7 +11,7 @@ from onboard.contract.messages import Halted, Message, TokenGrant
 from onboard.contract.terminal_device import MoveOrder
 from onboard.core.authority import TokenBook
 from onboard.core.effects import Effect
-from onboard.core.site import Needs, Site
+from onboard.core.site import MotionNeeds, Site
 from onboard.holon.taking_part import TakingPart
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.listener import Listener
@@ -66,7 +66,7 @@ def test_a01_a03_a06_without_the_rights_of_others_nothing_enters_what_is_shared(
     site = find_site(str(file_of(name)))
     for order in orders_in_a_run(name, tmp_path):
         is_lift = site.machines[order.sender].kind is KindCode.LIFT
-        assert is_lift or site.moved_by[type(order).__name__] is not Needs.RIGHT
+        assert is_lift or site.moved_by[type(order).__name__] is not MotionNeeds.RIGHT
         assert not (isinstance(order, MoveOrder) and is_shared(site, order))
 
 

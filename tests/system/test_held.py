@@ -14,7 +14,7 @@ from onboard.contract.codes import MachineState, ManualMode, Reason, ShuttleMode
 from onboard.contract.messages import Bid, Heartbeat, ManualOrder, ManualState, Progress, ShuttleState, TaskReport
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import car_park
-from onboard.trace.story.why import Why
+from onboard.trace.story.why import WaitingStory
 from onboard.trace.view import SiteView
 from onboard.ways.lifts import lift_at
 from onboard.ways.site import TrackKind, WaySite
@@ -162,7 +162,7 @@ def test_a_turn_in_the_mouth_of_a_spur_is_ended(at_s: float) -> None:
 def test_the_log_tells_that_a_person_held_it_and_for_how_long() -> None:
     """What `onboard trace why` and the picture say of a car that waited aboard."""
     scene = held([(52, FIRST, HELD), (152, FIRST, AUTOMATIC)])
-    why, view = Why(SITE), SiteView(SITE)
+    why, view = WaitingStory(SITE), SiteView(SITE)
     for said in scene.said:
         if said.bus == "fleet":
             why.feed(said.message, said.time_us)

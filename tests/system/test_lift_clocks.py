@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from bus_sim.campaign.report import Verdict
+from bus_sim.campaign.report import RunVerdict
 from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
@@ -39,4 +39,4 @@ def test_work_in_hand_goes_on_when_bus_time_jumps_by_years() -> None:
     """
     jump = "clock_jump:at_s=251.214793,target=ER1|IOC1|MR1,by_ms=136391240210"
     report = played("small", 59, Arrivals(6, 120, 60, 200), jump)
-    assert report.verdict is Verdict.SERVED, report.why()
+    assert report.verdict is RunVerdict.SERVED, report.why()

@@ -17,7 +17,7 @@ from onboard.core.authority import genesis_holder, segment_token, station_token
 from onboard.core.site import Segment
 from onboard.holon import holon
 from onboard.systems.car_park.compartment import Compartment
-from onboard.systems.car_park.robot import Robot
+from onboard.systems.car_park.robot import ParkingRobot
 from onboard.systems.car_park.site import car_park
 from onboard.ways.mirror import way_mirror
 from tests.system.scene import Scene, play, stays
@@ -161,7 +161,7 @@ def test_all_counters_may_wrap_in_the_middle_of_the_work() -> None:
             one.tokens.beliefs.take_up(key, _NEARLY, first)
             if first == one.node_id:
                 one.tokens.held[key] = one.tokens.seen[key] = _NEARLY
-        if isinstance(one.behaviour, Robot):
+        if isinstance(one.behaviour, ParkingRobot):
             one.behaviour.program.version = 0xFE
         if isinstance(one.behaviour, Compartment):
             one.behaviour.memory.number = 0xFFFE

@@ -24,7 +24,7 @@ from onboard.core.site import Segment, Site
 from onboard.holon.holon import Holon
 from onboard.systems.car_park.bay_generation import BayGeneration
 from onboard.systems.car_park.generation import CarParkGeneration
-from onboard.systems.car_park.program import Program, Step, to_itinerary
+from onboard.systems.car_park.program import CarStep, Program, to_itinerary
 from onboard.systems.car_park.site import car_park
 from onboard.systems.registry import factory_for
 from onboard.ways.mirror import WayMirror
@@ -132,9 +132,9 @@ def foreseen(mirror: Mirror) -> None:
     """Robot 12 is going to stand before the compartment for two minutes from now on."""
     program = Program(one_floor(robots=2), Segment(1, 6))
     steps = [
-        Step(LegAction.TRAVEL, 1, 6, 4, 0, 5_000_000),
-        Step(LegAction.STAND, 1, 4, 4, 5_000_000, 120_000_000),
-        Step(LegAction.TRAVEL, 1, 4, 12, 120_000_000, 140_000_000),
+        CarStep(LegAction.TRAVEL, 1, 6, 4, 0, 5_000_000),
+        CarStep(LegAction.STAND, 1, 4, 4, 5_000_000, 120_000_000),
+        CarStep(LegAction.TRAVEL, 1, 4, 12, 120_000_000, 140_000_000),
     ]
     program.replace(steps, Stamp(0, 1, 2))
     mirror.on_itinerary(to_itinerary(12, 7, Grade.FIRM, Stamp(0, 1, 2), steps), 0)

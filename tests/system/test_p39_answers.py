@@ -10,14 +10,14 @@ from onboard.contract.codes import Criterion, Grade, KindCode, LegAction, Operat
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Answer, CallKey, CallTerms, Needs, Proposal
+from onboard.core.negotiation import CallKey, NeededAnswers, Proposal, RequestedTerms, SubCallAnswer
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Segment
 from onboard.systems.car_park.asking import TOLERANCE_US, AskingGeneration
 from onboard.systems.car_park.generation import CarParkGeneration, Solution
 from onboard.systems.car_park.lift_generation import LiftGeneration, Promise
 from onboard.systems.car_park.ride_calls import calls_after_winning, ride_terms, rides_of
-from onboard.systems.car_park.robot import RobotFactory
+from onboard.systems.car_park.robot import ParkingRobotFactory
 from onboard.systems.car_park.site import CarPark, RideCalls, car_park
 from onboard.ways.lift_uses import GATE_US, ride_us, run_up_us
 from onboard.ways.mirror import WayMirror
@@ -46,7 +46,7 @@ def robot(node: int, rides: RideCalls = RideCalls.BEFORE, mirror: Mirror | None 
     """The task-generation function of a robot that stands at home."""
     site = site_with(rides)
     machine = site.machines[node]
-    generation = RobotFactory().estimator(site, machine, mirror or WayMirror(site, node))
+    generation = ParkingRobotFactory().estimator(site, machine, mirror or WayMirror(site, node))
     generation.program.standing = machine.home
     return generation
 
@@ -70,7 +70,7 @@ def lift() -> LiftGeneration:
     return LiftGeneration(site, site.machines[5], WayMirror(site, 5))
 
 
-def ride_call(terms: CallTerms, sender: int, whole: int, call: int = 50) -> CallForProposals:
+def ride_call(terms: RequestedTerms, sender: int, whole: int, call: int = 50) -> CallForProposals:
     """A robot's sub-call for a ride, as the lift hears it."""
     deadline_us = NOW_US + 400_000
     ready_ms = -(-max(0, terms.ready_us - deadline_us) // 100_000) * 100
@@ -80,10 +80,10 @@ def ride_call(terms: CallTerms, sender: int, whole: int, call: int = 50) -> Call
     )  # fmt: skip
 
 
-def first_ride(node: int) -> CallTerms:
+def first_ride(node: int) -> RequestedTerms:
     generation = robot(node)
     needs = generation.estimate(park(), NOW_US)
-    assert isinstance(needs, Needs)
+    assert isinstance(needs, NeededAnswers)
     return needs.parts[0]
 
 
@@ -149,26 +149,28 @@ def test_p49_a_lift_answers_for_its_own_shaft_only() -> None:
 # --- the robot -----------------------------------------------------------------------------------------------------
 
 
-def answers_to(parts: tuple[CallTerms, ...], late_us: int = 0, winner: int = 5, first: int = 1) -> tuple[Answer, ...]:
+def answers_to(
+    parts: tuple[RequestedTerms, ...], late_us: int = 0, winner: int = 5, first: int = 1
+) -> tuple[SubCallAnswer, ...]:
     """Lifts answer each part so much later than wanted."""
     found = []
     for number, terms in enumerate(parts, start=first):
         end_us = terms.ready_us + _ride_of(terms) + late_us
-        found.append(Answer(number, terms, winner, to_bus_ms(end_us)))
+        found.append(SubCallAnswer(number, terms, winner, to_bus_ms(end_us)))
     return tuple(found)
 
 
-def _ride_of(terms: CallTerms) -> int:
+def _ride_of(terms: RequestedTerms) -> int:
     site = car_park(find_site("small"))
     floors = abs((terms.from_station >> 8) - (terms.to_station >> 8))
     return run_up_us(site, 128, 1, 1 + floors) + GATE_US
 
 
-def asked() -> tuple[AskingGeneration, Needs]:
+def asked() -> tuple[AskingGeneration, NeededAnswers]:
     generation = robot(11)
     assert isinstance(generation, AskingGeneration)
     needs = generation.estimate(park(), NOW_US)
-    assert isinstance(needs, Needs)
+    assert isinstance(needs, NeededAnswers)
     return generation, needs
 
 
@@ -183,7 +185,7 @@ def test_p39_a_bid_names_what_the_mirror_gives_where_lifts_agree() -> None:
 def test_p39_a_lift_that_comes_later_makes_the_plan_and_the_bid_later() -> None:
     _, needs = asked()
     found = needs.combine(answers_to(needs.parts, 60_000_000), NOW_US + 400_000)
-    assert isinstance(found, Needs), "the plan has changed: it is asked once more"
+    assert isinstance(found, NeededAnswers), "the plan has changed: it is asked once more"
     assert from_bus_ms(found.cost, NOW_US) > from_bus_ms(needs.cost, NOW_US)
     heard = answers_to(needs.parts, 60_000_000) + answers_to(found.parts, first=len(needs.parts) + 1)
     bid = found.combine(heard, NOW_US + 600_000)
@@ -208,7 +210,7 @@ def test_p39_where_no_lift_answers_the_ride_is_called_after_winning() -> None:
     _, needs = asked()
     silence = answers_to(needs.parts, winner=0)
     again = needs.combine(silence, NOW_US + 400_000)
-    assert isinstance(again, Needs)
+    assert isinstance(again, NeededAnswers)
     bid = again.combine(silence + answers_to(again.parts, winner=0, first=len(silence) + 1), NOW_US + 600_000)
     assert isinstance(bid, Proposal)
     assert bid.parts == ()

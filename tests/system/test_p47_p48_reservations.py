@@ -22,7 +22,7 @@ from onboard.contract.messages import (
 from onboard.core.frame import Frame
 from onboard.core.serial import from_bus_ms
 from onboard.systems.car_park.generation import CarParkGeneration
-from onboard.systems.car_park.robot import Robot
+from onboard.systems.car_park.robot import ParkingRobot
 from onboard.wire.codec import fleet_codec
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays
@@ -125,7 +125,7 @@ class Rival:
     @property
     def _tentative(self) -> dict[tuple[int, int], object]:
         behaviour = self.simulation.controllers[11].holon.behaviour
-        assert isinstance(behaviour, Robot) and isinstance(behaviour.generation, CarParkGeneration)
+        assert isinstance(behaviour, ParkingRobot) and isinstance(behaviour.generation, CarParkGeneration)
         return dict(behaviour.generation.tentative)
 
     def _say(self, message: Message) -> None:

@@ -12,7 +12,7 @@ from bus_sim.options import RunOptions
 from bus_sim.run import FLEET, run_until
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.plant.bodies import Aboard
-from bus_sim.systems.car_park.show import Clock, draw
+from bus_sim.systems.car_park.show import DayClock, draw
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.contract.codes import KindCode, MachineState
@@ -57,7 +57,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Simulation, list[str]
 def picture(view: SiteView) -> str:
     console = Console(width=110, file=io.StringIO())
     with console.capture() as printed:
-        console.print(draw(SITE, view, Clock(datetime.fromtimestamp(EPOCH_US / 1e6, UTC)), ""))
+        console.print(draw(SITE, view, DayClock(datetime.fromtimestamp(EPOCH_US / 1e6, UTC)), ""))
     return printed.get()
 
 
@@ -117,7 +117,7 @@ def test_p54_the_picture_fits_the_terminal_with_the_newest_event_the_figures_and
         view.say(number * 1_000_000, f"event {number}")
     console = Console(width=width, height=height, file=io.StringIO())
     with console.capture() as printed:
-        clock = Clock(datetime.fromtimestamp(EPOCH_US / 1e6, UTC))
+        clock = DayClock(datetime.fromtimestamp(EPOCH_US / 1e6, UTC))
         console.print(draw(site, view, clock, "cars in 31", width, height, "http://127.0.0.1:41234/"))
     lines = printed.get().splitlines()
     assert len(lines) == height, "no line too many, and what is there is used"

@@ -14,7 +14,7 @@ from bus_sim.cli import main as bus_sim
 from bus_sim.options import RunOptions
 from bus_sim.session import run_site
 from bus_sim.sites import find_site
-from bus_sim.systems.car_park.day import Day
+from bus_sim.systems.car_park.day import ParkingDay
 from bus_sim.systems.car_park.summary import RunSummary
 from onboard.contract.codes import CallResult, Operation, TaskPhase
 from onboard.contract.messages import Award, Bid, CallForProposals, Progress, TaskReport
@@ -82,7 +82,7 @@ def test_p55_promises_are_compared_with_the_end_that_the_bus_saw(run: tuple[Scen
 def test_p55_any_log_of_the_fleet_bus_gives_the_same_figures(tmp_path: Path) -> None:
     trace = tmp_path / "trace.log"
     site = find_site("small")
-    day = Day(random_s=(120.0, 30.0), cars=3)
+    day = ParkingDay(random_s=(120.0, 30.0), cars=3)
     summary = run_site(site, RunOptions(demand=day, limit_s=600, trace=trace, quiet=True))
     assert isinstance(summary, RunSummary)
     with trace.open("rb") as lines:
@@ -224,7 +224,7 @@ def test_the_help_names_the_window_and_its_default() -> None:
 
 
 def test_who_waits_at_the_end_of_a_window_is_no_failure_but_at_the_end_of_a_day_is() -> None:
-    options = RunOptions(demand=Day(one_car_s=3_600.0), limit_s=15, quiet=True)
+    options = RunOptions(demand=ParkingDay(one_car_s=3_600.0), limit_s=15, quiet=True)
     summary = run_site(find_site("level1"), options)
     assert isinstance(summary, RunSummary)
     assert summary.unserved + summary.cars_in <= 1
@@ -234,7 +234,7 @@ def test_who_waits_at_the_end_of_a_window_is_no_failure_but_at_the_end_of_a_day_
 
 
 def test_a_run_that_was_ended_at_once_has_no_figures_and_no_line_is_wider_than_the_terminal() -> None:
-    summary = run_site(find_site("level1"), RunOptions(demand=Day(one_car_s=60.0), quiet=True))
+    summary = run_site(find_site("level1"), RunOptions(demand=ParkingDay(one_car_s=60.0), quiet=True))
     assert isinstance(summary, RunSummary)
     assert replace(summary, simulated_s=0.5).lines() == ["site level1, seed 1: ended in its first second; no figures"]
     folded = summary.lines(80)

@@ -17,7 +17,7 @@ from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.systems.car_park.checks import RULES
-from onboard.trace.check.checks import Checks, Verdict
+from onboard.trace.check.checks import Checks, LogVerdict
 from tests.sites import one_floor
 from tests.system.scene import ORIGIN_US, stays
 
@@ -40,7 +40,7 @@ def site_for(bug: str) -> Site:
     return one_floor(2) if bug in ON_ONE_ALLEY else find_site("small")
 
 
-def hunt(site: Site, bug: str, rule: str, limit_s: int = LIMIT_S) -> tuple[Verdict, Simulation]:
+def hunt(site: Site, bug: str, rule: str, limit_s: int = LIMIT_S) -> tuple[LogVerdict, Simulation]:
     """Run three cars in and out until the rule, or without one the oracle, finds something, or to the limit."""
     loop = VirtualTimeLoop()
     try:
@@ -49,7 +49,7 @@ def hunt(site: Site, bug: str, rule: str, limit_s: int = LIMIT_S) -> tuple[Verdi
         loop.close()
 
 
-async def _hunt(site: Site, bug: str, rule: str, limit_s: int, loop: VirtualTimeLoop) -> tuple[Verdict, Simulation]:
+async def _hunt(site: Site, bug: str, rule: str, limit_s: int, loop: VirtualTimeLoop) -> tuple[LogVerdict, Simulation]:
     simulation = build(site, RunOptions(), loop)
     checks = Checks(site)
 

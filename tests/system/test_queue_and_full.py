@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from bus_sim.systems.car_park.plant.customer import Outcome, State
+from bus_sim.systems.car_park.plant.customer import CustomerState, VisitOutcome
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
 from onboard.contract.codes import DeskText, Operation, TaskPhase
@@ -46,7 +46,11 @@ def test_p53_the_third_car_of_a_park_with_two_places_is_told_full(two_places: Si
     scene = play(two_places, stays((0, None), (0, None), (gap_s, None)), extra_s=120)
     scene.assert_sound()
     customers = scene.simulation.plant.street.customers
-    assert [customer.visit.outcome for customer in customers] == [Outcome.STAYING, Outcome.STAYING, Outcome.FULL]
+    assert [customer.visit.outcome for customer in customers] == [
+        VisitOutcome.STAYING,
+        VisitOutcome.STAYING,
+        VisitOutcome.FULL,
+    ]
     told_us, _ = scene.first(DeskOrder, lambda order: order.text is DeskText.FULL)
     assert customers[2].visit.gone_us is not None and customers[2].visit.gone_us > told_us, "told before driving out"
     summary = scene.simulation.plant.street.summary()
@@ -62,7 +66,7 @@ def test_a_full_park_has_room_again_once_a_car_has_left(two_places: Site) -> Non
     scene = play(two_places, stays((0, 600), (0, None), (300, None), (900, None)), extra_s=120)
     scene.assert_sound()
     outcomes = [customer.visit.outcome for customer in scene.simulation.plant.street.customers]
-    assert outcomes == [Outcome.SERVED, Outcome.STAYING, Outcome.FULL, Outcome.STAYING]
+    assert outcomes == [VisitOutcome.SERVED, VisitOutcome.STAYING, VisitOutcome.FULL, VisitOutcome.STAYING]
     assert scene.simulation.plant.street.summary().inside == 2
 
 
@@ -91,7 +95,7 @@ def test_p53_a_burst_queues_before_the_busy_compartment_and_is_served_in_its_ord
     falling = [after - before for before, after in pairwise(queues)]
     assert set(falling) == {0, -1} and queues[-1] == 0, "one after the other"
     customers = scene.simulation.plant.street.customers
-    assert {customer.state for customer in customers} == {State.PARKED}
+    assert {customer.state for customer in customers} == {CustomerState.PARKED}
     tickets = [customer.ticket.number for customer in customers if customer.ticket is not None]
     assert tickets == sorted(tickets) and len(tickets) == 6, "first come, first served"
     waits = [customer.visit.in_wait_us or 0 for customer in customers]

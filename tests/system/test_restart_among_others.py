@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from bus_sim import sites
-from bus_sim.campaign.report import Verdict
+from bus_sim.campaign.report import RunVerdict
 from bus_sim.cli import main as bus_sim
 from bus_sim.systems.car_park.demand import Arrivals
-from bus_sim.systems.car_park.plant.customer import TABLE, Event, State
+from bus_sim.systems.car_park.plant.customer import TABLE, CustomerEvent, CustomerState
 from onboard.cli import main as onboard
 from onboard.contract.messages import Progress
 from onboard.trace.candump_reader import CandumpReader
@@ -39,7 +39,7 @@ def test_a_way_given_up_while_its_rights_were_awaited_is_not_gone_when_they_come
     log = tmp_path / "run.log"
     crash = "crash:at_s=560.172354,target=ER2,restart_s=8.559,write=7,durable=no"
     report = played("small", 35, Arrivals(6, 20, 10, 200), crash, trace=log)
-    assert report.verdict is Verdict.SERVED, report.why()
+    assert report.verdict is RunVerdict.SERVED, report.why()
     decoder = Decoder(fleet_codec())
     with log.open("rb") as lines:
         said = [
@@ -57,7 +57,7 @@ def test_who_keeps_a_car_and_was_off_when_another_called_for_it_learns_who_fetch
     robot = "crash:at_s=271.378157,target=MR1,restart_s=14.459,write=5,durable=yes"
     keeper = "crash:at_s=395.171374,target=IOC1,restart_s=8.794,write=3,durable=yes"
     report = played("standard", 9, Arrivals(8, 15, 7.5, 200), robot, keeper)
-    assert report.verdict is Verdict.SERVED, report.why()
+    assert report.verdict is RunVerdict.SERVED, report.why()
 
 
 def test_who_has_won_a_car_before_its_keeper_has_it_may_fetch_it() -> None:
@@ -67,7 +67,7 @@ def test_who_has_won_a_car_before_its_keeper_has_it_may_fetch_it() -> None:
     """
     crash = "crash:target=MR1,at_s=0,restart_s=5,write=204,durable=yes,journal=cut,entries=39"
     report = played("small", 1, Arrivals(3, 30, 10, 60), crash)
-    assert report.verdict is Verdict.SERVED, report.why()
+    assert report.verdict is RunVerdict.SERVED, report.why()
 
 
 def test_a_car_that_nobody_came_to_park_is_its_drivers_who_comes_back_with_the_ticket() -> None:
@@ -77,16 +77,16 @@ def test_a_car_that_nobody_came_to_park_is_its_drivers_who_comes_back_with_the_t
     """
     crash = "crash:at_s=610.960052,target=MR1,restart_s=18.542,write=6,durable=yes"
     report = played("small", 414, Arrivals(6, 20, 10, 200), crash, limit_s=3_600)
-    assert report.verdict is Verdict.SERVED, report.why()
+    assert report.verdict is RunVerdict.SERVED, report.why()
 
 
 def test_a_car_that_nobody_came_to_park_is_called_for_again_where_its_driver_has_gone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The only robot is off for two minutes, and whoever has a ticket does not look at the desk any more."""
-    monkeypatch.delitem(TABLE, (State.PARKED, Event.FULL))
+    monkeypatch.delitem(TABLE, (CustomerState.PARKED, CustomerEvent.FULL))
     report = played("level1", 1, Arrivals(2, 20, 10, 300), "crash:target=MR1,at_s=8,restart_s=120")
-    assert report.verdict is Verdict.SERVED, report.why()
+    assert report.verdict is RunVerdict.SERVED, report.why()
 
 
 def test_who_was_off_while_its_task_was_called_anew_does_not_begin_it() -> None:
@@ -97,7 +97,7 @@ def test_who_was_off_while_its_task_was_called_anew_does_not_begin_it() -> None:
     first = "crash:at_s=333.410943,target=MR1,restart_s=15.574,write=1,durable=yes"
     second = "crash:at_s=375.432383,target=MR2,restart_s=13.868,write=1,durable=no"
     report = played("small", 2169, Arrivals(6, 20, 10, 200), first, second, limit_s=3_600)
-    assert report.verdict is Verdict.SERVED, report.why()
+    assert report.verdict is RunVerdict.SERVED, report.why()
 
 
 def test_who_works_where_another_was_to_come_first_does_not_plan_to_work_there_until_that_one_has_been() -> None:
@@ -107,4 +107,4 @@ def test_who_works_where_another_was_to_come_first_does_not_plan_to_work_there_u
     """
     crash = "crash:at_s=117.016517,target=MR1,restart_s=17.716,write=1,durable=no"
     report = played("small", 135, Arrivals(6, 20, 10, 200), crash, limit_s=3_600)
-    assert report.verdict is Verdict.SERVED, report.why()
+    assert report.verdict is RunVerdict.SERVED, report.why()

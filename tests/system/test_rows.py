@@ -48,7 +48,7 @@ from onboard.holon.holon import Holon
 from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.compartment_factory import CompartmentFactory
 from onboard.systems.car_park.generation import CarParkGeneration
-from onboard.systems.car_park.program import Handling, Program, Step, Work
+from onboard.systems.car_park.program import CarHandling, CarStep, Program, StationWork
 from onboard.ways.mirror import WayMirror
 from onboard.wire.codec import fleet_codec
 from tests.sites import one_floor
@@ -68,7 +68,7 @@ def a_call(
     )  # fmt: skip
 
 
-def a_robot(standing: Segment, steps: list[Step] | None = None) -> CarParkGeneration:
+def a_robot(standing: Segment, steps: list[CarStep] | None = None) -> CarParkGeneration:
     program = Program(SITE, standing)
     if steps:
         program.replace(steps, Stamp(0, 1, 1))
@@ -92,8 +92,8 @@ def test_p18_a_busy_robot_bids_later_on_the_bus_than_its_idle_twin() -> None:
 
 def test_p18_a_busy_robot_names_a_later_finishing_date_than_its_idle_twin() -> None:
     call = a_call()
-    work = Work(Handling.LEAVE, Station(1, 8, BAY.side), Reference(1, 9), 2700, call)
-    busy = a_robot(Segment(1, 8), [Step(LegAction.WORK, 1, 8, 8, 0, 30_000_000, work)])
+    work = StationWork(CarHandling.LEAVE, Station(1, 8, BAY.side), Reference(1, 9), 2700, call)
+    busy = a_robot(Segment(1, 8), [CarStep(LegAction.WORK, 1, 8, 8, 0, 30_000_000, work)])
     idle = a_robot(Segment(1, 8))
     slow, quick = busy.estimate(call, 1_000_000), idle.estimate(call, 1_000_000)
     assert slow is not None and quick is not None
@@ -103,8 +103,8 @@ def test_p18_a_busy_robot_names_a_later_finishing_date_than_its_idle_twin() -> N
 def test_p28_a_foreseen_task_of_another_delays_my_bid() -> None:
     call = a_call(to_station=Station(1, 10, BAY.side).number)
     alone, crowded = a_robot(Segment(1, 2)), a_robot(Segment(1, 2))
-    step = Step(LegAction.STAND, 1, 7, 7, 0, 60_000_000)
-    away = Step(LegAction.TRAVEL, 1, 7, 12, 60_000_000, 75_000_000)
+    step = CarStep(LegAction.STAND, 1, 7, 7, 0, 60_000_000)
+    away = CarStep(LegAction.TRAVEL, 1, 7, 12, 60_000_000, 75_000_000)
     other = Program(SITE, Segment(1, 7))
     other.replace([step, away], Stamp(0, 1, 2))
     crowded.mirror.on_itinerary(other.itinerary(12, 0), 0)
@@ -140,8 +140,8 @@ def test_p46_of_all_solutions_the_earliest_is_bid_though_another_place_is_nearer
             robot.mirror.on_car(CarAt(1, Reference(1, 10 + number), place.number, 1, 2700))
     other = Program(SITE, Segment(1, 5))
     steps = [
-        Step(LegAction.STAND, 1, 5, 5, 0, 60_000_000),
-        Step(LegAction.TRAVEL, 1, 5, 12, 60_000_000, 75_000_000),
+        CarStep(LegAction.STAND, 1, 5, 5, 0, 60_000_000),
+        CarStep(LegAction.TRAVEL, 1, 5, 12, 60_000_000, 75_000_000),
     ]
     other.replace(steps, Stamp(0, 1, 2))
     robot.mirror.on_itinerary(other.itinerary(12, 0), 0)

@@ -6,9 +6,9 @@ from onboard.contract.codes import KindCode
 from onboard.contract.messages import NO_REFERENCE
 from onboard.contract.terminal import Action
 from onboard.core.site import Machine, Segment, Timing
-from onboard.systems.terminal.plan import Load, Plan, VisitKey, drive_steps, handling_steps
+from onboard.systems.terminal.plan import ActionPlan, EntityStay, Load, drive_steps, handling_steps
 from onboard.systems.terminal.site import Box, Entity, EntityKind, StationKind, Terminal
-from onboard.systems.terminal.traffic import Node, Traffic
+from onboard.systems.terminal.traffic import StepDate, Traffic
 
 A1, L3, C1, L2, A4, L11, A2, S2, S1 = 1, 2, 3, 4, 5, 6, 7, 8, 9
 TIMING = Timing(0, 0, 1, 0, 1, 0, 0, 0, 0, 0)
@@ -59,18 +59,18 @@ def fig3(lane_capacity: int = 0, vehicles: int = 3) -> Terminal:
     )
 
 
-def plan_of(site: Terminal, owner: int, box: int = 3, begin: int = 10, before: int = 0) -> Plan:
+def plan_of(site: Terminal, owner: int, box: int = 3, begin: int = 10, before: int = 0) -> ActionPlan:
     """The printed plan, its dates not yet propagated."""
     steps = [
         *drive_steps(site, OUT), *handling_steps(site, S2, Action.PICK_UP),
         *drive_steps(site, BACK, S2), *handling_steps(site, S1, Action.PUT_DOWN),
     ]  # fmt: skip
-    return Plan(owner, 1, begin, tuple(steps), (Load(box, NO_REFERENCE, 6, 13, before),))
+    return ActionPlan(owner, 1, begin, tuple(steps), (Load(box, NO_REFERENCE, 6, 13, before),))
 
 
-def behind(plan: Plan, owner: int) -> Plan:
+def behind(plan: ActionPlan, owner: int) -> ActionPlan:
     """The same, after another machine wherever that goes."""
-    steps = [step._replace(after=VisitKey(owner, number)) for number, step in enumerate(plan.steps)]
+    steps = [step._replace(after=EntityStay(owner, number)) for number, step in enumerate(plan.steps)]
     return replace(plan, steps=tuple(steps))
 
 
@@ -78,4 +78,4 @@ def intervals(traffic: Traffic, owner: int, now: int) -> list[tuple[int, int]]:
     """[st et] of each step that is left."""
     dates, owned = traffic.dates(now).at, traffic.plans[owner]
     numbers = range(owned.current, len(owned.plan.steps))
-    return [(dates[Node(owner, number)], dates[Node(owner, number + 1)]) for number in numbers]
+    return [(dates[StepDate(owner, number)], dates[StepDate(owner, number + 1)]) for number in numbers]

@@ -7,7 +7,7 @@ import pytest
 
 from onboard.contract.messages import NO_REFERENCE
 from onboard.contract.terminal import Action
-from onboard.systems.terminal.plan import Load, Plan, Step, VisitKey
+from onboard.systems.terminal.plan import ActionPlan, ActionStep, EntityStay, Load
 from onboard.systems.terminal.site import Entity, EntityKind
 from onboard.systems.terminal.traffic import Traffic
 from tests.terminal.fig3 import A4, C1, L3, PRINTED, S1, S2, fig3, intervals, plan_of
@@ -22,9 +22,9 @@ def three(capacity: int) -> Traffic:
         steps = []
         for first, last in plan.visits():
             row = traffic.lists.get(plan.steps[first].entity, [])
-            after = row[-1].key if row else VisitKey(0, 0)
+            after = row[-1].key if row else EntityStay(0, 0)
             steps += [step._replace(after=after) for step in plan.steps[first : last + 1]]
-        traffic.take_up(Plan(owner, 1, 10, tuple(steps), plan.loads), 10)
+        traffic.take_up(ActionPlan(owner, 1, 10, tuple(steps), plan.loads), 10)
     return traffic
 
 
@@ -60,7 +60,9 @@ def test_m06_m16_m31_only_the_plan_that_misses_its_date_is_violated() -> None:
     site = fig3()
     traffic = Traffic(site)
     traffic.take_up(plan_of(site, 11, before=132), 10)
-    other = Plan(12, 1, 0, (Step(Action.GOTO, 7, 6), *plan_of(site, 12).steps[12:]), (Load(4, NO_REFERENCE, 31, 2),))
+    other = ActionPlan(
+        12, 1, 0, (ActionStep(Action.GOTO, 7, 6), *plan_of(site, 12).steps[12:]), (Load(4, NO_REFERENCE, 31, 2),)
+    )
     traffic.take_up(other, 10)
     assert traffic.violations(40) == []
     traffic.report(11, 1, 0, 40)
@@ -88,9 +90,9 @@ def lane_alone(capacity: int) -> list[tuple[int, int]]:
     site = replace(site, entities={**site.entities, **waiting, L3: lane})
     traffic = Traffic(site)
     for number in range(4):
-        after = VisitKey(10 + number, 1) if number else VisitKey(0, 0)
-        steps = (Step(Action.GOTO, 90 + number, number), Step(Action.GOTO, L3, 10, 0, after))
-        traffic.take_up(Plan(11 + number, 1, 0, steps), 0)
+        after = EntityStay(10 + number, 1) if number else EntityStay(0, 0)
+        steps = (ActionStep(Action.GOTO, 90 + number, number), ActionStep(Action.GOTO, L3, 10, 0, after))
+        traffic.take_up(ActionPlan(11 + number, 1, 0, steps), 0)
     return [intervals(traffic, owner, 0)[1] for owner in (11, 12, 13, 14)]
 
 
@@ -106,8 +108,11 @@ def test_m17_the_upper_box_is_picked_up_first() -> None:
     site = replace(site, entities={**site.entities, S2: replace(site.entities[S2], capacity=2)})
     traffic = Traffic(site, below={4: (3,)})
     traffic.take_up(plan_of(site, 11, box=4), 10)
-    steps = (Step(Action.GOTO, A4, 10), *(one._replace(after=VisitKey(11, 5)) for one in plan_of(site, 12).steps[5:8]))
-    traffic.take_up(Plan(12, 1, 60, steps, (Load(3, NO_REFERENCE, 2, 31),)), 10)
+    steps = (
+        ActionStep(Action.GOTO, A4, 10),
+        *(one._replace(after=EntityStay(11, 5)) for one in plan_of(site, 12).steps[5:8]),
+    )
+    traffic.take_up(ActionPlan(12, 1, 60, steps, (Load(3, NO_REFERENCE, 2, 31),)), 10)
     dates = intervals(traffic, 12, 10)
     assert dates[1] == (70, 82) and dates[2] == (82, 84), "docked from 70 on; the upper one is up at 81"
 
@@ -130,10 +135,14 @@ def test_m22_m34_a_delay_moves_the_dates_of_all_robots() -> None:
 def test_m31_plans_that_wait_for_each_other_are_told_by_the_later_one() -> None:
     site = fig3(1)
     traffic = Traffic(site)
-    steps = (Step(Action.GOTO, 1, 1), Step(Action.GOTO, S1, 5, 0), Step(Action.GOTO, S2, 5, 0))
-    other = (Step(Action.GOTO, 1, 1), Step(Action.GOTO, S2, 5, 0), Step(Action.GOTO, S1, 5, 0, VisitKey(0, 0)))
-    traffic.take_up(Plan(11, 1, 0, steps), 0)
-    traffic.take_up(Plan(12, 1, 1, other), 0)
+    steps = (ActionStep(Action.GOTO, 1, 1), ActionStep(Action.GOTO, S1, 5, 0), ActionStep(Action.GOTO, S2, 5, 0))
+    other = (
+        ActionStep(Action.GOTO, 1, 1),
+        ActionStep(Action.GOTO, S2, 5, 0),
+        ActionStep(Action.GOTO, S1, 5, 0, EntityStay(0, 0)),
+    )
+    traffic.take_up(ActionPlan(11, 1, 0, steps), 0)
+    traffic.take_up(ActionPlan(12, 1, 1, other), 0)
     for entity in (S1, S2):
         traffic.lists[entity].sort(key=lambda visit: visit.first == 1)
     traffic.changes += 1

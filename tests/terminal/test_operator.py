@@ -7,7 +7,7 @@ import pytest
 
 from bus_sim.options import RunOptions
 from bus_sim.systems.terminal.playing import play
-from bus_sim.systems.terminal.run import Outcome, TerminalRun
+from bus_sim.systems.terminal.run import TerminalOutcome, TerminalRun
 from onboard.config.problems import ConfigError
 from onboard.contract.codes import ManualMode
 from onboard.contract.messages import Bid, CallForProposals, ManualState, Message
@@ -69,7 +69,7 @@ def _steps(said: list[tuple[int, Message]], vehicle: int) -> list[float]:
 
 def _by_hand(
     presses: list[tuple[int, str]], prepare: Callable[[TerminalRun], None] | None = None
-) -> tuple[Outcome, Said]:
+) -> tuple[TerminalOutcome, Said]:
     said: Said = []
     text = _BY_HAND + "".join(
         f'[[manual]]\nat_s = {at_s}\nvehicle = "{WINNER}"\ndo = "{what}"\n\n' for at_s, what in presses

@@ -13,9 +13,9 @@ from onboard.contract.terminal import Action, Verb
 from onboard.contract.terminal_device import MissionKey
 from onboard.systems.terminal.generation import VehicleGeneration
 from onboard.systems.terminal.mirror import TerminalMirror
-from onboard.systems.terminal.missions import Orders, types_of
-from onboard.systems.terminal.plan import Plan, PlanReader, Step, to_frames
-from onboard.systems.terminal.search import Job, Search
+from onboard.systems.terminal.missions import MissionBook, types_of
+from onboard.systems.terminal.plan import ActionPlan, ActionStep, PlanReader, to_frames
+from onboard.systems.terminal.search import BoxTransport, PlanSearch
 from onboard.systems.terminal.site import StationKind
 from onboard.systems.terminal.traffic import Traffic
 from onboard.systems.terminal.vehicle import terminal
@@ -52,10 +52,10 @@ def box(name: str) -> int:
     return next(number for number, one in enumerate(SITE.boxes, 1) if one.name == name)
 
 
-def plan(picture: TerminalMirror, owner: int, name: str, target: str, *, now: int = 0) -> Plan:
+def plan(picture: TerminalMirror, owner: int, name: str, target: str, *, now: int = 0) -> ActionPlan:
     """The best plan of a vehicle that stands idle, taken up by the picture."""
-    job = Job(box(name), Reference(1, box(name)), picture.station_of(box(name)), BY_NAME[target])
-    search = Search(SITE, picture.traffic, owner, now, picture.long_blocked(now))
+    job = BoxTransport(box(name), Reference(1, box(name)), picture.station_of(box(name)), BY_NAME[target])
+    search = PlanSearch(SITE, picture.traffic, owner, now, picture.long_blocked(now))
     found = search.best(picture.where[owner], now, job, version=1)
     assert found is not None
     picture.take_up(found.plan, now)
@@ -70,7 +70,7 @@ def call(name: str, target: str) -> CallForProposals:
     )  # fmt: skip
 
 
-def entities(found: Plan) -> list[str]:
+def entities(found: ActionPlan) -> list[str]:
     return [SITE.entities[step.entity].name for step in found.steps]
 
 
@@ -83,8 +83,8 @@ def test_m10_the_plan_table_prints_as_in_the_paper() -> None:
 
 def test_m09_the_search_makes_the_printed_plan() -> None:
     site = fig3()
-    search = Search(site, Traffic(site), 11, 10)
-    found = search.best(A1, 10, Job(3, Reference(1, 1), S2, S1), version=1)
+    search = PlanSearch(site, Traffic(site), 11, 10)
+    found = search.best(A1, 10, BoxTransport(3, Reference(1, 1), S2, S1), version=1)
     assert found is not None and not found.pushes
     steps = [(step.action, step.entity, step.end) for step in found.plan.steps]
     assert steps == [(action, entity, end) for action, entity, _, end in PRINTED]
@@ -101,8 +101,8 @@ def test_m21_m25_of_several_routes_the_one_that_ends_first_is_taken() -> None:
     assert "L8" in entities(round_about) and "L11" not in entities(round_about)
     assert alone.end < round_about.end
     crowded = mirror()
-    stay = Step(Action.GOTO, BY_NAME["C1"], 300 * SECOND, 301 * SECOND)
-    crowded.take_up(Plan(11, 1, 0, (Step(Action.GOTO, BY_NAME["A2"], SECOND, SECOND), stay), ()), 0)
+    stay = ActionStep(Action.GOTO, BY_NAME["C1"], 300 * SECOND, 301 * SECOND)
+    crowded.take_up(ActionPlan(11, 1, 0, (ActionStep(Action.GOTO, BY_NAME["A2"], SECOND, SECOND), stay), ()), 0)
     assert "L8" in entities(plan(crowded, 14, "B4", "S1"))
 
 
@@ -116,7 +116,7 @@ def test_m21_a_plan_in_the_gaps_delays_nobody() -> None:
 
 
 def test_m23_only_a_box_with_nothing_above_it_is_called_for() -> None:
-    picture, orders = mirror(1), Orders(SITE, 1)
+    picture, orders = mirror(1), MissionBook(SITE, 1)
     wanted = [box("B3"), box("B4")]
     for one in wanted:
         assert orders.key(MissionKey(1, 1, Verb.TRANSHIP, one, 0, 0, BY_NAME["S1"], 0, urgent=False)) is None
@@ -138,7 +138,7 @@ def test_a_plan_does_not_fetch_what_it_buries_itself() -> None:
     picture = mirror(14)
     plan(picture, 14, "B4", "S3")
     generation = VehicleGeneration(SITE, SITE.machines[14], picture)
-    assert generation.plan(Job(box("B7"), Reference(1, 9), BY_NAME["S3"], BY_NAME["S1"]), 0, version=2) is None
+    assert generation.plan(BoxTransport(box("B7"), Reference(1, 9), BY_NAME["S3"], BY_NAME["S1"]), 0, version=2) is None
 
 
 @pytest.mark.parametrize("first", ["fetches", "puts"])
@@ -163,13 +163,13 @@ def test_nobody_bids_for_a_box_that_is_in_a_plan() -> None:
 
 def test_a_box_that_was_wanted_by_its_type_is_so_again_when_it_is_given_back() -> None:
     """It was wanted by name then, and another desk's mission took it where a stack grew on it (stranger, seed 4)."""
-    picture, orders = mirror(1), Orders(SITE, 1)
+    picture, orders = mirror(1), MissionBook(SITE, 1)
     area, kind = SITE.entities[BY_NAME["S3"]].area, types_of(SITE).index(SITE.boxes[box("B7") - 1].type)
     taken = {box(name) for name in ("B1", "B2", "B3", "B4")}
     assert orders.key(MissionKey(1, 1, Verb.LOAD, kind, 1, area, BY_NAME["S10"], 0, urgent=False))
     first = orders.next(picture, taken)
     assert first is not None and first.box == box("B7")
-    restarted = Orders(SITE, 1)
+    restarted = MissionBook(SITE, 1)
     restarted.replay([orders.record().entry])
     plan(picture, 14, "B7", "S1")
     for one in (orders, restarted):
@@ -183,13 +183,13 @@ def _typed(verb: Verb, what: int, count: int = 0, to: str = "S1", source: str = 
 
 
 def test_a_mission_that_comes_in_part_or_twice_is_carried_out_once_and_whole() -> None:
-    orders = Orders(SITE, 1)
+    orders = MissionBook(SITE, 1)
     one, other, end = _typed(Verb.TRANSHIP, box("B3")), _typed(Verb.TRANSHIP, box("B4")), _typed(Verb.END, 0, 2)
     assert orders.key(one) is orders.answer(one) is None
     assert orders.key(end) is orders.answer(end) is None, "one of two boxes was not heard"
     assert [orders.key(key) is None for key in (one, other, end)] == [True, True, False]
     assert orders.answer(end) is True
-    again = Orders(SITE, 1)
+    again = MissionBook(SITE, 1)
     again.replay([orders.record().entry])
     for known in (orders, again):
         assert [known.key(key) for key in (one, other, end)] == [None] * 3
@@ -208,7 +208,7 @@ def test_a_mission_that_comes_in_part_or_twice_is_carried_out_once_and_whole() -
     ],
 )
 def test_what_nobody_can_carry_out_is_refused_at_the_desk(key: MissionKey) -> None:
-    orders = Orders(SITE, 1)
+    orders = MissionBook(SITE, 1)
     assert orders.key(key) is None and orders.answer(key) is False
     assert orders.missions == {} and orders.next(mirror(1), set()) is None
 
@@ -254,7 +254,7 @@ def test_m26_one_box_after_the_other_is_near_the_best_order_of_all() -> None:
         picture = mirror()
         for position, number in enumerate(order):
             name, target = boxes[number]
-            job = Job(box(name), Reference(1, number + 1), picture.station_of(box(name)), BY_NAME[target])
+            job = BoxTransport(box(name), Reference(1, number + 1), picture.station_of(box(name)), BY_NAME[target])
             found = []
             for owner in owners if who is None else (who[position],):
                 vehicle = VehicleGeneration(SITE, SITE.machines[owner], replace_node(picture, owner))

@@ -11,7 +11,7 @@ from bus_sim.options import RunOptions
 from bus_sim.sites import find_site
 from bus_sim.systems.terminal.central import at_one_desk, play_auction, play_central
 from bus_sim.systems.terminal.playing import play
-from bus_sim.systems.terminal.run import Outcome, TerminalRun
+from bus_sim.systems.terminal.run import TerminalOutcome, TerminalRun
 from bus_sim.systems.terminal.show import summary_lines
 from bus_sim.systems.terminal.table import picture
 from onboard.contract.codes import CallResult, TaskPhase
@@ -44,7 +44,7 @@ SECOND = 1_000_000
 class Seen:
     """One run: what it came to, every message of the fleet bus with its time, what was looked at on the way."""
 
-    outcome: Outcome
+    outcome: TerminalOutcome
     trace: Path
     heard: list[tuple[int, Message]] = field(default_factory=list)
     orders: list[MoveOrder] = field(default_factory=list)

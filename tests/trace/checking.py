@@ -28,7 +28,7 @@ from onboard.contract.messages import (
     TokenGrant,
 )
 from onboard.core.site import Segment, Site
-from onboard.trace.check.checks import Checks, Verdict
+from onboard.trace.check.checks import Checks, LogVerdict
 from tests.sites import one_floor
 
 #: Robots of the sites below.
@@ -93,7 +93,7 @@ class Tape:
             self.checks.feed_message(round(at_s * 1e6), message)
         return self
 
-    def verdict(self, at_s: float | None = None) -> Verdict:
+    def verdict(self, at_s: float | None = None) -> LogVerdict:
         """The end; at a time, which a heartbeat tells."""
         if at_s is not None:
             self.say(at_s, power_up())

@@ -7,7 +7,7 @@ from tempfile import mkdtemp
 from bus_sim.cli import main
 from bus_sim.sites import find_site
 from onboard.contract.messages import Message
-from onboard.trace.listener import Listener, Said
+from onboard.trace.listener import Listener, LoggedMessage
 from onboard.trace.readers.open_log import Log
 from onboard.wire.codec import codecs
 
@@ -24,12 +24,12 @@ def run_log(*words: str, stay_s: int = 60) -> Path:
     return path
 
 
-def fleet_of(path: Path) -> list[Said]:
+def fleet_of(path: Path) -> list[LoggedMessage]:
     """All messages of the fleet bus."""
     with Log(str(path)) as log:
         return [said for said in Listener(codecs()).messages(log) if said.is_fleet]
 
 
-def first(said: list[Said], kind: type[Message]) -> Said:
+def first(said: list[LoggedMessage], kind: type[Message]) -> LoggedMessage:
     """The first message of a kind."""
     return next(one for one in said if isinstance(one.message, kind))

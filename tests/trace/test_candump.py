@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from onboard.core.frame import Frame
 from onboard.trace.candump import CandumpWriter, format_line
-from onboard.trace.candump_reader import CandumpReader, Fault, Record, parse_line
+from onboard.trace.candump_reader import CandumpReader, LineFault, LogRecord, parse_line
 from tests.tools import require_tool, run_tool
 
 GOLDEN = Path(__file__).parent.parent / "golden"
@@ -44,15 +44,15 @@ def test_writes_what_candump_wrote() -> None:
 def test_flexible_frames_are_counted_not_guessed() -> None:
     reader = CandumpReader(golden_lines("L.txt"))
     assert len(list(reader)) == 8
-    assert reader.faults == {Fault.FD: 2}
-    assert reader.first == {Fault.FD: 6}
+    assert reader.faults == {LineFault.FD: 2}
+    assert reader.first == {LineFault.FD: 6}
 
 
 def test_suffixes_and_line_ends_make_no_difference() -> None:
     plain = [parse_line(line) for line in golden_lines("Lx.txt")]
     assert plain == [parse_line(line.replace(b" T", b"")) for line in golden_lines("Lx.txt")]
     assert plain == [parse_line(line.replace(b"\n", b" \r\n")) for line in golden_lines("Lx.txt")]
-    assert sum(isinstance(one, Record) for one in plain) == 7
+    assert sum(isinstance(one, LogRecord) for one in plain) == 7
 
 
 def test_kinds_of_frames_in_the_capture() -> None:
@@ -78,7 +78,7 @@ def test_what_is_written_is_read(records: list[tuple[int, str, Frame]]) -> None:
 
 @given(st.binary())
 def test_no_line_raises(line: bytes) -> None:
-    assert isinstance(parse_line(line), Record | Fault)
+    assert isinstance(parse_line(line), LogRecord | LineFault)
 
 
 def test_faults_by_reason() -> None:
@@ -99,13 +99,13 @@ def test_faults_by_reason() -> None:
     ]
     reader = CandumpReader(lines)
     assert [record.time_us for record in reader] == [1_000_000, 2_000_000]
-    assert reader.faults == {Fault.NOT_A_LINE: 3, Fault.IDENTIFIER: 3, Fault.DATA: 3, Fault.CUT: 1}
-    assert reader.first[Fault.CUT] == 13
+    assert reader.faults == {LineFault.NOT_A_LINE: 3, LineFault.IDENTIFIER: 3, LineFault.DATA: 3, LineFault.CUT: 1}
+    assert reader.first[LineFault.CUT] == 13
 
 
 def test_a_log_of_nanoseconds_is_cut_to_microseconds() -> None:
     found = parse_line(b"(12.345678901) can0 123#00")
-    assert isinstance(found, Record)
+    assert isinstance(found, LogRecord)
     assert found.time_us == 12_345_678
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from onboard.contract.messages import Progress, Reference
-from onboard.systems.car_park.diagram import Picture, watch
-from onboard.trace.chart.sequence import Chart, chart
+from onboard.systems.car_park.diagram import TrackDiagram, watch
+from onboard.trace.chart.sequence import SequenceChart, chart
 from onboard.trace.cli import main
 from onboard.trace.listener import Listener
 from onboard.trace.readers.open_log import Log
@@ -20,14 +20,14 @@ from tests.trace.runs import SITE, SITE_FILE, fleet_of, run_log
 _SVG = "{http://www.w3.org/2000/svg}"
 
 
-def _chart(number: int = 1) -> Chart:
+def _chart(number: int = 1) -> SequenceChart:
     with Log(str(run_log())) as log:
         found = chart(SITE, Listener(codecs()).messages(log), Reference(1, number))
     assert found is not None
     return found
 
 
-def _picture() -> Picture:
+def _picture() -> TrackDiagram:
     return watch(SITE, fleet_of(run_log()))
 
 

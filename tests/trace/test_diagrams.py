@@ -24,7 +24,7 @@ from onboard.systems.turning.diagram import TurningDiagram
 from onboard.systems.turning.site import Turning
 from onboard.trace.chart.over_time import Rows
 from onboard.trace.cli import main
-from onboard.trace.listener import Said
+from onboard.trace.listener import LoggedMessage
 from tests.web.logs import file_of, log_of, said_in
 
 _SVG = "{http://www.w3.org/2000/svg}"
@@ -54,7 +54,7 @@ def test_every_system_draws_what_moves_over_time(name: str, tmp_path: Path) -> N
 def _watched(diagram: Rows, name: str) -> Rows:
     for time_us, is_fleet, message in said_in(name):
         if is_fleet:
-            diagram.feed(Said(time_us, "fleet", message, is_fleet))
+            diagram.feed(LoggedMessage(time_us, "fleet", message, is_fleet))
     diagram.draw(0)
     return diagram
 

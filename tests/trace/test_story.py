@@ -8,14 +8,14 @@ from bus_sim.cli import main as bus_sim
 from onboard.contract.codes import TaskPhase
 from onboard.contract.messages import Award, Bid, CallForProposals, Reference, TaskReport
 from onboard.trace.cli import main
-from onboard.trace.story.why import TaskStory, Why
+from onboard.trace.story.why import TaskStory, WaitingStory
 from tests.trace.runs import SITE, SITE_FILE, first, fleet_of, run_log
 
 PARK, FETCH = Reference(1, 1), Reference(1, 2)
 
 
 def _story(*words: str, task: Reference = PARK) -> TaskStory:
-    why = Why(SITE)
+    why = WaitingStory(SITE)
     for said in fleet_of(run_log(*words)):
         why.feed(said.message, said.time_us)
     why.finish()

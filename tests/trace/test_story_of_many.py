@@ -13,8 +13,8 @@ from bus_sim.cli import main as bus_sim
 from onboard.contract.codes import TaskPhase
 from onboard.contract.messages import CallForProposals, TaskReport
 from onboard.history.calls import is_task
-from onboard.trace.listener import Said
-from onboard.trace.story.why import TaskStory, Why
+from onboard.trace.listener import LoggedMessage
+from onboard.trace.story.why import TaskStory, WaitingStory
 from tests.trace.runs import SITE, fleet_of
 
 #: More cars than two robots keep up with, a robot and a lift that lose their power, and frames that are missed.
@@ -23,7 +23,7 @@ FAULTS = ("crash:target=MR1,at_s=130", "crash:target=ER2,at_s=300", "omission:re
 
 
 @cache
-def busy() -> list[Said]:
+def busy() -> list[LoggedMessage]:
     """All messages of the fleet bus of that run."""
     path = Path(mkdtemp(prefix="stories-")) / "run.log"
     faults = [word for fault in FAULTS for word in ("--fault", fault)]
@@ -31,9 +31,9 @@ def busy() -> list[Said]:
     return fleet_of(path)
 
 
-def told(said: list[Said]) -> dict[str, TaskStory]:
+def told(said: list[LoggedMessage]) -> dict[str, TaskStory]:
     """Every story, by its task."""
-    why = Why(SITE)
+    why = WaitingStory(SITE)
     for one in said:
         why.feed(one.message, one.time_us)
     why.finish()

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from onboard.systems.turning.cost import Edge, bill
+from onboard.systems.turning.cost import ToolEdgeUse, bill
 from onboard.systems.turning.lathe import LatheState
 from onboard.systems.turning.process import generate, wear_of
 from tests.turning.workshop import JOB, SHAFT, STEEL, lathe
@@ -12,7 +12,7 @@ from tests.turning.workshop import JOB, SHAFT, STEEL, lathe
 
 def test_p26_the_hand_computed_part() -> None:
     """60 EUR/h, 3.2 min of cutting, an 8 EUR edge of 20 min, 15 min of setup for 10 parts, 4.10 EUR of bar, 0.5 min."""
-    one = bill(60.0, 3.2, (Edge(8.0, 3.2, 20.0),), 15.0, 10, 4.10, 0.5)
+    one = bill(60.0, 3.2, (ToolEdgeUse(8.0, 3.2, 20.0),), 15.0, 10, 4.10, 0.5)
     assert [round(term, 2) for term in one] == [3.20, 1.28, 1.50, 4.10, 0.50]
     assert one.total_eur == pytest.approx(10.58)
     assert one.total_cents == 1058

@@ -14,7 +14,7 @@ from onboard.core.motion_authority import ALONE, acts, authorised
 from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 from onboard.systems.turning.machine import TABLE, Control, Deed, LatheMachine
-from onboard.systems.turning.records import JobRecord, JobStageRecord, Stage
+from onboard.systems.turning.records import BatchStage, JobRecord, JobStageRecord
 
 LATHE, BATCH = 3, 5
 TASK = Reference(9, 4)
@@ -26,7 +26,7 @@ PROGRAMS = {"its program": (9 * 31 + 4) % 255 + 1, "another program": 7}
 PARTS = {"none made": 0, "all made": BATCH}
 
 
-def machine_in(stage: Stage) -> LatheMachine:
+def machine_in(stage: BatchStage) -> LatheMachine:
     site = find_site("turning")
     machine = site.machines[LATHE]
     entries = [JOB.entry]
@@ -37,15 +37,15 @@ def machine_in(stage: Stage) -> LatheMachine:
     return behaviour
 
 
-def expected(stage: Stage, mode: str, program: str, parts: str, *, obeyed: bool) -> Control:
+def expected(stage: BatchStage, mode: str, program: str, parts: str, *, obeyed: bool) -> Control:
     """What the words of the control mean, told once more."""
     if mode == "works":
         return Control.BUSY
     if not obeyed:
         return Control.UNMOVED
-    if stage is Stage.WON:
+    if stage is BatchStage.WON:
         return Control.FREE if program == "its program" else Control.OTHER_PROGRAM
-    return Control.ALL_MADE if stage is Stage.MAKING and parts == "all made" else Control.FREE
+    return Control.ALL_MADE if stage is BatchStage.MAKING and parts == "all made" else Control.FREE
 
 
 def kind_of(effects: list[Effect]) -> list[object]:
@@ -75,10 +75,10 @@ SAID: dict[Deed, list[object]] = {
 }
 
 
-@pytest.mark.parametrize("stage", Stage)
+@pytest.mark.parametrize("stage", BatchStage)
 @pytest.mark.parametrize(("mode", "program", "parts", "obeyed"), list(product(MODES, PROGRAMS, PARTS, (True, False))))
 def test_every_stage_meets_every_word_of_the_control(
-    stage: Stage, mode: str, program: str, parts: str, obeyed: bool
+    stage: BatchStage, mode: str, program: str, parts: str, obeyed: bool
 ) -> None:
     machine = machine_in(stage)
     machine.sense(NcState(LATHE, 40, NcMode.READY, PROGRAMS[program], 0), 0)
@@ -95,13 +95,13 @@ def test_every_stage_meets_every_word_of_the_control(
 def test_a_line_of_the_table_is_for_what_can_be() -> None:
     met = {
         (stage, expected(stage, mode, program, parts, obeyed=obeyed))
-        for stage, mode, program, parts, obeyed in product(Stage, MODES, PROGRAMS, PARTS, (True, False))
+        for stage, mode, program, parts, obeyed in product(BatchStage, MODES, PROGRAMS, PARTS, (True, False))
     }
     assert met == set(TABLE)
 
 
 def test_a_lathe_that_is_set_up_goes_on_after_a_restart_and_one_that_was_not_begins_anew() -> None:
-    def stage_after(*records: JournalRecord) -> Stage:
+    def stage_after(*records: JournalRecord) -> BatchStage:
         site = find_site("turning")
         machine = site.machines[LATHE]
         entries = [JOB.entry, *(one.entry for one in records)]
@@ -109,5 +109,5 @@ def test_a_lathe_that_is_set_up_goes_on_after_a_restart_and_one_that_was_not_beg
         assert isinstance(behaviour, LatheMachine)
         return behaviour.tasks.in_hand[TASK].stage
 
-    assert stage_after(JobStageRecord(TASK, Stage.SETTING)) is Stage.WON, "whether it was obeyed is not known"
-    assert stage_after(JobStageRecord(TASK, Stage.MAKING)) is Stage.MAKING
+    assert stage_after(JobStageRecord(TASK, BatchStage.SETTING)) is BatchStage.WON, "whether it was obeyed is not known"
+    assert stage_after(JobStageRecord(TASK, BatchStage.MAKING)) is BatchStage.MAKING

@@ -10,7 +10,7 @@ from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
 from bus_sim.session import play
 from bus_sim.sites import find_site
-from bus_sim.systems.stage import Stage
+from bus_sim.systems.stage import SystemStage
 from bus_sim.systems.turning.nc import ProgramError, run_program
 from bus_sim.systems.turning.plant import TurningPlant
 from bus_sim.systems.turning.show import board
@@ -20,39 +20,39 @@ from onboard.contract.turning import BillBar, BillCutting, LathePhase, LatheProg
 from onboard.holon.holon import Holon
 from onboard.systems.turning.checks import RULES
 from onboard.systems.turning.generation import LatheGeneration
-from onboard.systems.turning.lathe import Job, LatheState
+from onboard.systems.turning.lathe import LatheState, TurningJob
 from onboard.systems.turning.machine import LatheMachine
 from onboard.systems.turning.process import generate
-from onboard.systems.turning.site import Turning, Wanted
+from onboard.systems.turning.site import BatchDemand, Turning
 from tests.faults.systems import judged, withstands
 
 
-def _site(*orders: Wanted) -> Turning:
+def _site(*orders: BatchDemand) -> Turning:
     site = find_site("turning")
     assert isinstance(site, Turning)
     return replace(site, orders=orders or site.orders)
 
 
-def _play(site: Turning, prepare: Callable[[BusRun[Any]], None] | None = None, **options: object) -> Stage[Any]:
+def _play(site: Turning, prepare: Callable[[BusRun[Any]], None] | None = None, **options: object) -> SystemStage[Any]:
     return play(site, RunOptions(limit_s=20_000, **options), prepare=prepare)  # type: ignore[arg-type]  # as given
 
 
-def _plant(played: Stage[Any]) -> TurningPlant:
+def _plant(played: SystemStage[Any]) -> TurningPlant:
     assert isinstance(played.plant, TurningPlant)
     return played.plant
 
 
-def _sound(played: Stage[Any]) -> None:
+def _sound(played: SystemStage[Any]) -> None:
     assert played.plant.violations == [] and played.halted == [] and played.is_over
 
 
 @pytest.fixture(scope="module")
-def shipped() -> Stage[Any]:
+def shipped() -> SystemStage[Any]:
     """The shipped site, once."""
     return _play(_site())
 
 
-def test_p27_three_lathes_and_the_winner_that_is_known(shipped: Stage[Any]) -> None:
+def test_p27_three_lathes_and_the_winner_that_is_known(shipped: SystemStage[Any]) -> None:
     """The cheapest by the five terms worked out here wins: thin pins L3, the shaft L2, only L1 holds the flange."""
     _sound(shipped)
     site = _site()
@@ -73,7 +73,7 @@ def test_p27_three_lathes_and_the_winner_that_is_known(shipped: Stage[Any]) -> N
         assert entries[number - 1].total_ct == min(cents.values())
 
 
-def test_p25_the_control_runs_the_winners_program_and_the_part_is_as_drawn(shipped: Stage[Any]) -> None:
+def test_p25_the_control_runs_the_winners_program_and_the_part_is_as_drawn(shipped: SystemStage[Any]) -> None:
     plant = _plant(shipped)
     assert set(plant.programs) == {(3, 1), (2, 2), (1, 3)}
     assert set(plant.errors_mm) == {1, 2, 3} and max(plant.errors_mm.values()) <= 0.01
@@ -85,7 +85,7 @@ def test_p25_the_control_runs_the_winners_program_and_the_part_is_as_drawn(shipp
         run_program(plant.programs[2, 2].replace("M30", "M0"))
 
 
-def test_p26_the_five_terms_are_on_the_bus_and_sum_to_the_bid(shipped: Stage[Any]) -> None:
+def test_p26_the_five_terms_are_on_the_bus_and_sum_to_the_bid(shipped: SystemStage[Any]) -> None:
     verdict = judged(_site(), shipped.messages)
     assert verdict.is_good, verdict.lines()
     assert all(verdict.seen[rule.name] for rule in RULES)
@@ -96,7 +96,7 @@ def test_p26_the_five_terms_are_on_the_bus_and_sum_to_the_bid(shipped: Stage[Any
 
 def test_p24_a_worn_edge_changes_the_bid_and_here_the_winner() -> None:
     """The sensor of L2's roughing edge decides between it and an L1 that is almost as cheap."""
-    site = _site(Wanted(0, Job(2, 1, 45, 1)))
+    site = _site(BatchDemand(0, TurningJob(2, 1, 45, 1)))
     site = replace(site, lathes={**site.lathes, 1: replace(site.lathes[1], hourly_eur=49.0)})
 
     def worn(run: BusRun[Any]) -> None:
@@ -112,13 +112,13 @@ def test_p24_a_worn_edge_changes_the_bid_and_here_the_winner() -> None:
 
 
 def test_p24_edges_are_changed_before_they_are_worn_out() -> None:
-    played = _play(_site(Wanted(0, Job(2, 1, 45, 60))))
+    played = _play(_site(BatchDemand(0, TurningJob(2, 1, 45, 60))))
     _sound(played)
     plant = _plant(played)
     assert plant.entries[0].result is OrderResult.DONE and sum(one.edges_changed for one in plant.devices.values()) >= 1
 
 
-def test_p21_a_lathe_looks_at_no_other_machine(shipped: Stage[Any]) -> None:
+def test_p21_a_lathe_looks_at_no_other_machine(shipped: SystemStage[Any]) -> None:
     """What the others do, and the mirror of it, changes nothing: a lathe alone bids what it bid beside the others."""
     site = _site()
     alone = LatheGeneration(site, site.machines[3])
@@ -131,7 +131,7 @@ def test_p21_a_lathe_looks_at_no_other_machine(shipped: Stage[Any]) -> None:
     assert found is not None and found.cost == bid.cost and found.itinerary is None
 
 
-def test_p59_the_same_holon_drives_lathes(shipped: Stage[Any]) -> None:
+def test_p59_the_same_holon_drives_lathes(shipped: SystemStage[Any]) -> None:
     controllers = shipped.run.controllers
     assert {type(one.holon) for one in controllers.values()} == {Holon}
     assert {type(one.holon.behaviour) for node, one in controllers.items() if node != 9} == {LatheMachine}
@@ -140,7 +140,7 @@ def test_p59_the_same_holon_drives_lathes(shipped: Stage[Any]) -> None:
 
 def test_what_no_lathe_can_make_is_refused() -> None:
     # A bar of 300 mm is in nobody's jaws.
-    played = _play(_site(Wanted(0, Job(3, 1, 300, 1))))
+    played = _play(_site(BatchDemand(0, TurningJob(3, 1, 300, 1))))
     _sound(played)
     assert [one.result for one in _plant(played).entries] == [OrderResult.REFUSED]
     assert not any(isinstance(one, Bid) for _, one in played.messages)
@@ -162,6 +162,10 @@ def test_each_checker_finds_what_it_is_for() -> None:
 
 @pytest.mark.parametrize("seed", range(16))
 def test_the_turning_cell_under_faults(seed: int) -> None:
-    site = _site(Wanted(0, Job(1, 2, 14, 2)), Wanted(5_000, Job(2, 1, 45, 1)), Wanted(20_000, Job(1, 1, 16, 2)))
+    site = _site(
+        BatchDemand(0, TurningJob(1, 2, 14, 2)),
+        BatchDemand(5_000, TurningJob(2, 1, 45, 1)),
+        BatchDemand(20_000, TurningJob(1, 1, 16, 2)),
+    )
     # Half of them strike while calls are open, half over the whole of the work.
     withstands(site, seed, (10.0, 36.4) if seed % 4 < 2 else (10.0, 714.0), 20_000)

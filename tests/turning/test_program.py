@@ -6,8 +6,8 @@ from math import atan2, cos, hypot, pi, sin
 import pytest
 from pygcode import Line  # type: ignore[import-untyped]  # the package has no types
 
-from onboard.systems.turning.drawing import Drawing, Element
-from onboard.systems.turning.lathe import Job, LatheState
+from onboard.systems.turning.drawing import ContourElement, Drawing
+from onboard.systems.turning.lathe import LatheState, TurningJob
 from onboard.systems.turning.process import Process, generate
 from tests.turning.workshop import JOB, SHAFT, STEEL, contour, lathe
 
@@ -16,7 +16,7 @@ Point = tuple[float, float]
 TOLERANCE_MM = 0.01
 
 
-def _process(drawing: Drawing = SHAFT, job: Job = JOB) -> Process:
+def _process(drawing: Drawing = SHAFT, job: TurningJob = JOB) -> Process:
     process = generate(job, drawing, STEEL, lathe(1, 60.0), LatheState())
     assert process is not None
     return process
@@ -52,7 +52,7 @@ def _path(start: Point, end: Point, centre: Point | None, word: str) -> list[Poi
     return [(centre[0] + radius * sin(a), centre[1] + radius * cos(a)) for a in angles]
 
 
-def _drawn(element: Element) -> list[Point]:
+def _drawn(element: ContourElement) -> list[Point]:
     """Points of one element of the drawing, by its own definition: the arc's points are ``radius`` from its centre."""
     one, other = element.start, element.end
     chord = [
@@ -130,9 +130,9 @@ def test_p25_cutting_conditions_keep_to_power_roughness_and_spindle() -> None:
 
 
 def test_p25_a_long_thin_bar_needs_the_tailstock_and_a_thick_one_other_jaws() -> None:
-    job = Job(12, 1, 22.0)
+    job = TurningJob(12, 1, 22.0)
     thin = Drawing(12, "needle", contour((0, 0, 0), (0, 20, 0), (90, 20, 0)), 3.2)
     assert generate(job, thin, STEEL, lathe(1, 60.0), LatheState()) is None
     supported = generate(job, thin, STEEL, lathe(1, 60.0, has_tailstock=True), LatheState())
     assert supported is not None and supported.clamping.tailstock
-    assert generate(Job(12, 1, 170.0), SHAFT, STEEL, lathe(1, 60.0), LatheState()) is None
+    assert generate(TurningJob(12, 1, 170.0), SHAFT, STEEL, lathe(1, 60.0), LatheState()) is None

@@ -9,7 +9,7 @@ from bus_sim.sites import find_site
 from onboard.config.problems import ConfigError
 from onboard.config.site import parse_site
 from onboard.systems.turning.drawing import Shape
-from onboard.systems.turning.lathe import Work
+from onboard.systems.turning.lathe import LatheOperation
 from onboard.systems.turning.site import Turning
 
 TEXT = (Path(bus_sim.sites.__file__).parent / "turning.toml").read_text(encoding="utf-8")
@@ -20,7 +20,11 @@ def test_the_shipped_cell_is_read() -> None:
     assert isinstance(site, Turning)
     assert sorted(site.lathes) == [1, 2, 3] and site.desks == (9,)
     lathe = site.lathes[1]
-    assert (lathe.hourly_eur, lathe.has_tailstock, lathe.tools[0].works) == (85.0, True, (Work.FACE, Work.ROUGH))
+    assert (lathe.hourly_eur, lathe.has_tailstock, lathe.tools[0].works) == (
+        85.0,
+        True,
+        (LatheOperation.FACE, LatheOperation.ROUGH),
+    )
     shapes = [element.shape for element in site.drawings[2].elements]
     assert shapes == [
         *(Shape.FACE, Shape.ARC, Shape.CYLINDER, Shape.ARC, Shape.FACE, Shape.TAPER, Shape.CYLINDER),

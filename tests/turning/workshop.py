@@ -2,11 +2,11 @@
 
 from itertools import pairwise
 
-from onboard.systems.turning.drawing import At, Drawing, Element
-from onboard.systems.turning.lathe import Chuck, Job, Lathe, Material, Tool, Work
+from onboard.systems.turning.drawing import At, ContourElement, Drawing
+from onboard.systems.turning.lathe import Chuck, Lathe, LatheOperation, Material, Tool, TurningJob
 
 STEEL = Material(1, "C45", 2100.0, 1.6, 7.85)
-EVERYTHING = (Work.FACE, Work.ROUGH)
+EVERYTHING = (LatheOperation.FACE, LatheOperation.ROUGH)
 
 
 def tools(**changes: float) -> tuple[Tool, ...]:
@@ -14,15 +14,15 @@ def tools(**changes: float) -> tuple[Tool, ...]:
     rough = {"speed_m_min": 180.0, "depth_mm": 2.5, "feed_mm": 0.3, "nose_mm": 0.8, "edge_eur": 8.0, "life_min": 20.0}
     return (
         Tool(1, EVERYTHING, **(rough | changes)),
-        Tool(2, (Work.FINISH,), 240.0, 0.8, 0.25, 0.4, 6.0, 15.0),
+        Tool(2, (LatheOperation.FINISH,), 240.0, 0.8, 0.25, 0.4, 6.0, 15.0),
     )
 
 
-def contour(*points: tuple[float, float, float]) -> tuple[Element, ...]:
+def contour(*points: tuple[float, float, float]) -> tuple[ContourElement, ...]:
     """Elements through points (depth mm, diameter mm, arc radius mm), the first with radius 0."""
     ats = [At(1000 * depth, 500 * diameter) for depth, diameter, _ in points]
     return tuple(
-        Element(one, other, 1000 * radius)
+        ContourElement(one, other, 1000 * radius)
         for (one, other), (_, _, radius) in zip(pairwise(ats), points[1:], strict=True)
     )
 
@@ -34,7 +34,7 @@ SHAFT = Drawing(
     contour((0, 0, 0), (0, 16, 0), (2, 20, 2), (25, 20, 0), (28, 26, -3), (28, 30, 0), (43, 40, 0), (60, 40, 0)),
     1.6,
 )
-JOB = Job(12, 1, 45.0, batch=10)
+JOB = TurningJob(12, 1, 45.0, batch=10)
 
 
 def lathe(node: int, hourly_eur: float, **changes: object) -> Lathe:

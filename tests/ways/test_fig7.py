@@ -19,7 +19,7 @@ from onboard.systems.car_park.site import CarPark
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lift_uses import are_compatible, ride_us
 from onboard.ways.occupancy import itinerary_windows, lift_uses
-from onboard.ways.reservations import FOREVER, Reservations, Window
+from onboard.ways.reservations import FOREVER, Reservations, SlotWindow
 from onboard.ways.sipp import Route, RouteLeg, Visit, plan_route
 from onboard.ways.site import Axis
 from tests.ways.buildings import LEFT, RIGHT, building
@@ -207,7 +207,7 @@ def test_p37_the_planner_finds_each_of_the_eight_where_the_others_are_blocked(ri
     standing = [away, back, *(Segment(floor, 8) for floor in (2, 3, 4) if floor not in crossed)]
     reservations = Reservations()
     for owner, segment in enumerate(standing, start=ALPHA):
-        reservations.reserve(owner, [Window(segment, 0, FOREVER)])
+        reservations.reserve(owner, [SlotWindow(segment, 0, FOREVER)])
     visits = (Visit(GOAL, FAST.work_us),)
     route = plan_route(park(FAST, 0), reservations, LAMBDA, START, 0, visits, frozenset({GOAL}), 4_000)
     assert isinstance(route, Route)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from onboard.ways.kinematics import Run, ceil_ms, cleared_at_us, run_duration_us, time_at_us
+from onboard.ways.kinematics import RestToRest, ceil_ms, cleared_at_us, run_duration_us, time_at_us
 from onboard.ways.site import Axis
 
 CARRIER = Axis(1_500, 500)  # reaches top speed after 3 s and 2,250 mm
@@ -49,12 +49,12 @@ def test_duration_of_a_run(distance_mm: int, duration_us: int) -> None:
     [(-5, 0), (0, 0), (1_000, 2_000_000), (2_250, 3_000_000), (6_000, 5_500_000), (11_000, 9_000_000)],
 )
 def test_where_the_time_is_whole_both_roundings_agree(travelled_mm: int, time_us: int) -> None:
-    run = Run(12_000, CARRIER)
+    run = RestToRest(12_000, CARRIER)
     assert time_at_us(run, travelled_mm) == cleared_at_us(run, travelled_mm) == time_us
 
 
 def test_the_end_of_a_run_is_cleared_with_its_leg_and_reached_no_later() -> None:
-    run = Run(2_400, CARRIER)
+    run = RestToRest(2_400, CARRIER)
     assert cleared_at_us(run, 2_400) == cleared_at_us(run, 9_999) == 4_382_000
     assert time_at_us(run, 2_400) == 4_381_780
 
@@ -72,7 +72,7 @@ def test_a_front_is_never_expected_late_nor_a_rear_early_and_both_within_a_micro
     distance: int, axis: Axis, part: float
 ) -> None:
     travelled = int(distance * part)
-    run = Run(distance, axis)
+    run = RestToRest(distance, axis)
     front_us, rear_us = time_at_us(run, travelled), cleared_at_us(run, travelled)
     tick = Decimal("1.003")  # a microsecond and the nanoseconds that the docstring admits
     tiny = Decimal("1e-30")

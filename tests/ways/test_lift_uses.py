@@ -16,7 +16,7 @@ from onboard.ways.lift_uses import (
 )
 from onboard.ways.lifts import platform
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
-from onboard.ways.reservations import FOREVER, Interval, Reservations, Use, Window
+from onboard.ways.reservations import FOREVER, Interval, Reservations, SlotWindow, Use
 from onboard.ways.site import Axis
 from tests.ways.buildings import LEFT, RIGHT, building
 
@@ -45,7 +45,7 @@ THROUGH = plan(
 )
 
 
-def spans_ms(windows: list[Window], segment: Segment) -> list[tuple[float, float]]:
+def spans_ms(windows: list[SlotWindow], segment: Segment) -> list[tuple[float, float]]:
     return [(w.from_us / MS, w.to_us / MS if w.to_us < FOREVER else -1) for w in windows if w.segment == segment]
 
 
@@ -161,7 +161,7 @@ def test_where_lifts_stand_when_a_plan_begins_later() -> None:
 def test_uses_are_kept_sorted_and_released_with_the_windows() -> None:
     book = Reservations()
     mine, theirs = use(1, 2, 50, 80, 11), use(1, 3, 0, 40)
-    book.reserve(11, [Window(platform(LEFT), 50 * MS, 80 * MS)], [mine])
+    book.reserve(11, [SlotWindow(platform(LEFT), 50 * MS, 80 * MS)], [mine])
     book.reserve(12, [], [theirs])
     assert book.uses(LEFT, 0) == [theirs, mine]
     assert book.uses(LEFT, 11) == [theirs]

@@ -8,7 +8,7 @@ from onboard.core.site import Segment
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.occupancy import itinerary_windows, leg_sweeps, standing_segments, travel_windows
-from onboard.ways.reservations import FOREVER, Window
+from onboard.ways.reservations import FOREVER, SlotWindow
 from onboard.ways.site import Axis
 from tests.ways.lines import ALLEY, SPUR, line_site
 
@@ -28,7 +28,7 @@ def leg(action: LegAction, track: int, from_index: int, to_index: int, end_ms: i
     return Leg(action, track, from_index, to_index, Side.NEAR, end_ms)
 
 
-def spans_ms(windows: list[Window]) -> list[tuple[str, float, float]]:
+def spans_ms(windows: list[SlotWindow]) -> list[tuple[str, float, float]]:
     return [(str(w.segment), w.from_us / 1000, w.to_us / 1000 if w.to_us < FOREVER else -1) for w in windows]
 
 

@@ -6,7 +6,7 @@ from onboard.contract.codes import Grade, LegAction, Reason, Side
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Itinerary, Leg, Progress, Stamp
 from onboard.core.site import Segment
-from onboard.ways.passing import Plan
+from onboard.ways.passing import BegunItinerary
 from onboard.ways.passing_order import PassingOrder
 from tests.sites import one_floor
 
@@ -22,7 +22,7 @@ def order_of(*plans: Itinerary) -> PassingOrder:
 
 
 def tell(order: PassingOrder, itinerary: Itinerary) -> None:
-    order.on_plan(Plan(itinerary, itinerary.stamp.award_ms * 1000), 0)
+    order.on_plan(BegunItinerary(itinerary, itinerary.stamp.award_ms * 1000), 0)
 
 
 def plan(node: int, way: Sequence[tuple[int, int, int]], version: int = 1, begin_s: int = 0) -> Itinerary:
@@ -88,7 +88,7 @@ def test_a_plan_told_anew_drops_what_is_over() -> None:
 
 def test_a_released_plan_is_nobodys_predecessor() -> None:
     order = passing()
-    order.on_plan(Plan(Itinerary(ALICE, 2, Grade.RELEASED, Stamp(0, ALICE, 0), ()), 0), 0)
+    order.on_plan(BegunItinerary(Itinerary(ALICE, 2, Grade.RELEASED, Stamp(0, ALICE, 0), ()), 0), 0)
     assert order.predecessor(BOB, Segment(1, 7)) == NOBODY
 
 

@@ -5,14 +5,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from onboard.core.site import Segment
-from onboard.ways.reservations import FOREVER, Interval, Reservations, Window
+from onboard.ways.reservations import FOREVER, Interval, Reservations, SlotWindow
 
 HERE = Segment(1, 4)
 THERE = Segment(1, 5)
 HORIZON = 40
 
 WINDOWS = st.builds(
-    lambda segment, start, length: Window(segment, start, FOREVER if length == 0 else start + length),
+    lambda segment, start, length: SlotWindow(segment, start, FOREVER if length == 0 else start + length),
     st.sampled_from([HERE, THERE]),
     st.integers(0, HORIZON - 1),
     st.integers(0, 12),
@@ -21,10 +21,10 @@ WINDOWS = st.builds(
 PLANS = st.lists(st.tuples(st.integers(1, 3), st.lists(WINDOWS, max_size=4)), max_size=6)
 
 
-def filled(plans: list[tuple[int, list[Window]]]) -> tuple[Reservations, list[tuple[int, Window]]]:
+def filled(plans: list[tuple[int, list[SlotWindow]]]) -> tuple[Reservations, list[tuple[int, SlotWindow]]]:
     """The reservations under test, and beside them the naive list."""
     reservations = Reservations()
-    naive: list[tuple[int, Window]] = []
+    naive: list[tuple[int, SlotWindow]] = []
     for owner, windows in plans:
         reservations.release(owner)
         reservations.reserve(owner, windows)
@@ -34,7 +34,7 @@ def filled(plans: list[tuple[int, list[Window]]]) -> tuple[Reservations, list[tu
 
 @given(PLANS, st.integers(0, 4), st.integers(0, HORIZON))
 def test_safe_intervals_are_the_instants_that_no_other_node_holds(
-    plans: list[tuple[int, list[Window]]], owner: int, from_us: int
+    plans: list[tuple[int, list[SlotWindow]]], owner: int, from_us: int
 ) -> None:
     reservations, naive = filled(plans)
     for segment in (HERE, THERE):
@@ -50,7 +50,7 @@ def test_safe_intervals_are_the_instants_that_no_other_node_holds(
 
 @given(PLANS, st.integers(1, 3), st.lists(WINDOWS, max_size=4))
 def test_conflicts_are_all_overlaps_with_other_nodes(
-    plans: list[tuple[int, list[Window]]], owner: int, windows: list[Window]
+    plans: list[tuple[int, list[SlotWindow]]], owner: int, windows: list[SlotWindow]
 ) -> None:
     reservations, naive = filled(plans)
     expected = [
@@ -65,7 +65,7 @@ def test_conflicts_are_all_overlaps_with_other_nodes(
 
 @given(PLANS, st.integers(1, 3), st.integers(0, HORIZON))
 def test_passing_order_is_read_from_the_first_window_that_is_not_over(
-    plans: list[tuple[int, list[Window]]], owner: int, now_us: int
+    plans: list[tuple[int, list[SlotWindow]]], owner: int, now_us: int
 ) -> None:
     reservations, naive = filled(plans)
     open_here = [(holder, w.from_us) for holder, w in naive if w.segment == HERE and w.to_us > now_us]
@@ -77,11 +77,11 @@ def test_passing_order_is_read_from_the_first_window_that_is_not_over(
 
 
 def test_a_released_node_leaves_the_windows_of_others() -> None:
-    reservations, _ = filled([(1, [Window(HERE, 10, 20)]), (2, [Window(HERE, 15, 30)]), (1, [])])
+    reservations, _ = filled([(1, [SlotWindow(HERE, 10, 20)]), (2, [SlotWindow(HERE, 15, 30)]), (1, [])])
     assert reservations.safe_intervals(HERE, 9, 0) == [Interval(0, 15), Interval(30, FOREVER)]
 
 
 @pytest.mark.parametrize("to_us", [10, 9])
 def test_a_window_without_length_is_a_broken_invariant(to_us: int) -> None:
     with pytest.raises(ValueError, match=r"node 7 has no length"):
-        Reservations().reserve(7, [Window(HERE, 10, to_us)])
+        Reservations().reserve(7, [SlotWindow(HERE, 10, to_us)])

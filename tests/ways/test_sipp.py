@@ -11,7 +11,7 @@ from onboard.core.site import Segment
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.occupancy import itinerary_windows, travel_windows
-from onboard.ways.reservations import FOREVER, Reservations, Window
+from onboard.ways.reservations import FOREVER, Reservations, SlotWindow
 from onboard.ways.sipp import NoRoute, Route, RouteLeg, Visit, free_flow_us, plan_route
 from onboard.ways.site import Axis, WaySite
 from tests.ways.lines import ALLEY, SPUR, line_site
@@ -51,7 +51,7 @@ def planned(
     return route
 
 
-def windows_of(site: WaySite, route: Route, start: Segment, start_us: int = 0) -> list[Window]:
+def windows_of(site: WaySite, route: Route, start: Segment, start_us: int = 0) -> list[SlotWindow]:
     """What all other machines conclude from the itinerary on the wire."""
     legs = [
         Leg(one.action, one.track, one.from_index, one.to_index, Side.NEAR, to_bus_ms(one.end_us)) for one in route.legs
@@ -60,8 +60,8 @@ def windows_of(site: WaySite, route: Route, start: Segment, start_us: int = 0) -
     return itinerary_windows(site, itinerary, start_us)
 
 
-def occupied(segment: Segment, from_s: float, to_s: float) -> Window:
-    return Window(segment, int(from_s * SECOND), FOREVER if to_s == float("inf") else int(to_s * SECOND))
+def occupied(segment: Segment, from_s: float, to_s: float) -> SlotWindow:
+    return SlotWindow(segment, int(from_s * SECOND), FOREVER if to_s == float("inf") else int(to_s * SECOND))
 
 
 def run_us(segments: int) -> int:
@@ -120,7 +120,7 @@ def test_a_spur_is_where_one_lets_the_other_pass() -> None:
     site = alley(8, spur_at=4)
     reservations = Reservations()
     leader = travel_windows(site, p(8), 1, 15 * SECOND, 15 * SECOND + run_us(7))
-    stays = [occupied(p(8), 0, 15), Window(p(1), 15 * SECOND + run_us(7), FOREVER)]
+    stays = [occupied(p(8), 0, 15), SlotWindow(p(1), 15 * SECOND + run_us(7), FOREVER)]
     reservations.reserve(OTHER, leader + stays)
     route = planned(site, reservations, p(2), Visit(p(6), SECOND), refuges=frozenset({p(6)}))
     assert SPUR in {leg.track for leg in route.legs}
@@ -135,7 +135,7 @@ def test_a_route_that_sets_off_through_a_junction_tells_where_it_stands() -> Non
         RouteLeg(LegAction.STAND, ALLEY, 4, 4, 0, 0),
         RouteLeg(LegAction.TRAVEL, SPUR, 1, 1, 0, hop_us),
     )
-    assert Window(p(4), 0, hop_us) in windows_of(site, route, p(4))
+    assert SlotWindow(p(4), 0, hop_us) in windows_of(site, route, p(4))
 
 
 def test_free_flow_knows_the_way_through_spurs_and_what_is_out_of_reach() -> None:
@@ -171,7 +171,7 @@ def test_a_follower_departs_exactly_a_headway_behind() -> None:
     leader_us = 4 * SECOND
     reservations = Reservations()
     leader = travel_windows(site, p(3), 30, leader_us, leader_us + run_us(27))
-    reservations.reserve(OTHER, [occupied(p(3), 0, 4), *leader, Window(p(30), leader_us + run_us(27), FOREVER)])
+    reservations.reserve(OTHER, [occupied(p(3), 0, 4), *leader, SlotWindow(p(30), leader_us + run_us(27), FOREVER)])
     route = planned(site, reservations, p(1), Visit(p(28), SECOND), refuges=frozenset({p(28)}))
 
     # By hand: both run 27 segments, the leader 2 segments ahead; in each segment the follower's front (1,200 mm ahead
@@ -269,7 +269,7 @@ def test_machines_that_plan_one_after_the_other_never_touch(seed: int) -> None:
     homes = {14: p(9), 13: p(8), 12: p(7), 11: p(6)}
     reservations = Reservations()
     for node, home in homes.items():
-        reservations.reserve(node, [Window(home, 0, FOREVER)])
+        reservations.reserve(node, [SlotWindow(home, 0, FOREVER)])
     paths: list[list[float]] = []
     limit, waited = 31, 0
     for node, home in homes.items():

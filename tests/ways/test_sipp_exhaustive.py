@@ -8,7 +8,7 @@ from onboard.contract.messages import Itinerary, Leg, Stamp
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment
 from onboard.ways.occupancy import itinerary_windows
-from onboard.ways.reservations import FOREVER, Reservations, Window
+from onboard.ways.reservations import FOREVER, Reservations, SlotWindow
 from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 from tests.ways.exhaustive import AXIS, BUSY, PITCH_MM, TICK_US, Exhaustive, Place, Problem
 from tests.ways.lines import line_site
@@ -51,9 +51,9 @@ def plan(problem: Problem) -> tuple[Route | NoRoute, int]:
     reservations = Reservations()
     for number, (place, begin, end) in enumerate(problem.held):
         to_us = FOREVER if end is None else end * TICK_US
-        reservations.reserve(OTHERS[number % 3], [Window(Segment(*place), begin * TICK_US, to_us)])
+        reservations.reserve(OTHERS[number % 3], [SlotWindow(Segment(*place), begin * TICK_US, to_us)])
     # My own windows are no obstacle to me.
-    reservations.reserve(MYSELF, [Window(Segment(*problem.start), 0, FOREVER)])
+    reservations.reserve(MYSELF, [SlotWindow(Segment(*problem.start), 0, FOREVER)])
     start, start_us = Segment(*problem.start), problem.start_tick * TICK_US
     visits = tuple(Visit(Segment(*place), dwell * TICK_US, early * TICK_US) for place, dwell, early in problem.visits)
     refuges = frozenset(Segment(*place) for place in problem.refuges)

@@ -13,7 +13,7 @@ from onboard.ways import lift_uses as lifts_module
 from onboard.ways.lift_uses import are_compatible
 from onboard.ways.lifts import platform
 from onboard.ways.occupancy import itinerary_windows, lift_uses
-from onboard.ways.reservations import FOREVER, Reservations, Use, Window
+from onboard.ways.reservations import FOREVER, Reservations, SlotWindow, Use
 from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 from onboard.ways.site import WaySite
 from tests.ways.buildings import LEFT, RIGHT, building
@@ -92,15 +92,15 @@ def reserved(problem: Building) -> Reservations:
     reservations = Reservations()
     for number, (place, begin, end) in enumerate(problem.held):
         to_us = FOREVER if end is None else end * TICK_US
-        reservations.reserve(OTHERS[number % 3], [Window(Segment(*place), begin * TICK_US, to_us)])
+        reservations.reserve(OTHERS[number % 3], [SlotWindow(Segment(*place), begin * TICK_US, to_us)])
     for number, use in enumerate(problem.uses):
         owner = OTHERS[number % 3]
         to_us = FOREVER if use.until is None else use.until * TICK_US
         taken = Use(TRACKS[use.lift], use.board, use.leave, use.begin * TICK_US, to_us, owner)
-        reservations.reserve(owner, [Window(platform(taken.lift_track), taken.from_us, to_us)], [taken])
+        reservations.reserve(owner, [SlotWindow(platform(taken.lift_track), taken.from_us, to_us)], [taken])
     # My own windows and uses are no obstacle to me.
     mine = Use(TRACKS[problem.lifts[0]], 1, 1, 0, FOREVER, MYSELF)
-    reservations.reserve(MYSELF, [Window(Segment(1, 1), 0, FOREVER)], [mine])
+    reservations.reserve(MYSELF, [SlotWindow(Segment(1, 1), 0, FOREVER)], [mine])
     return reservations
 
 

@@ -11,12 +11,12 @@ from onboard.contract.messages import Reference
 from onboard.core.effects import Record
 from onboard.holon.holon import Holon
 from onboard.systems.cell.contracts import Goal
-from onboard.systems.cell.desk import Order as GoalOrder
+from onboard.systems.cell.desk import GoalOrder
 from onboard.systems.cell.geometry import Point
 from onboard.systems.graph.desk import Visits
 from onboard.systems.registry import factory_for
-from onboard.systems.turning.desk import Order as JobOrder
-from onboard.systems.turning.lathe import Job
+from onboard.systems.turning.desk import BatchOrder
+from onboard.systems.turning.lathe import TurningJob
 from onboard.work.order_desk import OrderDesk
 from onboard.work.order_life import NEXT, OVER, OrderEvent, OrderState, WorkOrder
 
@@ -25,7 +25,7 @@ GOAL = Goal(TASK, TASK, Point(10_000, 10_000), Point(40_000, 30_000), (), 0)
 ORDERS: dict[str, WorkOrder] = {
     "cell": GoalOrder(TASK, GOAL),
     "graph": Visits(TASK, (4, 6)),
-    "turning": JobOrder(TASK, Job(1, 1, 16)),
+    "turning": BatchOrder(TASK, TurningJob(1, 1, 16)),
 }
 NOW_US = 5_000_000
 

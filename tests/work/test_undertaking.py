@@ -11,16 +11,14 @@ from onboard.contract.messages import Award, CallForProposals, Reference, TaskRe
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.journal_records import JournalRecord
 from onboard.holon.holon import Holon
-from onboard.systems.cell.records import ContractRecord, StageRecord
-from onboard.systems.cell.records import Stage as ContractStage
+from onboard.systems.cell.records import ContractRecord, ContractStage, StageRecord
 from onboard.systems.cell.robot import ArmRobot
 from onboard.systems.graph.records import ErrandRecord
 from onboard.systems.graph.robot import GraphRobot
 from onboard.systems.registry import factory_for
 from onboard.systems.turning.machine import LatheMachine
-from onboard.systems.turning.records import JobOverRecord, JobRecord, JobStageRecord
-from onboard.systems.turning.records import Stage as JobStage
-from onboard.work.undertaking import TABLE, Answer, TaskEvent, TaskStanding
+from onboard.systems.turning.records import BatchStage, JobOverRecord, JobRecord, JobStageRecord
+from onboard.work.undertaking import TABLE, TaskEvent, TaskStanding, UndertakingAnswer
 
 #: The desk of all three sites.
 DESK = 9
@@ -53,7 +51,12 @@ SUBJECTS = {
         StageRecord(TASK, ContractStage.OVER, 0),
     ),
     "lathe": Subject(
-        "turning", 3, 1, JobRecord(TASK, 1, 1, 16, 5, 1000), JobStageRecord(TASK, JobStage.MAKING), JobOverRecord(TASK)
+        "turning",
+        3,
+        1,
+        JobRecord(TASK, 1, 1, 16, 5, 1000),
+        JobStageRecord(TASK, BatchStage.MAKING),
+        JobOverRecord(TASK),
     ),
     "robot of a graph": Subject(
         "graph", 11, 12, ErrandRecord(TASK, (4, 6)), ErrandRecord(TASK, (6,)), ErrandRecord(TASK, ())
@@ -97,7 +100,7 @@ def happens(machine: ArmRobot | LatheMachine | GraphRobot, subject: Subject, eve
         case _:
             tasks, work = machine.tasks, next(iter(machine_of(subject, subject.won).tasks.in_hand.values()))
             answer = tasks.meet(TASK, event, work)  # type: ignore[arg-type]  # the work of the same kind of machine
-            return [tasks.report(TASK)] if answer is Answer.REPORT else []
+            return [tasks.report(TASK)] if answer is UndertakingAnswer.REPORT else []
 
 
 @pytest.mark.parametrize("name", SUBJECTS)
@@ -107,7 +110,7 @@ def test_every_standing_meets_every_event(name: str, standing: TaskStanding, eve
     machine = machine_of(subject, *(getattr(subject, one) for one in WRITTEN[standing]))
     assert machine.tasks.standing(TASK) is standing
     effects = happens(machine, subject, event)
-    following, answer = TABLE.get((standing, event), (standing, Answer.NOTHING))
+    following, answer = TABLE.get((standing, event), (standing, UndertakingAnswer.NOTHING))
     assert machine.tasks.standing(TASK) is following
     said = [
         (one.message.phase, one.message.reason)
@@ -118,9 +121,9 @@ def test_every_standing_meets_every_event(name: str, standing: TaskStanding, eve
     assert (
         said
         == {
-            Answer.NOTHING: [],
-            Answer.REPORT: [(phase, Reason.NONE)],
-            Answer.GIVES_BACK: [(TaskPhase.FORFEITED, Reason.JOURNAL_LOST)],
+            UndertakingAnswer.NOTHING: [],
+            UndertakingAnswer.REPORT: [(phase, Reason.NONE)],
+            UndertakingAnswer.GIVES_BACK: [(TaskPhase.FORFEITED, Reason.JOURNAL_LOST)],
         }[answer]
     )
     if event is TaskEvent.TO_ANOTHER and standing is TaskStanding.WON:

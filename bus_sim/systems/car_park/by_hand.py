@@ -12,15 +12,15 @@ from rich.console import Console
 
 from bus_sim.systems.car_park.demand import Stay
 from bus_sim.systems.car_park.plant.bodies import random_car
-from bus_sim.systems.car_park.plant.customer import State
+from bus_sim.systems.car_park.plant.customer import CustomerState
 from bus_sim.systems.car_park.plant.street import Street
 
 KEYS = "keys: i a car comes in, o the car that came first is wanted out, q ends the run"
 #: What a person has done already: their car was asked for, or is on its way.
-_ASKED = frozenset({State.AT_DESK, State.AWAITING_DOOR, State.DRIVING_OUT, State.GONE})
+_ASKED = frozenset({CustomerState.AT_DESK, CustomerState.AWAITING_DOOR, CustomerState.DRIVING_OUT, CustomerState.GONE})
 
 
-class Hand:
+class StreetByHand:
     """What a person does to the street: lets a car come, and has one asked for."""
 
     def __init__(self, street: Street, seed: int) -> None:
@@ -54,7 +54,7 @@ class ByHand:
         self._is_quit = False
         self._is_closed = False
         self._street = street
-        self._hand = Hand(street, seed)
+        self._hand = StreetByHand(street, seed)
         self._console = console
         self._in = sys.stdin.fileno()
         self._terminal: list[Any] | None = None

@@ -12,7 +12,7 @@ from onboard.ways.site import way_site
 
 
 @dataclass(frozen=True)
-class Day:
+class ParkingDay:
     """Who comes, as the options of ``bus-sim run`` say it; see its help. ``window`` is what is shown of it."""
 
     sessions: Path | None = None
@@ -28,7 +28,7 @@ class Day:
     by_hand: bool = False
 
 
-def choose_demand(day: Day, site: Site | None = None, seed: int = 1) -> Demand:
+def choose_demand(day: ParkingDay, site: Site | None = None, seed: int = 1) -> Demand:
     """The stays to be played. Raises ``DemandError`` for a person's mistake.
 
     Unless told otherwise a site with several compartments gets the shipped day of all 52 stalls, any other that of
@@ -61,7 +61,7 @@ def _days(text: str | None) -> tuple[date | None, date | None]:
     return days
 
 
-def asked_day(args: Namespace, *, live: bool) -> Day:
+def asked_day(args: Namespace, *, live: bool) -> ParkingDay:
     """The day that the options ask for. Raises ``DemandError`` for those that do not go together."""
     window = _window(args, live=live)
     if args.by_hand and (window is not None or args.speed == "max"):
@@ -72,7 +72,7 @@ def asked_day(args: Namespace, *, live: bool) -> Day:
             f"--without {args.without[0]}: a window's warm-up is hurried, and a controller in another process lives at "
             "the clock's pace; leave out --hour and --window"
         )
-    return Day(
+    return ParkingDay(
         sessions=args.sessions,
         day=args.day,
         stalls=tuple(name for name in args.stalls.split(",") if name),

@@ -159,7 +159,7 @@ class Arrivals:
         ]
 
 
-class Session(NamedTuple):
+class ParkingSession(NamedTuple):
     """One row of a session file; both times carry their UTC offset."""
 
     arrival: datetime
@@ -176,7 +176,7 @@ class Session(NamedTuple):
         return Stay(_us(self.arrival, zero), _us(self.departure, zero), random_car(self.name, seed))
 
 
-def read_sessions(source: Readable) -> Iterator[Session]:
+def read_sessions(source: Readable) -> Iterator[ParkingSession]:
     """All sessions of a CSV file in its order. Raises ``DemandError`` at the first thing that cannot be read."""
     try:
         text = source.read_text(encoding="utf-8")
@@ -207,12 +207,12 @@ def _header_remedy(names: Sequence[str] | None) -> str:
     return f"the first line must name {', '.join(COLUMNS)}, divided by commas"
 
 
-def _session(row: dict[str, str | None], where: str) -> Session:
+def _session(row: dict[str, str | None], where: str) -> ParkingSession:
     arrival, departure = _time(row, "arrival", where), _time(row, "departure", where)
     if departure <= arrival:
         times = f"departure {row['departure']!r} is not after arrival {row['arrival']!r}"
         raise DemandError(f"{where}: {times}; correct or leave out the row")
-    return Session(arrival, departure, _cell(row, "station_id", where), _cell(row, "session_id", where))
+    return ParkingSession(arrival, departure, _cell(row, "station_id", where), _cell(row, "session_id", where))
 
 
 def _cell(row: dict[str, str | None], column: str, where: str) -> str:
@@ -238,7 +238,9 @@ def _is_within(day: date, first: date | None, last: date | None) -> bool:
     return (first is None or first <= day) and (last is None or day <= last)
 
 
-def _nothing(name: str, sessions: list[Session], stations: tuple[str, ...], day: date | None, last: date | None) -> str:
+def _nothing(
+    name: str, sessions: list[ParkingSession], stations: tuple[str, ...], day: date | None, last: date | None
+) -> str:
     if not sessions:
         return f"{name}: no sessions in the file"
     here = [session for session in sessions if session.is_at(stations)]

@@ -3,16 +3,16 @@
 from collections.abc import Iterator
 
 from bus_sim.attacks import words
-from bus_sim.attacks.attack import Node
+from bus_sim.attacks.attack import AttackerNode
 from onboard.contract.codes import OperatorAction
 from onboard.contract.messages import CarAt, Message, OperatorOrder, Reference
 from onboard.systems.car_park.site import car_park
 
 
-class Orders(words.Orders):
+class ForgedRetrievals(words.ForgedOrders):
     """Other people's cars are ordered out."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: AttackerNode) -> None:
         super().__init__(node)
         self._cars: set[Reference] = set()
 
@@ -22,7 +22,7 @@ class Orders(words.Orders):
             self._cars.add(message.car)
 
     def orders(self) -> Iterator[Message]:
-        """See ``words.Orders``."""
+        """See ``words.ForgedOrders``."""
         for compartment in car_park(self.node.site).compartments:
             for car in sorted(self._cars):
                 yield OperatorOrder(self.node.node_id, compartment, OperatorAction.URGENT_TICKET, car)

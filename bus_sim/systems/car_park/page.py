@@ -7,7 +7,7 @@ from typing import Any
 
 from bus_sim.demand import Law
 from bus_sim.faults.operators import STATION
-from bus_sim.systems.car_park.by_hand import Hand
+from bus_sim.systems.car_park.by_hand import StreetByHand
 from bus_sim.systems.car_park.simulation import Simulation
 from bus_sim.web.run_source import Arguments, RunSource
 from onboard.contract.codes import Reason
@@ -33,7 +33,7 @@ class CarParkSource(RunSource):
         }
         super().__init__(simulation, zero, acts)
         self._simulation = simulation
-        self._hand = Hand(simulation.plant.street, simulation.options.seed)
+        self._hand = StreetByHand(simulation.plant.street, simulation.options.seed)
         self._arrivals: asyncio.Task[None] | None = None
         self._station: Bus | None = None
 

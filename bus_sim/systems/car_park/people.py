@@ -5,7 +5,7 @@ from functools import partial
 
 from bus_sim.faults.controllers import machine_named
 from bus_sim.faults.injection import Injection
-from bus_sim.systems.car_park.plant.customer import Customer, Event
+from bus_sim.systems.car_park.plant.customer import Customer, CustomerEvent
 from bus_sim.systems.car_park.plant.motion import standing
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import DoorName, DoorPosition
@@ -41,7 +41,7 @@ def cancel(simulation: Simulation, injection: Injection) -> None:
     """Cancel is pressed: a parked car's owner comes back for it."""
     customer = _customer(simulation, injection)
     if customer is not None:
-        customer.on(Event.CANCEL)
+        customer.on(CustomerEvent.CANCEL)
 
 
 def key_presses(simulation: Simulation, injection: Injection) -> None:

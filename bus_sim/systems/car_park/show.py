@@ -38,7 +38,7 @@ _STATE_WORDS = {
 }
 
 
-class Clock:
+class DayClock:
     """Wall time of the simulated day; ``zero`` is the local time of loop time 0."""
 
     def __init__(self, zero: datetime) -> None:
@@ -222,7 +222,7 @@ def _floors(site: WaySite, view: SiteView, width: int, room: int, events: int) -
 def draw(
     site: WaySite,
     view: SiteView,
-    clock: Clock,
+    clock: DayClock,
     line: str,
     width: int = 120,
     height: int | None = None,
@@ -250,11 +250,11 @@ def draw(
     return Group(head, *floors, *states, bus, *events, *foot)
 
 
-class TerminalShow:
+class ConsoleShow:
     """A live picture where output is a terminal, else one plain line each simulated hour, or oftener."""
 
     def __init__(
-        self, site: WaySite, view: SiteView, clock: Clock, figures: Callable[[], str], console: Console
+        self, site: WaySite, view: SiteView, clock: DayClock, figures: Callable[[], str], console: Console
     ) -> None:
         self._site = site
         self._view = view

@@ -10,13 +10,13 @@ from bus_sim.demand import DemandError
 from bus_sim.faults import operators
 from bus_sim.options import RunOptions
 from bus_sim.systems.car_park import drives, people
-from bus_sim.systems.car_park.day import Day, asked_day, choose_demand
+from bus_sim.systems.car_park.day import ParkingDay, asked_day, choose_demand
 from bus_sim.systems.car_park.demand import Arrivals
-from bus_sim.systems.car_park.forged import Orders as ForgedOrders
+from bus_sim.systems.car_park.forged import ForgedRetrievals
 from bus_sim.systems.car_park.plant.plant import Plant
 from bus_sim.systems.car_park.planted.registry import find_bug
 from bus_sim.systems.car_park.simulation import build
-from bus_sim.systems.car_park.stage import ORIGIN_US, CarParkStage, Coming
+from bus_sim.systems.car_park.stage import ORIGIN_US, CarParkStage, ComingCustomers
 from bus_sim.systems.car_park.stranger import factories_with
 from bus_sim.systems.car_park.window import choose_window, with_short_eve
 from bus_sim.systems.stranger import Stranger
@@ -69,23 +69,23 @@ class CarParkSystem(SimulatedSystem[CarPark, Plant]):
         "moved": people.moved,
         "blocked": operators.blocked,
     }
-    attacks: Mapping[str, type[Any]] = {"orders": ForgedOrders}
+    attacks: Mapping[str, type[Any]] = {"orders": ForgedRetrievals}
     section = "demand"
     settings: ClassVar[Mapping[str, type]] = {"cars": int, "mean_s": float, "sigma_s": float, "min_stay_s": float}
 
     # --- a run -------------------------------------------------------------------------------------------------
 
     def stage(self, site: CarPark, options: RunOptions, loop: VirtualTimeLoop) -> CarParkStage:
-        """See ``SimulatedSystem``; ``options.demand`` is a ``Day``, or ``Arrivals`` by chance."""
+        """See ``SimulatedSystem``; ``options.demand`` is a ``ParkingDay``, or ``Arrivals`` by chance."""
         coming = _coming(site, options)
         dated = replace(options, epoch_us=round(coming.zero.timestamp() * 1_000_000))
-        return CarParkStage(build(site, dated if isinstance(options.demand, Day) else options, loop), coming)
+        return CarParkStage(build(site, dated if isinstance(options.demand, ParkingDay) else options, loop), coming)
 
-    def asked(self, site: CarPark, args: Namespace, given: Mapping[str, object], *, live: bool) -> Day:
+    def asked(self, site: CarPark, args: Namespace, given: Mapping[str, object], *, live: bool) -> ParkingDay:
         """See ``SimulatedSystem``."""
         return asked_day(args, live=live)
 
-    def speed(self, demand: Day, *, web: bool, terminal: bool) -> float | None:
+    def speed(self, demand: ParkingDay, *, web: bool, terminal: bool) -> float | None:
         """See ``SimulatedSystem``."""
         return WINDOW_SPEED if demand.window is not None else HAND_SPEED if web or demand.by_hand else None
 
@@ -138,10 +138,10 @@ class CarParkSystem(SimulatedSystem[CarPark, Plant]):
         return PATIENCE_S
 
 
-def _coming(site: CarPark, options: RunOptions) -> Coming:
+def _coming(site: CarPark, options: RunOptions) -> ComingCustomers:
     wanted = options.demand
-    if not isinstance(wanted, Day):
-        return Coming((wanted or Arrivals()).demand(options.seed))
+    if not isinstance(wanted, ParkingDay):
+        return ComingCustomers((wanted or Arrivals()).demand(options.seed))
     demand = choose_demand(wanted, site, options.seed)
     window = choose_window(demand, wanted.window) if wanted.window is not None else None
     if window is not None and wanted.short_eve:
@@ -149,7 +149,7 @@ def _coming(site: CarPark, options: RunOptions) -> Coming:
     # The first to come, or what is shown, is so long after power-up.
     first_us = min((stay.arrival_us for stay in demand.stays), default=0)
     first_us = first_us if window is None else min(first_us, window.begin_us)
-    return Coming(demand, ORIGIN_US - first_us, window, wanted.by_hand)
+    return ComingCustomers(demand, ORIGIN_US - first_us, window, wanted.by_hand)
 
 
 SIMULATED = CarParkSystem()

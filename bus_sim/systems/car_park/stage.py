@@ -10,13 +10,13 @@ from rich.console import Console
 from bus_sim.systems.car_park.by_hand import ByHand
 from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.plant.bodies import random_car
-from bus_sim.systems.car_park.plant.customer import Customer, Event, Outcome, State
+from bus_sim.systems.car_park.plant.customer import Customer, CustomerEvent, CustomerState, VisitOutcome
 from bus_sim.systems.car_park.plant.plant import Plant, looks_for_ticket
-from bus_sim.systems.car_park.show import Clock, TerminalShow
+from bus_sim.systems.car_park.show import ConsoleShow, DayClock
 from bus_sim.systems.car_park.simulation import Simulation
 from bus_sim.systems.car_park.summary import BurstFigures, RunSummary, bus_figures, unserved
-from bus_sim.systems.car_park.window import BURST_US, Window, densest
-from bus_sim.systems.stage import Ended, Hand, Show, Stage, Tally
+from bus_sim.systems.car_park.window import BURST_US, DayWindow, densest
+from bus_sim.systems.stage import EndedRun, PersonAtKeys, Show, SystemStage, Tally
 from onboard.systems.car_park.site import CarPark
 from onboard.trace.durations import Durations
 from onboard.trace.indicators import Indicators
@@ -33,16 +33,16 @@ PATIENCE_US = 2 * 3_600_000_000
 WINDOW_LINE_US = 300_000_000
 
 #: A customer who is hurried does not walk or drive: these states end at once.
-_HURRIED = (State.DRIVING_IN, State.WALKING_OUT)
+_HURRIED = (CustomerState.DRIVING_IN, CustomerState.WALKING_OUT)
 
 
 @dataclass(frozen=True)
-class Coming:
+class ComingCustomers:
     """Who comes when: ``origin_us`` is the loop time of the demand's time zero; ``window`` is what is shown of it."""
 
     demand: Demand
     origin_us: int = ORIGIN_US
-    window: Window | None = None
+    window: DayWindow | None = None
     by_hand: bool = False
 
     @property
@@ -51,8 +51,8 @@ class Coming:
         return (self.demand.zero or datetime(2000, 1, 1, tzinfo=UTC)) - timedelta(microseconds=self.origin_us)
 
 
-class CarParkStage(Stage[Plant]):
-    """See ``Stage``."""
+class CarParkStage(SystemStage[Plant]):
+    """See ``SystemStage``."""
 
     who = "customers"
     step_us = 1_000_000
@@ -64,12 +64,12 @@ class CarParkStage(Stage[Plant]):
     goes_on_watched = False
     run: Simulation
 
-    def __init__(self, run: Simulation, coming: Coming) -> None:
+    def __init__(self, run: Simulation, coming: ComingCustomers) -> None:
         super().__init__(run)
         self._coming = coming
         self._street = run.plant.street
         self._street.add_all(coming.demand, coming.origin_us)
-        self._clock = Clock(coming.zero)
+        self._clock = DayClock(coming.zero)
         self._indicators = Indicators(run.site)
         self._hurried: list[Customer] = []
 
@@ -85,7 +85,7 @@ class CarParkStage(Stage[Plant]):
         self.plant.oracle.finish()
 
     def waits_since(self, time_us: int) -> int:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return sum(_waits_since(customer, time_us) for customer in self.customers)
 
     def waits_s(self) -> tuple[float | None, ...]:
@@ -96,13 +96,13 @@ class CarParkStage(Stage[Plant]):
         """Whoever has lost the ticket does not count as waiting: no machine can help there."""
         customers, summary = self.customers, self._street.summary()
         outcomes = Counter(customer.visit.outcome for customer in customers)
-        still = (State.COMING, State.PARKED, State.GONE)
+        still = (CustomerState.COMING, CustomerState.PARKED, CustomerState.GONE)
         return Tally(
-            outcomes[Outcome.SERVED] + outcomes[Outcome.CANCELLED],
-            sum(outcomes[one] for one in (Outcome.FULL, Outcome.TOO_LARGE, Outcome.TICKET_UNKNOWN)),
+            outcomes[VisitOutcome.SERVED] + outcomes[VisitOutcome.CANCELLED],
+            sum(outcomes[one] for one in (VisitOutcome.FULL, VisitOutcome.TOO_LARGE, VisitOutcome.TICKET_UNKNOWN)),
             sum(one.state not in still and not looks_for_ticket(one) for one in customers),
             max((*summary.in_wait_us, *summary.out_wait_us), default=0) / 1e6,
-            outcomes[Outcome.FULL],
+            outcomes[VisitOutcome.FULL],
         )
 
     # --- a machine under test ----------------------------------------------------------------------------------
@@ -123,10 +123,10 @@ class CarParkStage(Stage[Plant]):
     def _hurry(self) -> None:
         for customer in self._hurried:
             if customer.state in _HURRIED:
-                customer.on(Event.TIMER)
+                customer.on(CustomerEvent.TIMER)
 
     def power_up(self, node: int) -> None:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         plant = self.plant
         for devices in (plant.shuttles, plant.carriers, plant.lifts, plant.compartments):
             if node in devices:
@@ -136,18 +136,18 @@ class CarParkStage(Stage[Plant]):
 
     @property
     def limit_us(self) -> int:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         last_us = max((stay.departure_us or stay.arrival_us for stay in self._coming.demand.stays), default=0)
         return last_us + self._coming.origin_us + PATIENCE_US
 
     @property
     def shown_us(self) -> tuple[int, int] | None:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         window, origin_us = self._coming.window, self._coming.origin_us
         return None if window is None else (window.begin_us + origin_us, window.end_us + origin_us)
 
     def head(self) -> list[str]:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         options, stays = self.run.options, self._coming.demand.stays
         told = (
             f"site {self.run.site.name}, {len(stays)} cars, seed {options.seed}, speed {options.speed or 'unlimited'}"
@@ -155,18 +155,18 @@ class CarParkStage(Stage[Plant]):
         return [told + "".join(f", fault {fault}" for fault in options.faults)]
 
     def warming_up(self, wall_s: float | None) -> str:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         window, demand = self._coming.window, self._coming.demand
         assert window is not None and self.shown_us is not None, "only what comes before a window is hurried"
         if wall_s is not None:
             speed = self.run.options.speed or "unlimited"
-            return f"warmed up in {wall_s:.1f} s; now {window.told(demand)} at speed {speed}"
+            return f"warmed up in {wall_s:.1f} s; now {window.described(demand)} at speed {speed}"
         before, until = sum(stay.arrival_us < window.begin_us for stay in demand.stays), self.shown_us[0]
         span = f"from {self._clock.at(0)} to {self._clock.at(until)}"
         return f"warm-up {span}, as fast as possible: {before} cars come before"
 
     def measure_from(self, now_us: int) -> None:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         super().measure_from(now_us)
         self._indicators.begin(now_us)
         self._show.every(WINDOW_LINE_US)
@@ -176,8 +176,8 @@ class CarParkStage(Stage[Plant]):
         self.run.observers.append(self._indicators.feed)
 
     def show(self, console: Console) -> Show:
-        """See ``Stage``."""
-        self._show = TerminalShow(way_site(self.run.site), self.run.view, self._clock, self._line, console)
+        """See ``SystemStage``."""
+        self._show = ConsoleShow(way_site(self.run.site), self.run.view, self._clock, self._line, console)
         return self._show
 
     def _line(self) -> str:
@@ -187,21 +187,21 @@ class CarParkStage(Stage[Plant]):
             f"  calls {view.calls_opened}  bids {view.bids}  bus load {load.mean_load:.2%}"
         )
 
-    def hand(self, console: Console) -> Hand | None:
-        """See ``Stage``."""
+    def hand(self, console: Console) -> PersonAtKeys | None:
+        """See ``SystemStage``."""
         if not self._coming.by_hand:
             return None
         options = self.run.options
         return ByHand(self._street, options.seed, console, ends_with_pipe=options.web is None)
 
     def source(self) -> "RunSource":
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         from bus_sim.systems.car_park.page import CarParkSource  # noqa: PLC0415  # its libraries are an extra
 
         return CarParkSource(self.run, self._coming.zero)
 
-    def summary(self, ended: Ended) -> RunSummary:
-        """See ``Stage``."""
+    def summary(self, ended: EndedRun) -> RunSummary:
+        """See ``SystemStage``."""
         run, now_us = self.run, self.run.loop.now_us()
         street, fleet = self._street.summary(ended.begin_us), self._indicators.figures(now_us)
         frames, errors, mean_load, worst_load = bus_figures(run.fleet.statistics())
@@ -236,18 +236,18 @@ class CarParkStage(Stage[Plant]):
             trace=str(trace) if trace is not None else None,
         )
 
-    def _played(self, ended: Ended) -> str | None:
+    def _played(self, ended: EndedRun) -> str | None:
         """What of the window the figures are of, as far as it was played; None for a whole run."""
         coming = self._coming
         if coming.window is None:
             return None
         begin_us = coming.window.begin_us if ended.is_warm else ended.begin_us - coming.origin_us
-        played = Window(begin_us, self.run.loop.now_us() - coming.origin_us).told(coming.demand)
+        played = DayWindow(begin_us, self.run.loop.now_us() - coming.origin_us).described(coming.demand)
         return played if ended.is_warm else f"warm-up, {played}"
 
-    def _burst(self, ended: Ended) -> BurstFigures | None:
+    def _burst(self, ended: EndedRun) -> BurstFigures | None:
         coming = self._coming
-        played = Window(ended.begin_us - coming.origin_us, self.run.loop.now_us() - coming.origin_us)
+        played = DayWindow(ended.begin_us - coming.origin_us, self.run.loop.now_us() - coming.origin_us)
         burst = densest(coming.demand, played if coming.window is not None else None)
         if burst is None:
             return None
@@ -266,7 +266,7 @@ def _wait_s(customer: Customer) -> float | None:
 
 def _waits_since(customer: Customer, time_us: int) -> bool:
     """Whether a customer waits who waited at this time: to bring the car, or to have it back."""
-    if customer.state is State.GONE or looks_for_ticket(customer):
+    if customer.state is CustomerState.GONE or looks_for_ticket(customer):
         return False
     visit = customer.visit
     since_us = visit.arrived_us if visit.parked_us is None else visit.asked_us

@@ -18,7 +18,7 @@ from onboard.core.serial import from_bus_ms, successor, to_bus_ms
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park.generation import Alternative, CarParkGeneration, Solution
 from onboard.systems.car_park.program import Program
-from onboard.systems.car_park.robot import RobotFactory
+from onboard.systems.car_park.robot import ParkingRobotFactory
 from onboard.systems.car_park.site import car_park
 from onboard.systems.registry import factory_for
 from onboard.ways.mirror import way_mirror
@@ -29,7 +29,7 @@ from onboard.work.plain import Plain
 RUN_MS = 10_000
 
 
-class _LeastBid(CarParkGeneration):
+class _LeastCarParkBid(CarParkGeneration):
     """Bids what nobody can beat, and can do the task only as soon as any robot."""
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
@@ -42,7 +42,7 @@ class _LeastBid(CarParkGeneration):
         return honest._replace(cost=self.floor(call, from_bus_ms(call.deadline_ms, solution.start_us)))
 
 
-class _EmptyBid(_LeastBid):
+class _EmptyBid(_LeastCarParkBid):
     """Bids what nobody can beat, for nothing."""
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
@@ -56,13 +56,13 @@ class _EmptyBid(_LeastBid):
 
 
 @dataclass
-class _Standing(Plain):
+class _StandingRobot(Plain):
     """It stands at its home, and says a plan for what it wins, unless it is ``silent``."""
 
     kind: KindCode = KindCode.ROBOT
     state: MachineState = MachineState.IDLE
     silent: bool = False
-    told: Itinerary | None = field(default=None)
+    itinerary: Itinerary | None = field(default=None)
     _version: int = 0
 
     def start(self, now_us: int) -> list[Effect]:
@@ -74,7 +74,7 @@ class _Standing(Plain):
         """Its place and its plan."""
         home = self.fleet.machine.home
         progress = Progress(self.fleet.node_id, self._version, 0, home.track, home.index, 0, 0)
-        return [Send(progress), *([] if self.told is None else [Send(self.told)])]
+        return [Send(progress), *([] if self.itinerary is None else [Send(self.itinerary)])]
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """A task is won: a plan is told where it tells anything."""
@@ -97,17 +97,17 @@ class _Standing(Plain):
 
     def _say(self, legs: tuple[Leg, ...], stamp: Stamp) -> None:
         self._version = successor(self._version, 8)
-        self.told = Itinerary(self.fleet.node_id, self._version, Grade.FIRM, stamp, legs)
-        self.fleet.mirror.on_itinerary(self.told, 0)
+        self.itinerary = Itinerary(self.fleet.node_id, self._version, Grade.FIRM, stamp, legs)
+        self.fleet.mirror.on_itinerary(self.itinerary, 0)
 
 
 @dataclass
-class _Factory(BehaviourFactory):
+class _StrangeRobotFactory(BehaviourFactory):
     """Makes robots, one of which is the stranger."""
 
     target: int
     how: Stranger
-    robots: RobotFactory = field(default_factory=RobotFactory)
+    robots: ParkingRobotFactory = field(default_factory=ParkingRobotFactory)
 
     def __post_init__(self) -> None:
         self.fleet_type = self.robots.fleet_type
@@ -116,19 +116,19 @@ class _Factory(BehaviourFactory):
         """What it bids."""
         if machine.node_id != self.target:
             return self.robots.estimator(site, machine, mirror)
-        bids = _LeastBid if self.how is Stranger.LIAR else _EmptyBid
+        bids = _LeastCarParkBid if self.how is Stranger.LIAR else _EmptyBid
         return bids(car_park(site), machine, way_mirror(mirror), Program(way_site(site)))
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Behaviour:
         """What it does."""
         if fleet.node_id != self.target or self.how is Stranger.LIAR:
             return self.robots.behaviour(fleet, estimator)
-        return _Standing(fleet, silent=self.how is Stranger.SILENT)
+        return _StandingRobot(fleet, silent=self.how is Stranger.SILENT)
 
 
 def factories_with(target: int, how: Stranger) -> Callable[[Site, KindCode], BehaviourFactory]:
     """For ``BusRun.factories``: node ``target`` is a stranger, all others are what they are."""
-    stranger = _Factory(target, how)
+    stranger = _StrangeRobotFactory(target, how)
 
     def choose(site: Site, kind: KindCode) -> BehaviourFactory:
         return stranger if kind is KindCode.ROBOT else factory_for(site, kind)

@@ -4,7 +4,7 @@ from dataclasses import asdict, dataclass
 from textwrap import wrap
 
 from bus_sim.can.statistics import BusStatistics
-from bus_sim.systems.car_park.plant.street import Summary as StreetSummary
+from bus_sim.systems.car_park.plant.street import StreetSummary
 from onboard.trace.durations import Durations
 from onboard.trace.indicators import FleetIndicators
 

@@ -19,13 +19,13 @@ EVE_US = 3 * MINUTE_US
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
+class DayWindow:
     """From ``begin_us`` (included) to ``end_us`` (left out), in us after the demand's time zero."""
 
     begin_us: int
     end_us: int
 
-    def told(self, demand: Demand) -> str:
+    def described(self, demand: Demand) -> str:
         """Both ends in local time, with the day where the demand has one and the window leaves its first."""
         zero = demand.zero or datetime(2000, 1, 1)  # noqa: DTZ001  # a demand without a date: only its clock is shown
         begin, end = (zero + timedelta(microseconds=time_us) for time_us in (self.begin_us, self.end_us))
@@ -41,7 +41,7 @@ class Burst:
     count: int
 
 
-def busiest_hour(demand: Demand) -> Window:
+def busiest_hour(demand: Demand) -> DayWindow:
     """The 60 minutes with the most arrivals and departures; of equal ones the first.
 
     Looked for among those that begin on a full minute, so that a person can ask for the same by the clock. Raises
@@ -50,7 +50,7 @@ def busiest_hour(demand: Demand) -> Window:
     return _best_hour(demand, lambda come, go: (come + go, 0))
 
 
-def two_way_hour(demand: Demand) -> Window:
+def two_way_hour(demand: Demand) -> DayWindow:
     """The 60 minutes in which cars come and go: the lesser of the two counts is greatest; of equal ones the busiest.
 
     Found as the busiest hour is, and the same as it where no hour has both. Raises ``DemandError`` where nobody comes.
@@ -58,7 +58,7 @@ def two_way_hour(demand: Demand) -> Window:
     return _best_hour(demand, lambda come, go: (min(come, go), come + go))
 
 
-def _best_hour(demand: Demand, worth: Callable[[int, int], tuple[int, int]]) -> Window:
+def _best_hour(demand: Demand, worth: Callable[[int, int], tuple[int, int]]) -> DayWindow:
     """The first of the hours whose counts of arrivals and departures are worth most."""
     if not demand.stays:
         raise DemandError("busiest hour: nobody comes at all; give other days or stalls")
@@ -71,10 +71,10 @@ def _best_hour(demand: Demand, worth: Callable[[int, int], tuple[int, int]]) -> 
         return worth(_count(come, start, start + HOUR_US), _count(go, start, start + HOUR_US)), -start
 
     begin_us = max(starts, key=key)
-    return Window(begin_us, begin_us + HOUR_US)
+    return DayWindow(begin_us, begin_us + HOUR_US)
 
 
-def with_short_eve(demand: Demand, window: Window, compartments: int) -> Demand:
+def with_short_eve(demand: Demand, window: DayWindow, compartments: int) -> Demand:
     """The same window without the hours before it: who is inside when it begins came shortly before, one by one.
 
     Who has left by then does not come at all. Nobody comes sooner than they did, and the window itself is as it was.
@@ -91,7 +91,7 @@ def with_short_eve(demand: Demand, window: Window, compartments: int) -> Demand:
     return replace(demand, stays=(*eve, *later))
 
 
-def choose_window(demand: Demand, text: str) -> Window:
+def choose_window(demand: Demand, text: str) -> DayWindow:
     """The window that a person asked for: ``busiest``, ``two-way``, ``HH:MM`` (an hour) or ``HH:MM-HH:MM``.
 
     Times are of the first day. With ``YYYY-MM-DDTHH:MM`` an hour of another day. An end that is not after its begin is
@@ -106,12 +106,12 @@ def choose_window(demand: Demand, text: str) -> Window:
     if begin_us < 0:
         raise DemandError(f"{text}: before the first day, {demand.zero:%Y-%m-%d}")
     if not end:
-        return Window(begin_us, begin_us + HOUR_US)
+        return DayWindow(begin_us, begin_us + HOUR_US)
     end_us = _clock_us(end, text)
-    return Window(begin_us, end_us if end_us > begin_us else end_us + DAY_US)
+    return DayWindow(begin_us, end_us if end_us > begin_us else end_us + DAY_US)
 
 
-def densest(demand: Demand, within: Window | None = None, span_us: int = BURST_US) -> Burst | None:
+def densest(demand: Demand, within: DayWindow | None = None, span_us: int = BURST_US) -> Burst | None:
     """The ``span_us`` with most arrivals, of equal ones the first; None where nobody comes (in the window)."""
     arrivals = sorted(stay.arrival_us for stay in demand.stays)
     if within is not None:

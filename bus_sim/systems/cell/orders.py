@@ -4,11 +4,11 @@ import random
 from dataclasses import replace
 
 from bus_sim.systems.cell.plant import ORIGIN_US, CellPlant
-from bus_sim.systems.orders import Orders, last_of, tally_of
+from bus_sim.systems.orders import OrderArrivals, last_of, tally_of
 from bus_sim.systems.stage import Tally
 from onboard.contract.codes import OrderResult
 from onboard.systems.cell.geometry import Point
-from onboard.systems.cell.site import Cell, Wish
+from onboard.systems.cell.site import Cell, GoalDemand
 
 #: Points are drawn so far from edges of areas and obstacles at least, mm: the gripper's width.
 MARGIN_MM = 500
@@ -18,11 +18,11 @@ ATTEMPTS = 100
 ORDER_S = 60.0
 
 
-def draw(site: Cell, orders: Orders, seed: int) -> Cell:
+def draw(site: Cell, orders: OrderArrivals, seed: int) -> Cell:
     """The site with drawn goals; none has a deadline, as faults may last longer than any."""
     chance = orders.chance(site.name, seed)
-    wishes = [Wish(at_ms, _point(site, chance), _point(site, chance)) for at_ms in orders.moments_ms(chance)]
-    return replace(site, wishes=tuple(wishes))
+    goals = [GoalDemand(at_ms, _point(site, chance), _point(site, chance)) for at_ms in orders.moments_ms(chance)]
+    return replace(site, goals=tuple(goals))
 
 
 def _point(site: Cell, chance: random.Random) -> Point:
@@ -43,10 +43,10 @@ def _is_on(point: Point, x0_mm: int, y0_mm: int, x1_mm: int, y1_mm: int) -> bool
 
 def last_s(site: Cell) -> float:
     """When the last order comes, s after power-up."""
-    return last_of((one.at_ms for one in site.wishes), ORIGIN_US)
+    return last_of((one.at_ms for one in site.goals), ORIGIN_US)
 
 
 def count(plant: CellPlant) -> Tally:
     """What became of the goals."""
-    done, refused, expected = OrderResult.DONE, OrderResult.REFUSED, len(plant.site.wishes)
+    done, refused, expected = OrderResult.DONE, OrderResult.REFUSED, len(plant.site.goals)
     return tally_of(plant.entries, done, refused, expected, plant.timers.now_us())

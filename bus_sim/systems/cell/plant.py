@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from math import hypot
 
-from bus_sim.devices.link import BusDeviceLink, DeviceLink
+from bus_sim.devices.link import BusDeviceLink, DeviceBusLink
 from bus_sim.devices.timers import Timer, Timers
 from onboard.contract.cell import ArmMode, GripAction, GripMode
 from onboard.contract.cell_device import ArmOrder, ArmState, GripOrder, GripState, OrderAnswer, OrderFrom, OrderTo
@@ -16,7 +16,7 @@ from onboard.contract.messages import Message, Reference
 from onboard.core.serial import is_newer
 from onboard.systems.cell.contracts import Arm
 from onboard.systems.cell.geometry import Area, Point
-from onboard.systems.cell.site import Cell, Wish
+from onboard.systems.cell.site import Cell, GoalDemand
 
 #: A moving drive that hears no order for this long stops (dbc/cell.dbc).
 DRIVE_TIME_OUT_US = 500_000
@@ -48,7 +48,7 @@ class Parts:
 class ArmDevice:
     """Drive and gripper of one robot: straight lines at constant speed, from wherever it is."""
 
-    def __init__(self, arm: Arm, plant: "CellPlant", link: DeviceLink) -> None:
+    def __init__(self, arm: Arm, plant: "CellPlant", link: DeviceBusLink) -> None:
         self.arm = arm
         self._plant = plant
         self._timers = plant.timers
@@ -185,41 +185,41 @@ class ArmDevice:
 
 
 @dataclass
-class Entry:
+class GoalEntry:
     """One order at the counter and what became of it."""
 
     number: int
-    wish: Wish
+    demand: GoalDemand
     begun_us: int
     result: OrderResult | None = None
     cost_mm: int = 0
     ended_us: int | None = None
 
 
-class Counter:
+class GoalCounter:
     """The goal manager's counter: says each order until it is answered (row C03)."""
 
-    def __init__(self, node_id: int, plant: "CellPlant", link: DeviceLink) -> None:
+    def __init__(self, node_id: int, plant: "CellPlant", link: DeviceBusLink) -> None:
         self.node_id = node_id
-        self.entries: list[Entry] = []
+        self.entries: list[GoalEntry] = []
         self._plant = plant
         self._link = link
         link.subscribe(self._on_message)
 
-    def add(self, wish: Wish) -> None:
+    def add(self, demand: GoalDemand) -> None:
         """Somebody wants a part carried, now."""
         plant = self._plant
-        entry = Entry(len(self.entries) + 1, wish, plant.timers.now_us())
+        entry = GoalEntry(len(self.entries) + 1, demand, plant.timers.now_us())
         self.entries.append(entry)
-        plant.parts.lying[Reference(self.node_id, entry.number)] = wish.start
+        plant.parts.lying[Reference(self.node_id, entry.number)] = demand.start
         self._say(entry)
 
-    def _say(self, entry: Entry) -> None:
+    def _say(self, entry: GoalEntry) -> None:
         if entry.result is not None:
             return
-        wish = entry.wish
-        self._link.send(OrderFrom(self.node_id, entry.number, *wish.start))
-        self._link.send(OrderTo(self.node_id, entry.number, *wish.end, wish.within_ms))
+        demand = entry.demand
+        self._link.send(OrderFrom(self.node_id, entry.number, *demand.start))
+        self._link.send(OrderTo(self.node_id, entry.number, *demand.end, demand.within_ms))
         self._plant.timers.call_at(self._plant.timers.now_us() + ENTRY_REPEAT_US, lambda: self._say(entry))
 
     def _on_message(self, message: Message, now_us: int) -> None:
@@ -245,26 +245,26 @@ class CellPlant:
         self.parts = Parts()
         self.violations: list[str] = []
         self.devices = {node: ArmDevice(arm, self, links[node]) for node, arm in site.arms.items()}
-        self.counters = {node: Counter(node, self, links[node]) for node in site.desks}
+        self.counters = {node: GoalCounter(node, self, links[node]) for node in site.desks}
         #: Who took which part up, in order of time.
         self.takes: list[tuple[Reference, int]] = []
-        self._to_come = len(site.wishes)
+        self._to_come = len(site.goals)
 
     def start(self) -> None:
         """Power on, and let the demand come."""
         for device in self.devices.values():
             device.start()
         desks = list(self.counters.values())
-        for number, wish in enumerate(self.site.wishes):
+        for number, demand in enumerate(self.site.goals):
             counter = desks[number % len(desks)]
-            self.timers.call_at(ORIGIN_US + wish.at_ms * 1000, partial(self._come, counter, wish))
+            self.timers.call_at(ORIGIN_US + demand.at_ms * 1000, partial(self._come, counter, demand))
 
-    def _come(self, counter: Counter, wish: Wish) -> None:
+    def _come(self, counter: GoalCounter, demand: GoalDemand) -> None:
         self._to_come -= 1
-        counter.add(wish)
+        counter.add(demand)
 
     @property
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[GoalEntry]:
         """All orders that came so far, counter by counter."""
         return [entry for counter in self.counters.values() for entry in counter.entries]
 
@@ -293,10 +293,10 @@ class CellPlant:
         """A robot has taken a part up."""
         self.takes.append((part, arm.node_id))
 
-    def check_end(self, part: Reference, entry: Entry) -> None:
+    def check_end(self, part: Reference, entry: GoalEntry) -> None:
         """What was told to be achieved is so; what was refused lies where it lay."""
         lies = self.parts.lying.get(part)
-        wanted = entry.wish.end if entry.result is OrderResult.DONE else entry.wish.start
+        wanted = entry.demand.end if entry.result is OrderResult.DONE else entry.demand.start
         if lies is None or hypot(lies.x_mm - wanted.x_mm, lies.y_mm - wanted.y_mm) > REACH_MM:
             where = f"at {tuple(lies)}" if lies is not None else "in a gripper"
             told = entry.result.name if entry.result is not None else "nothing"

@@ -7,7 +7,7 @@ from onboard.systems.cell.geometry import Area, Point
 WIDTH, HEIGHT = 78, 24
 
 
-class _Sheet:
+class _CharacterSheet:
     """A sheet of characters over the span of all areas."""
 
     def __init__(self, areas: list[Area]) -> None:
@@ -44,7 +44,7 @@ class _Sheet:
 def plan(plant: CellPlant, view: CellView) -> str:
     """Areas as dotted frames, obstacles as #, parts as o (O in a gripper), robots by their names."""
     site = plant.site
-    sheet = _Sheet([arm.area for arm in site.arms.values()])
+    sheet = _CharacterSheet([arm.area for arm in site.arms.values()])
     for arm in site.arms.values():
         sheet.frame(arm.area)
     for obstacle in site.obstacles:
@@ -57,7 +57,7 @@ def plan(plant: CellPlant, view: CellView) -> str:
     lines = [*sheet.lines(), ""]
     for entry in plant.entries:
         word = entry.result.name if entry.result is not None else "at the counter"
-        lines.append(f"order {entry.number}: {_place(entry.wish.start)} to {_place(entry.wish.end)}: {word}")
+        lines.append(f"order {entry.number}: {_place(entry.demand.start)} to {_place(entry.demand.end)}: {word}")
     lines.append(f"{now_us / 1e6:8.1f} s   goal messages {view.goal_messages}")
     return "\n".join(lines)
 

@@ -9,8 +9,8 @@ from bus_sim.systems.cell.plant import CellPlant
 from bus_sim.systems.cell.show import plan
 from bus_sim.systems.cell.tree import ContractTree
 from bus_sim.systems.cell.view import CellView
-from bus_sim.systems.orders import Orders
-from bus_sim.systems.stage import Stage, Tally
+from bus_sim.systems.orders import OrderArrivals
+from bus_sim.systems.stage import SystemStage, Tally
 from onboard.contract.codes import OrderResult
 from onboard.contract.messages import Reference
 from onboard.systems.cell.contracts import Goal
@@ -21,8 +21,8 @@ if TYPE_CHECKING:  # the page's libraries are an extra
     from bus_sim.web.run_source import RunSource
 
 
-class CellStage(Stage[CellPlant]):
-    """See ``Stage``."""
+class CellStage(SystemStage[CellPlant]):
+    """See ``SystemStage``."""
 
     who = "goals"
 
@@ -31,46 +31,46 @@ class CellStage(Stage[CellPlant]):
         self.view = CellView(run.plant.site)
 
     def head(self) -> list[str]:
-        """See ``Stage``."""
-        return [f"{super().head()[0]}, {len(self.plant.site.wishes)} goals"]
+        """See ``SystemStage``."""
+        return [f"{super().head()[0]}, {len(self.plant.site.goals)} goals"]
 
     def listen(self) -> None:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         super().listen()
         self.run.observers.append(lambda message, _: self.view.feed(message))
 
     def tally(self) -> Tally:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return count(self.plant)
 
     def bring(self, site: Cell, node: int) -> None:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         alone = replace(site, arms={node: site.arms[node]})
-        next(iter(self.plant.counters.values())).add(draw(alone, Orders(1, 1.0), self.run.options.seed).wishes[0])
+        next(iter(self.plant.counters.values())).add(draw(alone, OrderArrivals(1, 1.0), self.run.options.seed).goals[0])
 
     def power_up(self, node: int) -> None:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         if node in self.plant.devices:
             self.plant.devices[node].start()
 
     def picture(self) -> str:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return plan(self.plant, self.view)
 
-    def told(self) -> list[str]:
+    def remarks(self) -> list[str]:
         """The paper's text for each goal, then the picture."""
         lines = []
         for node, counter in self.plant.counters.items():
             for entry in counter.entries:
                 text = self.view.text(Reference(node, entry.number))
                 lines += ["", f"Goal {entry.number}", *text.removesuffix("\n").split("\n")]
-        return [*lines, *super().told()]
+        return [*lines, *super().remarks()]
 
     def source(self) -> "RunSource":
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         from bus_sim.web.orders import let_order  # noqa: PLC0415  # its libraries are an extra
 
-        return let_order(super().source(), self.plant.counters, self.plant.site.wishes)
+        return let_order(super().source(), self.plant.counters, self.plant.site.goals)
 
     def figures(self) -> dict[str, object]:
         """What a cell is judged by: goals, time to achieve them, cost beside the exhaustive optimum, goal messages."""
@@ -78,7 +78,7 @@ class CellStage(Stage[CellPlant]):
         done = [entry for entry in plant.entries if entry.result is OrderResult.DONE and entry.ended_us is not None]
         seconds = [(entry.ended_us - entry.begun_us) / 1e6 for entry in done if entry.ended_us is not None]
         in_time = [
-            s for s, e in zip(seconds, done, strict=True) if not e.wish.within_ms or s * 1000 <= e.wish.within_ms
+            s for s, e in zip(seconds, done, strict=True) if not e.demand.within_ms or s * 1000 <= e.demand.within_ms
         ]
         behaviours = [controller.holon.behaviour for controller in self.run.controllers.values()]
         generations = [one.generation for one in behaviours if isinstance(one, ArmRobot)]
@@ -104,6 +104,6 @@ def _over_optimum(plant: CellPlant) -> float:
     if entry is None or not entry.cost_mm:
         return 0.0
     homes = {node: arm.home for node, arm in site.arms.items()}
-    goal = Goal(Reference(0, 1), Reference(0, 1), entry.wish.start, entry.wish.end)
+    goal = Goal(Reference(0, 1), Reference(0, 1), entry.demand.start, entry.demand.end)
     best = ContractTree(tuple(site.arms.values()), homes, site.obstacles).solve(goal)
     return entry.cost_mm / 1000 / best.cost if best is not None else 0.0

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import count
 
-from onboard.systems.cell.contracts import Arm, Contract, Filter, Goal, Move, filtered, moves
+from onboard.systems.cell.contracts import Arm, ArmMove, Contract, Filter, Goal, filtered, moves
 from onboard.systems.cell.geometry import Area, Point
 from onboard.systems.cell.offers import OFFERS, OfferRule
 
@@ -18,12 +18,12 @@ ALL_FILTERS = frozenset(Filter)
 
 
 @dataclass
-class Node:
+class GoalNode:
     """A goal as one robot got it: the offers that it can make, each with the answers to its sub-goal."""
 
     goal: Goal
     arm: Arm
-    offers: list[tuple[Move, list["Node"]]] = field(default_factory=list)
+    offers: list[tuple[ArmMove, list["GoalNode"]]] = field(default_factory=list)
     contract: Contract | None = None
 
 
@@ -37,7 +37,7 @@ class ContractTree:
     filters: frozenset[Filter] = ALL_FILTERS
     rules: tuple[OfferRule, ...] = OFFERS
     messages: int = 0
-    levels: list[list[Node]] = field(default_factory=list)
+    levels: list[list[GoalNode]] = field(default_factory=list)
     _numbers: Iterable[int] = field(default_factory=lambda: count(1))
 
     def solve(self, goal: Goal) -> Contract | None:
@@ -50,11 +50,13 @@ class ContractTree:
                 self._build(node)
         return _best(roots)
 
-    def _send(self, goal: Goal) -> list[Node]:
+    def _send(self, goal: Goal) -> list[GoalNode]:
         """One goal message to each robot that the filters let through; nobody is sent its own."""
         sender = goal.path[-1] if goal.path else 0
         told = [
-            Node(goal, arm) for arm in self.arms if arm.node_id != sender and filtered(goal, arm) not in self.filters
+            GoalNode(goal, arm)
+            for arm in self.arms
+            if arm.node_id != sender and filtered(goal, arm) not in self.filters
         ]
         self.messages += len(told)
         while len(self.levels) <= goal.level:
@@ -72,14 +74,14 @@ class ContractTree:
                 sub = node.goal.part_of(node.arm.node_id, next(iter(self._numbers)), move.via)
                 node.offers.append((move, [] if whole else self._send(sub)))
 
-    def _moves(self, node: Node) -> tuple[Move, ...]:
+    def _moves(self, node: GoalNode) -> tuple[ArmMove, ...]:
         goal = node.goal
         if Filter.PREDECESSOR not in self.filters:
             # Without the filter a predecessor may work on the goal again: for it the path is empty.
             goal = Goal(goal.task, goal.part, goal.start, goal.end)
         return moves(goal, node.arm, self.positions[node.arm.node_id], self.obstacles, self.rules)
 
-    def _build(self, node: Node) -> None:
+    def _build(self, node: GoalNode) -> None:
         """Row C11: answers of the level below are final when a level is built."""
         for move, answers in node.offers:
             own = move.cost(node.arm)
@@ -101,10 +103,10 @@ class ContractTree:
         return steps
 
 
-def _follows(node: Node, last: Contract) -> bool:
+def _follows(node: GoalNode, last: Contract) -> bool:
     return node.goal.path == (*last.goal.path, last.node) and node.goal.start == last.move.via
 
 
-def _best(nodes: list[Node]) -> Contract | None:
+def _best(nodes: list[GoalNode]) -> Contract | None:
     found = [node.contract for node in nodes if node.contract is not None]
     return min(found, key=lambda contract: (contract.cost, contract.node), default=None)

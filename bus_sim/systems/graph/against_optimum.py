@@ -6,12 +6,12 @@ from statistics import fmean
 from bus_sim.options import RunOptions
 from bus_sim.session import play
 from bus_sim.systems.graph.certify.optimum import least_steps, some_tasks
-from bus_sim.systems.graph.certify.search import Tasks
+from bus_sim.systems.graph.certify.search import TaskSet
 from bus_sim.systems.graph.plant import GraphPlant
 from onboard.contract.codes import KindCode, Side
 from onboard.core.site import Machine, Segment, Station
 from onboard.systems.graph.network import Graph
-from onboard.systems.graph.site import FactoryGraph, Order
+from onboard.systems.graph.site import FactoryGraph, VisitOrder
 
 #: Node-ID of the first robot of a case.
 FIRST_ROBOT = 101
@@ -29,7 +29,7 @@ class Ratios:
         return f"{self.robots:6}  {len(self.ratios):5}  {fmean(self.ratios):6.3f}  {max(self.ratios):6.3f}"
 
 
-def case_site(site: FactoryGraph, graph: Graph, tasks: Tasks) -> FactoryGraph:
+def case_site(site: FactoryGraph, graph: Graph, tasks: TaskSet) -> FactoryGraph:
     """A site with the machines of ``site`` but for its robots, on another graph, with one order for each robot."""
     robots = {}
     for number, start in enumerate(tasks.starts):
@@ -45,11 +45,11 @@ def case_site(site: FactoryGraph, graph: Graph, tasks: Tasks) -> FactoryGraph:
         edges=tuple((*ends, length) for ends, length in sorted(graph.lengths_mm.items())),
         hosts=hosts,
         stewards=hosts,
-        orders=tuple(Order(0, node, (goal,)) for node, goal in zip(robots, tasks.goals, strict=True)),
+        orders=tuple(VisitOrder(0, node, (goal,)) for node, goal in zip(robots, tasks.goals, strict=True)),
     )
 
 
-def ratio(site: FactoryGraph, graph: Graph, tasks: Tasks) -> float:
+def ratio(site: FactoryGraph, graph: Graph, tasks: TaskSet) -> float:
     """One case, from the first departure to the last arrival. All edges are of one length."""
     best = least_steps(graph, tasks)
     played = play(case_site(site, graph, tasks), RunOptions(limit_s=900, quiet=True))

@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from bus_sim.devices.link import DeviceLink
+from bus_sim.devices.link import DeviceBusLink
 from bus_sim.devices.timers import Timer, Timers
 from onboard.contract.graph import BodyPlace, RouteAction
 from onboard.contract.graph_device import ApproachSensor, BodyState, RouteOrder
@@ -22,20 +22,20 @@ class Hall(Protocol):
     site: FactoryGraph
     timers: Timers
 
-    def holds(self, body: "Body") -> bool:
+    def holds(self, body: "GraphRobotBody") -> bool:
         """Whether it is kept before its approach sensor for now."""
 
-    def check_onto(self, body: "Body", start: int, end: int) -> None:
+    def check_onto(self, body: "GraphRobotBody", start: int, end: int) -> None:
         """It drives onto an edge."""
 
-    def check_into(self, body: "Body") -> None:
+    def check_into(self, body: "GraphRobotBody") -> None:
         """It has come into a node."""
 
 
-class Body:
+class GraphRobotBody:
     """One robot's body. ``offset_mm`` counts from the beginning of its edge, as of when it began to move last."""
 
-    def __init__(self, machine: Machine, plant: Hall, link: DeviceLink) -> None:
+    def __init__(self, machine: Machine, plant: Hall, link: DeviceBusLink) -> None:
         self.machine = machine
         self.node = machine.home.track
         self.behind = NO_NODE

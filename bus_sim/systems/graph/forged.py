@@ -10,11 +10,11 @@ from onboard.systems.graph.fields import five
 from onboard.systems.graph.site import FactoryGraph
 
 
-class Orders(words.Orders):
+class ForgedVisits(words.ForgedOrders):
     """Visits that nobody ordered."""
 
     def orders(self) -> Iterator[Message]:
-        """See ``words.Orders``."""
+        """See ``words.ForgedOrders``."""
         me, site, chance = self.node.node_id, self.node.site, self.node.chance
         assert isinstance(site, FactoryGraph)
         robots = [node for node, one in site.machines.items() if one.kind is KindCode.VEHICLE]
@@ -22,7 +22,7 @@ class Orders(words.Orders):
         yield VisitList(me, self.number, chance.choice(robots), *five(stops))
 
 
-class WrongAnswers(words.WrongAnswers):
+class ForgedGoAheads(words.WrongAnswers):
     """Every robot that comes near a node is told by the attacker that it may go on."""
 
     def hear(self, message: Message, now_us: int) -> None:

@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 from bus_sim.systems.graph.plant import ORIGIN_US, GraphPlant
-from bus_sim.systems.orders import Orders, last_of, nothing_to_draw, tally_of
+from bus_sim.systems.orders import OrderArrivals, last_of, nothing_to_draw, tally_of
 from bus_sim.systems.stage import Tally
 from onboard.contract.codes import OrderResult
-from onboard.systems.graph.site import MAX_STOPS, FactoryGraph, Order
+from onboard.systems.graph.site import MAX_STOPS, FactoryGraph, VisitOrder
 
 #: So many orders name their robot: enough that each seed has both sorts.
 NAMED = 0.2
@@ -14,7 +14,7 @@ NAMED = 0.2
 ORDER_S = 50.0
 
 
-def draw(site: FactoryGraph, orders: Orders, seed: int) -> FactoryGraph:
+def draw(site: FactoryGraph, orders: OrderArrivals, seed: int) -> FactoryGraph:
     """The site with drawn orders. Raises ``DemandError`` for a graph of one node."""
     chance, nodes, drawn = orders.chance(site.name, seed), site.graph.nodes, []
     if len(nodes) < 2:
@@ -23,7 +23,7 @@ def draw(site: FactoryGraph, orders: Orders, seed: int) -> FactoryGraph:
         # Whoever is near carries from one node to another; a robot that is named visits as many as a frame holds.
         robot = chance.choice(list(site.robots)) if chance.random() < NAMED else 0
         stops = chance.randint(1, min(MAX_STOPS, len(nodes))) if robot else 2
-        drawn.append(Order(at_ms, robot, tuple(chance.sample(nodes, stops))))
+        drawn.append(VisitOrder(at_ms, robot, tuple(chance.sample(nodes, stops))))
     return replace(site, orders=tuple(drawn))
 
 
@@ -38,6 +38,6 @@ def count(plant: GraphPlant) -> Tally:
     return tally_of(plant.entries, done, refused, expected, plant.timers.now_us())
 
 
-def usual(site: FactoryGraph) -> Orders:
+def usual(site: FactoryGraph) -> OrderArrivals:
     """Four for each robot of the shipped hall."""
-    return Orders(12, ORDER_S / max(1, len(site.robots)))
+    return OrderArrivals(12, ORDER_S / max(1, len(site.robots)))

@@ -7,15 +7,15 @@ two bodies on one edge (row G08), a body that leaves the graph or turns back (ro
 from dataclasses import dataclass
 from functools import partial
 
-from bus_sim.devices.link import BusDeviceLink, DeviceLink
+from bus_sim.devices.link import BusDeviceLink, DeviceBusLink
 from bus_sim.devices.timers import Timers
-from bus_sim.systems.graph.body import Body
+from bus_sim.systems.graph.body import GraphRobotBody
 from onboard.contract.codes import OrderResult
 from onboard.contract.graph import BodyPlace
 from onboard.contract.graph_device import VisitAnswer, VisitKey
 from onboard.contract.messages import Message
 from onboard.systems.graph.fields import five
-from onboard.systems.graph.site import FactoryGraph, Order, Rules, edge
+from onboard.systems.graph.site import FactoryGraph, Rules, VisitOrder, edge
 
 #: Orders begin so long after power-up, us: the machines find each other first.
 ORIGIN_US = 10_000_000
@@ -23,34 +23,34 @@ REPEAT_US = 1_000_000
 
 
 @dataclass
-class Entry:
+class VisitEntry:
     """One order at a counter and what became of it."""
 
     number: int
-    order: Order
+    order: VisitOrder
     begun_us: int
     result: OrderResult | None = None
     robot: int = 0
     ended_us: int | None = None
 
 
-class Counter:
+class VisitCounter:
     """A desk's counter: says each order until it is answered."""
 
-    def __init__(self, node_id: int, plant: "GraphPlant", link: DeviceLink) -> None:
-        self.entries: list[Entry] = []
+    def __init__(self, node_id: int, plant: "GraphPlant", link: DeviceBusLink) -> None:
+        self.entries: list[VisitEntry] = []
         self._node_id = node_id
         self._plant = plant
         self._link = link
         link.subscribe(self._on_message)
 
-    def add(self, order: Order) -> None:
+    def add(self, order: VisitOrder) -> None:
         """Somebody orders visits at this moment; said to the desk, and again until it answers."""
-        entry = Entry(len(self.entries) + 1, order, self._plant.timers.now_us())
+        entry = VisitEntry(len(self.entries) + 1, order, self._plant.timers.now_us())
         self.entries.append(entry)
         self._say(entry)
 
-    def _say(self, entry: Entry) -> None:
+    def _say(self, entry: VisitEntry) -> None:
         if entry.result is None:
             order = entry.order
             self._link.send(VisitKey(self._node_id, entry.number, order.robot, *five(order.stops)))
@@ -76,8 +76,8 @@ class GraphPlant:
         self.timers = timers
         self.links = links
         self.violations: list[str] = []
-        self.bodies = {node: Body(machine, self, links[node]) for node, machine in site.robots.items()}
-        self.counters = {node: Counter(node, self, links[node]) for node in site.desks}
+        self.bodies = {node: GraphRobotBody(machine, self, links[node]) for node, machine in site.robots.items()}
+        self.counters = {node: VisitCounter(node, self, links[node]) for node in site.desks}
         self._to_come = len(site.orders)
 
     def start(self) -> None:
@@ -89,12 +89,12 @@ class GraphPlant:
             come = partial(self._come, desks[number % len(desks)], order)
             self.timers.call_at(ORIGIN_US + order.at_ms * 1000, come)
 
-    def _come(self, counter: Counter, order: Order) -> None:
+    def _come(self, counter: VisitCounter, order: VisitOrder) -> None:
         self._to_come -= 1
         counter.add(order)
 
     @property
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[VisitEntry]:
         """All orders that came so far, counter by counter."""
         return [entry for counter in self.counters.values() for entry in counter.entries]
 
@@ -104,7 +104,7 @@ class GraphPlant:
         done = not self._to_come and all(entry.ended_us is not None for entry in self.entries)
         return done and all(body.place is BodyPlace.IN_NODE for body in self.bodies.values())
 
-    def holds(self, body: Body) -> bool:
+    def holds(self, body: GraphRobotBody) -> bool:
         """Whether a body is kept before its approach sensor for now; by itself the plant keeps nobody.
 
         How fast robots drive is nobody's promise: a plant that plays a timing of its own slows them here.
@@ -117,7 +117,7 @@ class GraphPlant:
         """Something that must never happen has happened."""
         self.violations.append(f"{self.timers.now_us() / 1e6:.3f} s: {violation}")
 
-    def check_onto(self, body: Body, start: int, end: int) -> None:
+    def check_onto(self, body: GraphRobotBody, start: int, end: int) -> None:
         """One robot an edge, on edges of the graph only, and nobody turns back on the way."""
         name = body.machine.name
         if end not in self.site.graph.neighbours[start]:
@@ -128,13 +128,13 @@ class GraphPlant:
         if body.place is not BodyPlace.IN_NODE and end == body.behind:
             self.note(f"{name} turns back at {start}")
 
-    def check_into(self, body: Body) -> None:
+    def check_into(self, body: GraphRobotBody) -> None:
         """A node has so many slots, where the rules count them."""
         inside = [one for one in self.bodies.values() if one.place is BodyPlace.IN_NODE and one.node == body.node]
         if self.site.rules is Rules.EDGE_AND_NODE and len(inside) > self.site.capacity:
             self.note(f"{len(inside)} robots in node {body.node}, which has {self.site.capacity} slots")
 
-    def check_end(self, entry: Entry) -> None:
+    def check_end(self, entry: VisitEntry) -> None:
         """What was told to be done was done: the robot stood in every node in turn, as long as loading takes."""
         if entry.result is not OrderResult.DONE:
             return

@@ -1,7 +1,6 @@
 """A factory graph in the simulator."""
 
-from bus_sim.systems.graph.forged import Orders as ForgedOrders
-from bus_sim.systems.graph.forged import WrongAnswers
+from bus_sim.systems.graph.forged import ForgedGoAheads, ForgedVisits
 from bus_sim.systems.graph.orders import ORDER_S, draw, last_s, usual
 from bus_sim.systems.graph.plant import make_plant
 from bus_sim.systems.graph.stage import GraphStage
@@ -18,5 +17,5 @@ SIMULATED = OrderedSystem(
     lambda _: ORDER_S,
     usual,
     worker=KindCode.VEHICLE,
-    attacks={"orders": ForgedOrders, "answers": WrongAnswers},
+    attacks={"orders": ForgedVisits, "answers": ForgedGoAheads},
 )

@@ -7,7 +7,7 @@ from bus_sim.systems.graph.certify.certificate import certify
 from bus_sim.systems.graph.orders import count
 from bus_sim.systems.graph.plant import GraphPlant
 from bus_sim.systems.graph.show import picture
-from bus_sim.systems.stage import Stage, Tally
+from bus_sim.systems.stage import SystemStage, Tally
 from onboard.contract.codes import OrderResult
 from onboard.contract.graph import EdgeNotice, NodeAnswer, NodeVerdict, TurnSignal
 from onboard.contract.messages import Bid, CallForProposals
@@ -20,8 +20,8 @@ if TYPE_CHECKING:  # the page's libraries are an extra
 CERTIFICATE_STATES = 100_000
 
 
-class GraphStage(Stage[GraphPlant]):
-    """See ``Stage``."""
+class GraphStage(SystemStage[GraphPlant]):
+    """See ``SystemStage``."""
 
     def head(self) -> list[str]:
         """With the certificate of its graph under its rules."""
@@ -36,25 +36,25 @@ class GraphStage(Stage[GraphPlant]):
         ]
 
     def tally(self) -> Tally:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return count(self.plant)
 
     def bring(self, site: FactoryGraph, node: int) -> None:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         anybody = next(order for order in site.orders if not order.robot)
         next(iter(self.plant.counters.values())).add(anybody)
 
     def power_up(self, node: int) -> None:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         if node in self.plant.bodies:
             self.plant.bodies[node].start()
 
     def picture(self) -> str:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return picture(self.plant)
 
     def source(self) -> "RunSource":
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         from bus_sim.web.orders import let_order  # noqa: PLC0415  # its libraries are an extra
 
         return let_order(super().source(), self.plant.counters, self.plant.site.orders)

@@ -4,22 +4,22 @@ from dataclasses import replace
 from statistics import fmean
 
 from bus_sim.systems.mapd.plant import UnitPlant
-from bus_sim.systems.orders import Ended, Orders, nothing_to_draw, tally
+from bus_sim.systems.orders import EndedOrder, OrderArrivals, nothing_to_draw, tally
 from bus_sim.systems.stage import Tally
 from onboard.contract.codes import OrderResult
-from onboard.systems.mapd.site import FAR, Mapd, Task
+from onboard.systems.mapd.site import FAR, Mapd, TransportTask
 
 #: So many endpoints are looked at to see how long ways are: enough for a mean, and cheap.
 SAMPLE = 12
 
 
-def draw(site: Mapd, orders: Orders, seed: int) -> Mapd:
+def draw(site: Mapd, orders: OrderArrivals, seed: int) -> Mapd:
     """The site with drawn tasks. Raises ``DemandError`` for one with fewer than two endpoints."""
     if len(site.endpoints) < 2:
         raise nothing_to_draw(site.name, "fewer than two endpoints")
     chance = orders.chance(site.name, seed)
     tasks = [
-        Task(number, at_ms // site.step_ms, *chance.sample(site.endpoints, 2))
+        TransportTask(number, at_ms // site.step_ms, *chance.sample(site.endpoints, 2))
         for number, at_ms in enumerate(orders.moments_ms(chance))
     ]
     return replace(site, tasks=tuple(tasks))
@@ -35,7 +35,7 @@ def count(plant: UnitPlant) -> Tally:
     ended = []
     for one in plant.goods.values():
         refused = one.answer is OrderResult.REFUSED and one.served_step is None
-        ended.append(Ended(one.served_step is not None, refused, one.ordered_us, one.served_us))
+        ended.append(EndedOrder(one.served_step is not None, refused, one.ordered_us, one.served_us))
     return tally(ended, len(plant.site.tasks), plant.timers.now_us())
 
 
@@ -47,6 +47,6 @@ def order_s(site: Mapd) -> float:
     return max(1.0, 3 * fmean(known or [1]) * site.step_us / 1e6)
 
 
-def usual(site: Mapd) -> Orders:
+def usual(site: Mapd) -> OrderArrivals:
     """As the robots can just carry out."""
-    return Orders(16, order_s(site) / max(1, len(site.robots)))
+    return OrderArrivals(16, order_s(site) / max(1, len(site.robots)))

@@ -7,7 +7,7 @@ bodies in one cell or zone, a move to where no way leads, two that change places
 from dataclasses import dataclass, field
 from functools import partial
 
-from bus_sim.devices.link import BusDeviceLink, DeviceLink
+from bus_sim.devices.link import BusDeviceLink, DeviceBusLink
 from bus_sim.devices.timers import Timer, Timers
 from onboard.contract.codes import OrderResult
 from onboard.contract.mapd import CartAction
@@ -15,7 +15,7 @@ from onboard.contract.mapd_device import CartOrder, CartState, TransportAnswer, 
 from onboard.contract.messages import Message
 from onboard.core.site import Machine
 from onboard.systems.mapd.fields import NO_TASK
-from onboard.systems.mapd.site import Mapd, Task
+from onboard.systems.mapd.site import Mapd, TransportTask
 
 #: Bodies tell where they are, and unanswered orders are said again, this often, us (dbc/mapd.dbc).
 WORD_US, KEY_US = 2_000_000, 1_000_000
@@ -23,10 +23,10 @@ WORD_US, KEY_US = 2_000_000, 1_000_000
 WORK_US = 1_000
 
 
-class Body:
+class GridRobotBody:
     """One robot's body: in ``cell``, or on its way there."""
 
-    def __init__(self, machine: Machine, cell: int, plant: "UnitPlant", link: DeviceLink) -> None:
+    def __init__(self, machine: Machine, cell: int, plant: "UnitPlant", link: DeviceBusLink) -> None:
         self.machine = machine
         self.cell = cell
         self.is_moving = False
@@ -72,7 +72,7 @@ class Body:
 class Goods:
     """What a task is about: when it was ordered and served, in bus time and in steps."""
 
-    task: Task
+    task: TransportTask
     ordered_us: int
     answer: OrderResult | None = None
     aboard: int = 0
@@ -95,7 +95,7 @@ class UnitPlant:
     def __post_init__(self) -> None:
         machines = self.site.machines
         self.bodies = {
-            node: Body(machines[node], cell, self, self.links[node]) for node, cell in self.site.homes.items()
+            node: GridRobotBody(machines[node], cell, self, self.links[node]) for node, cell in self.site.homes.items()
         }
         self._counter = self.links[self.site.desk]
         self._counter.subscribe(self._on_answer)
@@ -107,11 +107,11 @@ class UnitPlant:
         for task in self.site.tasks:
             self.timers.call_at(task.release * self.site.step_us, partial(self._order, task))
 
-    def _order(self, task: Task) -> None:
+    def _order(self, task: TransportTask) -> None:
         self.goods[task.number] = Goods(task, self.timers.now_us())
         self._say_key(task)
 
-    def _say_key(self, task: Task) -> None:
+    def _say_key(self, task: TransportTask) -> None:
         if self.goods[task.number].answer is None:
             release = task.release & 0xFFFF
             self._counter.send(TransportKey(self.site.desk, task.number, task.pickup, task.delivery, release))
@@ -138,7 +138,7 @@ class UnitPlant:
         """Something that must never happen has happened."""
         self.violations.append(f"{self.timers.now_us() / 1e6:.3f} s: {violation}")
 
-    def check_move(self, body: Body, order: CartOrder) -> None:
+    def check_move(self, body: GridRobotBody, order: CartOrder) -> None:
         """Nobody is where it goes, not even on the way out of it unless it has begun to leave; and a way leads there.
 
         A swap would be two moves, the first of them into a cell that is not left.
@@ -155,7 +155,7 @@ class UnitPlant:
             self.note(f"{name} meets {', '.join(others)} in {floor.names[order.cell]}")
         self.moves.append((order.step, body.machine.node_id, order.cell))
 
-    def load(self, body: Body, order: CartOrder) -> None:
+    def load(self, body: GridRobotBody, order: CartOrder) -> None:
         """The goods must be there, and the deck empty."""
         goods = self.goods.get(order.task)
         if goods is None or goods.aboard or goods.task.pickup != body.cell or body.task != NO_TASK:
@@ -163,7 +163,7 @@ class UnitPlant:
             return
         goods.aboard, body.task = body.machine.node_id, order.task
 
-    def unload(self, body: Body, order: CartOrder) -> None:
+    def unload(self, body: GridRobotBody, order: CartOrder) -> None:
         """What is aboard, where it is to go."""
         goods = self.goods.get(order.task)
         if goods is None or body.task != order.task or goods.task.delivery != body.cell:

@@ -7,13 +7,13 @@ from bus_sim.systems.mapd.orders import count
 from bus_sim.systems.mapd.plant import UnitPlant
 from bus_sim.systems.mapd.published import token_passing
 from bus_sim.systems.mapd.show import picture
-from bus_sim.systems.stage import Stage, Tally
+from bus_sim.systems.stage import SystemStage, Tally
 from onboard.contract.mapd import StepRound
 from onboard.contract.messages import CallForProposals
 
 
-class MapdStage(Stage[UnitPlant]):
-    """See ``Stage``."""
+class MapdStage(SystemStage[UnitPlant]):
+    """See ``SystemStage``."""
 
     who = "tasks"
 
@@ -22,16 +22,16 @@ class MapdStage(Stage[UnitPlant]):
         self.plant.check_steps()
 
     def head(self) -> list[str]:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         site = self.plant.site
         return [f"{super().head()[0]}, {len(site.homes)} robots, {len(site.tasks)} tasks"]
 
     def tally(self) -> Tally:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return count(self.plant)
 
     def picture(self) -> str:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return picture(self.plant)
 
     def figures(self) -> dict[str, object]:

@@ -7,25 +7,25 @@ others have published, in the order of the bids; then all move at once.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from onboard.systems.mapd.auction import Offer, Rule, Task, winners
+from onboard.systems.mapd.auction import Availability, BidWeights, TransportTask, winners
 from onboard.systems.mapd.floor import Floor
 from onboard.systems.mapd.paths import Path, Paths
 from onboard.systems.mapd.search import find_path
 
 
 @dataclass
-class Robot:
+class SteppingRobot:
     """One robot. ``loaded`` is whether its task has been picked up; ``free_at`` the step of the planned delivery."""
 
     number: int
     home: int
-    task: Task | None = None
+    task: TransportTask | None = None
     loaded: bool = False
     free_at: int = 0
 
 
 @dataclass
-class Day:
+class SteppedDay:
     """A day's work: ``run`` plays it. ``served`` is the step at which each task was delivered, by number.
 
     ``searches`` were made, and in ``failures`` of them a robot kept its former path. ``rests`` are where robots may
@@ -35,8 +35,8 @@ class Day:
     floor: Floor
     homes: Sequence[int]
     rests: frozenset[int]
-    tasks: Sequence[Task]
-    rule: Rule = field(default_factory=Rule)
+    tasks: Sequence[TransportTask]
+    rule: BidWeights = field(default_factory=BidWeights)
     step: int = 0
     served: dict[int, int] = field(default_factory=dict)
     searches: int = 0
@@ -45,12 +45,12 @@ class Day:
     history: list[tuple[int, ...]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.robots = [Robot(number, home) for number, home in enumerate(self.homes)]
+        self.robots = [SteppingRobot(number, home) for number, home in enumerate(self.homes)]
         self.paths = Paths(self.floor.resources)
         for robot in self.robots:
             self.paths.put(robot.number, Path(0, (robot.home,)))
         self.waiting = sorted(self.tasks, key=lambda task: (task.release, task.number))[::-1]
-        self.open: dict[int, Task] = {}
+        self.open: dict[int, TransportTask] = {}
         self.fresh = False
         # Whether somebody who planned right at its pick-up took the goods: the others see that in the next step.
         self._is_news = False
@@ -61,7 +61,7 @@ class Day:
         """Whether every task was served."""
         return len(self.served) == len(self.tasks)
 
-    def run(self, limit: int = 20_000) -> "Day":
+    def run(self, limit: int = 20_000) -> "SteppedDay":
         """Play until every task is served or ``limit`` steps have gone."""
         while not self.is_over and self.step < limit:
             self._arrive()
@@ -82,7 +82,7 @@ class Day:
         """Step of the last delivery."""
         return max(self.served.values())
 
-    def at(self, robot: Robot) -> int:
+    def at(self, robot: SteppingRobot) -> int:
         """Its cell at this step."""
         return self.paths.by_robot[robot.number].at(self.step)
 
@@ -102,15 +102,15 @@ class Day:
                 robot.task, robot.loaded = None, False
                 self.fresh = True
 
-    def _pick_up(self, robot: Robot, task: Task) -> None:
+    def _pick_up(self, robot: SteppingRobot, task: TransportTask) -> None:
         robot.loaded = True
         self.fresh = True
         del self.open[task.number]
 
-    def _offer(self, robot: Robot) -> Offer:
+    def _offer(self, robot: SteppingRobot) -> Availability:
         if robot.loaded and robot.task is not None:
-            return Offer(robot.number, robot.task.delivery, robot.free_at - self.step)
-        return Offer(robot.number, self.at(robot), 0)
+            return Availability(robot.number, robot.task.delivery, robot.free_at - self.step)
+        return Availability(robot.number, self.at(robot), 0)
 
     def _decide(self) -> None:
         if not self.fresh and all(robot.task for robot in self.robots):
@@ -130,16 +130,16 @@ class Day:
             if number in won:
                 self._plan(self.robots[number], won[number][0])
 
-    def _must_yield(self, robot: Robot) -> bool:
+    def _must_yield(self, robot: SteppingRobot) -> bool:
         return self.paths.by_robot[robot.number].rest not in self._rests(robot)
 
-    def _rests(self, robot: Robot) -> frozenset[int]:
+    def _rests(self, robot: SteppingRobot) -> frozenset[int]:
         """Where it may end: not in others' homes, nor where somebody has to pick up or deliver; its home always."""
         wanted = {cell for task in self.open.values() for cell in (task.pickup, task.delivery)}
         wanted.update(one.task.delivery for one in self.robots if one.task is not None)
         return (self.rests - wanted - set(self.homes)) | {robot.home}
 
-    def _plan(self, robot: Robot, task: Task | None) -> None:
+    def _plan(self, robot: SteppingRobot, task: TransportTask | None) -> None:
         """A path for a task, or to a rest; where there is none the robot keeps its former path and has no task."""
         old = self.paths.take(robot.number)
         assert old is not None

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from bus_sim.options import RunOptions
 from bus_sim.systems.terminal.playing import play
-from bus_sim.systems.terminal.run import Outcome, TerminalRun
+from bus_sim.systems.terminal.run import TerminalOutcome, TerminalRun
 from onboard.contract.codes import KindCode
 from onboard.contract.terminal import Assignment, TaskTerms
 from onboard.core.behaviour import BehaviourFactory, Fleet
@@ -18,9 +18,9 @@ from onboard.core.negotiation import Estimator
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Site
 from onboard.systems.registry import factory_for
-from onboard.systems.terminal.desk import Desk, DeskFactory, DeskGeneration
+from onboard.systems.terminal.desk import Desk, DeskGeneration, TerminalDeskFactory
 from onboard.systems.terminal.missions import Transport
-from onboard.systems.terminal.search import Job, Search, remaining
+from onboard.systems.terminal.search import BoxTransport, PlanSearch, remaining
 from onboard.systems.terminal.site import Terminal
 from onboard.ways.cars import car_fleet
 from onboard.work.order_life import OrderEvent
@@ -64,11 +64,11 @@ class CentralDesk(Desk):
     def _best(self, transport: Transport, now_us: int) -> int | None:
         """The robot whose plan would end first (section 3c of the paper)."""
         source = self.mirror.station_of(transport.box)
-        job = Job(transport.box, transport.task, source, transport.target, transport.before_us)
+        job = BoxTransport(transport.box, transport.task, source, transport.target, transport.before_us)
         avoid, found = self.mirror.long_blocked(now_us), []
         for node in self.candidates(now_us):
             free_us = self.mirror.traffic.end_of(node, now_us)
-            search = Search(self.site, self.mirror.traffic, node, now_us, avoid)
+            search = PlanSearch(self.site, self.mirror.traffic, node, now_us, avoid)
             kept = remaining(self.mirror.traffic, node, now_us)
             plan = search.best(self.mirror.where[node], free_us, job, version=1, kept=kept)
             if plan is not None:
@@ -76,7 +76,7 @@ class CentralDesk(Desk):
         return min(found)[1] if found else None
 
 
-class CentralDeskFactory(DeskFactory):
+class CentralDeskFactory(TerminalDeskFactory):
     """Makes desks that plan for all vehicles, for comparison."""
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> CentralDesk:
@@ -96,7 +96,7 @@ def at_one_desk(site: Terminal) -> Terminal:
     return replace(site, missions=tuple(replace(one, desk=site.desk) for one in site.missions))
 
 
-def play_central(site: Terminal, options: RunOptions, *, limit_us: int) -> Outcome:
+def play_central(site: Terminal, options: RunOptions, *, limit_us: int) -> TerminalOutcome:
     """A run under the central planner."""
 
     def prepare(run: TerminalRun) -> None:
@@ -105,6 +105,6 @@ def play_central(site: Terminal, options: RunOptions, *, limit_us: int) -> Outco
     return play(at_one_desk(site), options, limit_us=limit_us, prepare=prepare)
 
 
-def play_auction(site: Terminal, options: RunOptions, *, limit_us: int) -> Outcome:
+def play_auction(site: Terminal, options: RunOptions, *, limit_us: int) -> TerminalOutcome:
     """Play the same missions at one desk by calls and bids; ``limit_us`` of virtual time at most."""
     return play(at_one_desk(site), options, limit_us=limit_us)

@@ -3,12 +3,12 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from bus_sim.systems.terminal.world import Handling
+from bus_sim.systems.terminal.world import BoxHandling
 from onboard.systems.terminal.site import Mission, Terminal
 
 
 @dataclass(frozen=True)
-class Delivery:
+class BoxDelivery:
     """One box of a mission: times in us since it was ordered."""
 
     mission: int
@@ -24,7 +24,7 @@ def ordered(site: Terminal, refused: Collection[int] = ()) -> int:
     return sum(max(mission.count, len(mission.boxes)) for mission in wanted)
 
 
-def deliveries(site: Terminal, handled: list[Handling]) -> list[Delivery]:
+def deliveries(site: Terminal, handled: list[BoxHandling]) -> list[BoxDelivery]:
     """Which mission each putting down served: the first that names this box, else the first that wants its type."""
     # Named ones come first: a box that one mission names must not be counted for another that takes any of its type.
     missions = sorted(enumerate(site.missions, 1), key=lambda one: not one[1].boxes)
@@ -40,7 +40,7 @@ def deliveries(site: Terminal, handled: list[Handling]) -> list[Delivery]:
                 lacking[number] -= 1
                 late_us = max(0, one.time_us - mission.before_us) if mission.before_us else 0
                 waited_us = up[one.box] - mission.at_us
-                found.append(Delivery(number, one.box, waited_us, one.time_us - mission.at_us, late_us))
+                found.append(BoxDelivery(number, one.box, waited_us, one.time_us - mission.at_us, late_us))
                 break
     return found
 

@@ -9,11 +9,11 @@ from onboard.systems.terminal.site import EntityKind
 from onboard.systems.terminal.vehicle import terminal
 
 
-class Orders(words.Orders):
+class ForgedTransports(words.ForgedOrders):
     """Boxes that nobody ordered."""
 
     def orders(self) -> Iterator[Message]:
-        """See ``words.Orders``."""
+        """See ``words.ForgedOrders``."""
         site, chance = terminal(self.node.site), self.node.chance
         stations = [number for number, one in site.entities.items() if one.kind is EntityKind.STATION]
         box, station = chance.randint(1, len(site.boxes)), chance.choice(stations)

@@ -4,7 +4,7 @@ import random
 from dataclasses import dataclass, field, replace
 
 from bus_sim.demand import DemandError
-from bus_sim.systems.orders import Orders
+from bus_sim.systems.orders import OrderArrivals
 from bus_sim.systems.stage import Tally
 from bus_sim.systems.terminal.deliveries import deliveries, ordered
 from bus_sim.systems.terminal.plant import TerminalPlant
@@ -62,7 +62,7 @@ class _Yard:
         return sum(len(boxes) for one, boxes in self.standing.items() if self._targets(one))
 
 
-def draw(site: Terminal, orders: Orders, seed: int) -> Terminal:
+def draw(site: Terminal, orders: OrderArrivals, seed: int) -> Terminal:
     """The site with drawn missions and, in some seeds, a blocked lane. Raises ``DemandError`` for too many of them."""
     chance, yard, missions = orders.chance(site.name, seed), _Yard(site), []
     yard.by_type = {one for one in yard.standing if chance.random() < 0.5}

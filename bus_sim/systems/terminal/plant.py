@@ -7,7 +7,7 @@ from functools import partial
 from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import Timers
 from bus_sim.systems.terminal.deliveries import deliveries, ordered
-from bus_sim.systems.terminal.world import VehicleBody, World
+from bus_sim.systems.terminal.world import TerminalWorld, VehicleBody
 from onboard.contract.codes import KindCode, ManualMode
 from onboard.contract.messages import Message
 from onboard.contract.terminal import Action, HandlerMode, MoveMode, Verb
@@ -184,7 +184,7 @@ class TerminalPlant:
     ) -> None:
         self.site, self.noise = site, noise
         self.timers = timers
-        self.world = World(site)
+        self.world = TerminalWorld(site)
         self.violations = self.world.violations
         self.links = links
         #: Missions that were taken, and those that a desk said it cannot carry out, by number.

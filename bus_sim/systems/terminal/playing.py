@@ -11,7 +11,7 @@ from bus_sim import session
 from bus_sim.options import RunOptions
 from bus_sim.systems.stage import HOUR_US, Show
 from bus_sim.systems.terminal.plant import NOISE, make_plant
-from bus_sim.systems.terminal.run import Outcome, TerminalRun
+from bus_sim.systems.terminal.run import TerminalOutcome, TerminalRun
 from bus_sim.systems.terminal.simulated import SIMULATED
 from bus_sim.systems.terminal.stage import TerminalStage
 from onboard.systems.terminal.site import Terminal
@@ -51,7 +51,7 @@ def play(
     noise: float = NOISE,
     prepare: Callable[[TerminalRun], None] | None = None,
     show: Callable[[TerminalRun], None] | None = None,
-) -> Outcome:
+) -> TerminalOutcome:
     """``prepare`` gets the run before it is switched on, ``show`` after each second; ``noise`` as of the plant."""
     staged: type[TerminalStage] = TerminalStage
     if show is not None:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from bus_sim.run import BusRun
-from bus_sim.systems.terminal.deliveries import Delivery, deliveries, ordered
+from bus_sim.systems.terminal.deliveries import BoxDelivery, deliveries, ordered
 from bus_sim.systems.terminal.plant import TerminalPlant
 from onboard.contract.messages import CarAt, Message
 from onboard.systems.terminal.desk import Desk
@@ -32,10 +32,10 @@ class TerminalRun(BusRun[TerminalPlant]):
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TerminalOutcome:
     """What a run came to. ``touched`` counts plans that their owners made anew; ``events`` disturbances."""
 
-    deliveries: tuple[Delivery, ...]
+    deliveries: tuple[BoxDelivery, ...]
     ordered: int
     ended_us: int
     touched: int
@@ -51,12 +51,12 @@ class Outcome:
         """Whether all was delivered and nothing broke."""
         return not self.violations and not self.halted and len(self.deliveries) == self.ordered
 
-    def mean_s(self, what: Callable[[Delivery], int]) -> float:
+    def mean_s(self, what: Callable[[BoxDelivery], int]) -> float:
         """Mean over all deliveries, s."""
         return sum(map(what, self.deliveries)) / max(1, len(self.deliveries)) / 1e6
 
 
-def outcome(run: TerminalRun) -> Outcome:
+def outcome(run: TerminalRun) -> TerminalOutcome:
     """The indicators of a run so far."""
     site = run.plant.site
     vehicles = [one.holon.behaviour for one in run.controllers.values() if isinstance(one.holon.behaviour, Vehicle)]
@@ -65,7 +65,7 @@ def outcome(run: TerminalRun) -> Outcome:
         f"{one.holon.machine.name}: {one.holon.halted}" for one in run.controllers.values() if one.holon.halted
     )
     statistics = run.fleet.statistics()
-    return Outcome(
+    return TerminalOutcome(
         tuple(deliveries(site, run.plant.world.handled)),
         ordered(site),
         max((one.time_us for one in run.plant.world.handled), default=0),

@@ -7,7 +7,7 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
-from bus_sim.systems.terminal.run import Outcome, TerminalRun
+from bus_sim.systems.terminal.run import TerminalOutcome, TerminalRun
 from bus_sim.systems.terminal.table import picture, plan_table
 from onboard.systems.terminal.site import Terminal
 
@@ -64,7 +64,7 @@ class TerminalShow:
         self._console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
-def summary_lines(site: Terminal, found: Outcome) -> list[str]:
+def summary_lines(site: Terminal, found: TerminalOutcome) -> list[str]:
     """Indicators of a run for people: waiting is from the order to the picking up, finishing to the putting down."""
     late = [one for one in found.deliveries if one.late_us]
     lines = [
@@ -84,5 +84,5 @@ def _times(name: str, mean_s: float, longest_s: float) -> str:
     return f"{name:<9} mean {mean_s:7.1f} s   longest {longest_s:7.1f} s"
 
 
-def _longest(found: Outcome, what: str) -> float:
+def _longest(found: TerminalOutcome, what: str) -> float:
     return max((getattr(one, what) for one in found.deliveries), default=0) / 1e6

@@ -1,7 +1,7 @@
 """A terminal in the simulator."""
 
-from bus_sim.systems.orders import OrderedSystem, Orders
-from bus_sim.systems.terminal.forged import Orders as ForgedOrders
+from bus_sim.systems.orders import OrderArrivals, OrderedSystem
+from bus_sim.systems.terminal.forged import ForgedTransports
 from bus_sim.systems.terminal.orders import ORDER_S, draw, last_s
 from bus_sim.systems.terminal.plant import make_plant
 from bus_sim.systems.terminal.run import TerminalRun
@@ -19,9 +19,9 @@ SIMULATED = OrderedSystem(
     draw,
     last_s,
     lambda _: ORDER_S,
-    lambda _: Orders(5, 30.0),
+    lambda _: OrderArrivals(5, 30.0),
     worker=KindCode.VEHICLE,
     connected=TerminalRun,
     look_speed=LOOK_SPEED,
-    attacks={"orders": ForgedOrders},
+    attacks={"orders": ForgedTransports},
 )

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from bus_sim.systems.stage import HOUR_US, Ended, Show, Stage, Summary, Tally
+from bus_sim.systems.stage import HOUR_US, EndedRun, RunFigures, Show, SystemStage, Tally
 from bus_sim.systems.terminal.orders import count
 from bus_sim.systems.terminal.plant import TerminalPlant
-from bus_sim.systems.terminal.run import Outcome, TerminalRun, outcome
+from bus_sim.systems.terminal.run import TerminalOutcome, TerminalRun, outcome
 from bus_sim.systems.terminal.show import TerminalShow, summary_lines
 from onboard.systems.terminal.site import Terminal
 
@@ -18,20 +18,20 @@ if TYPE_CHECKING:  # the page's libraries are an extra
 
 @dataclass(frozen=True)
 class TerminalSummary:
-    """See ``Summary``."""
+    """See ``RunFigures``."""
 
     site: Terminal
     seed: int
-    found: Outcome
+    found: TerminalOutcome
     failures: tuple[str, ...]
 
     @property
     def is_good(self) -> bool:
-        """See ``Summary``."""
+        """See ``RunFigures``."""
         return self.found.is_good and not self.failures
 
     def lines(self, width: int | None = None) -> list[str]:
-        """See ``Summary``."""
+        """See ``RunFigures``."""
         return summary_lines(self.site, self.found) + [f"halted: {what}" for what in self.failures]
 
     def to_json(self) -> dict[str, object]:
@@ -39,8 +39,8 @@ class TerminalSummary:
         return {"site": self.site.name, "seed": self.seed, **asdict(self.found), "good": self.is_good}
 
 
-class TerminalStage(Stage[TerminalPlant]):
-    """See ``Stage``."""
+class TerminalStage(SystemStage[TerminalPlant]):
+    """See ``SystemStage``."""
 
     who = "boxes"
     step_us = 1_000_000
@@ -49,33 +49,33 @@ class TerminalStage(Stage[TerminalPlant]):
 
     @property
     def limit_us(self) -> int:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return HOUR_US
 
     def head(self) -> list[str]:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         site, options = self.plant.site, self.run.options
         trace = options.trace if options.trace is not None else "none"
         return [f"site {site.name}, digest {site.digest}, seed {options.seed}, trace {trace}"]
 
     def tally(self) -> Tally:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return count(self.plant)
 
     def show(self, console: Console) -> Show:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return TerminalShow(self.run, console)
 
     def source(self) -> "RunSource":
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         from bus_sim.systems.terminal.page import TerminalSource  # noqa: PLC0415  # its libraries are an extra
 
         return TerminalSource(self.run)
 
-    def outcome(self) -> Outcome:
+    def outcome(self) -> TerminalOutcome:
         """The indicators so far."""
         return outcome(self.run)
 
-    def summary(self, ended: Ended) -> Summary:
-        """See ``Stage``."""
+    def summary(self, ended: EndedRun) -> RunFigures:
+        """See ``SystemStage``."""
         return TerminalSummary(self.plant.site, self.run.options.seed, self.outcome(), ended.failures)

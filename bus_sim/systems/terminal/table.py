@@ -4,7 +4,7 @@ from onboard.contract.terminal import Action
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.plan import NO_STEP, Load
 from onboard.systems.terminal.site import Entity, EntityKind, Terminal
-from onboard.systems.terminal.traffic import Node, Traffic
+from onboard.systems.terminal.traffic import StepDate, Traffic
 
 _WORDS = {Action.GOTO: "GOTO", Action.DOCK: "DOCK", Action.UNDOCK: "UNDOCK"}
 _LOADS = {Action.PICK_UP: "PICK UP", Action.PUT_DOWN: "PUTDOWN"}
@@ -28,7 +28,7 @@ def plan_table(site: Terminal, traffic: Traffic, owner: int, now: int, tick: int
         if step.action in _LOADS:
             words = f"{_LOADS[step.action]} Box {name}"
         whereto = site.entities[steps[number + 1].entity].name if step.action is Action.GOTO else ""
-        begin, end = dates[Node(owner, number)] // tick, dates[Node(owner, number + 1)] // tick
+        begin, end = dates[StepDate(owner, number)] // tick, dates[StepDate(owner, number + 1)] // tick
         shown = now_task if now_task != task else ""
         task = now_task
         lines.append(f"{shown:<15}{words:<20}{whereto:<12}[{begin} {end}]")

@@ -19,7 +19,7 @@ class VehicleBody:
 
 
 @dataclass(frozen=True, slots=True)
-class Handling:
+class BoxHandling:
     """A box picked up or put down: loop time in us."""
 
     time_us: int
@@ -30,14 +30,14 @@ class Handling:
 
 
 @dataclass
-class World:
+class TerminalWorld:
     """Bodies, boxes and obstacles. Whatever must never happen is kept in ``violations``, word for word."""
 
     site: Terminal
     bodies: dict[int, VehicleBody] = field(default_factory=dict)
     standing: dict[int, list[int]] = field(default_factory=dict)
     blocked: set[int] = field(default_factory=set)
-    handled: list[Handling] = field(default_factory=list)
+    handled: list[BoxHandling] = field(default_factory=list)
     violations: list[str] = field(default_factory=list)
     #: Vehicles in each lane in the order in which they came.
     order: dict[int, list[int]] = field(default_factory=dict)
@@ -103,7 +103,7 @@ class World:
             return False
         row.remove(box)
         body.box = box
-        self.handled.append(Handling(time_us, body.node_id, box, body.entity, is_up=True))
+        self.handled.append(BoxHandling(time_us, body.node_id, box, body.entity, is_up=True))
         return True
 
     def put_down(self, body: VehicleBody, time_us: int) -> bool:
@@ -112,7 +112,7 @@ class World:
         if not body.box or len(row) >= self.site.entities[body.entity].room:
             return False
         row.append(body.box)
-        self.handled.append(Handling(time_us, body.node_id, body.box, body.entity, is_up=False))
+        self.handled.append(BoxHandling(time_us, body.node_id, body.box, body.entity, is_up=False))
         body.box = 0
         return True
 

@@ -19,7 +19,7 @@ class ProgramError(ValueError):
 
 
 @dataclass
-class Run:
+class ProgramRun:
     """What one run of a program does. Radii and lengths in mm, minutes under feed by tool, and in rapid moves."""
 
     cuts: list[list[tuple[float, float]]] = field(default_factory=list)
@@ -42,9 +42,9 @@ class _Modal:
     tool: int = 0
 
 
-def run_program(text: str) -> Run:
+def run_program(text: str) -> ProgramRun:
     """Run a program once. Raises ``ProgramError`` where it is none."""
-    run, modal, ended = Run(), _Modal(), False
+    run, modal, ended = ProgramRun(), _Modal(), False
     for line in text.splitlines():
         block = re.sub(r"\([^)]*\)", "", line).strip()
         if not block or block == "%" or block.startswith("O"):
@@ -58,7 +58,7 @@ def run_program(text: str) -> Run:
     return run
 
 
-def _block(words: list[tuple[str, str]], modal: _Modal, run: Run, line: str) -> bool:
+def _block(words: list[tuple[str, str]], modal: _Modal, run: ProgramRun, line: str) -> bool:
     """One block; True for the end of the program."""
     codes = [int(float(number)) for letter, number in words if letter == "G"]
     values = {letter: float(number) for letter, number in words if letter != "G"}
@@ -77,7 +77,7 @@ def _block(words: list[tuple[str, str]], modal: _Modal, run: Run, line: str) -> 
     return values.get("M") == 30
 
 
-def _move(values: dict[str, float], modal: _Modal, run: Run, line: str) -> None:
+def _move(values: dict[str, float], modal: _Modal, run: ProgramRun, line: str) -> None:
     start = (modal.x_mm, modal.z_mm)
     end = (values.get("X", 2 * modal.x_mm) / 2, values.get("Z", modal.z_mm))
     modal.x_mm, modal.z_mm = end
@@ -117,7 +117,7 @@ def _arc(
     return [(centre[0] + radius * sin(a), centre[1] + radius * cos(a)) for a in angles]
 
 
-def contour_error_mm(run: Run, contour: list[tuple[float, float]]) -> float:
+def contour_error_mm(run: ProgramRun, contour: list[tuple[float, float]]) -> float:
     """How far the made part is from the drawing, ``contour`` as (radius, z) points from the face to the chuck.
 
     The larger of: the farthest that a point of the drawing is from any cut, and the deepest that any move goes into

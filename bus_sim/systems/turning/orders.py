@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
-from bus_sim.systems.orders import Orders, last_of, nothing_to_draw, tally_of
+from bus_sim.systems.orders import OrderArrivals, last_of, nothing_to_draw, tally_of
 from bus_sim.systems.stage import Tally
 from bus_sim.systems.turning.plant import ORIGIN_US, TurningPlant
 from onboard.contract.codes import OrderResult
-from onboard.systems.turning.site import Turning, Wanted
+from onboard.systems.turning.site import BatchDemand, Turning
 
 #: Parts of an order, at least and at most: a batch of a small shop.
 BATCH = (1, 3)
@@ -14,7 +14,7 @@ BATCH = (1, 3)
 ORDER_S = 1_500.0
 
 
-def draw(site: Turning, orders: Orders, seed: int) -> Turning:
+def draw(site: Turning, orders: OrderArrivals, seed: int) -> Turning:
     """The site with drawn orders. Raises ``DemandError`` for a site without any of its own, whose parts they take."""
     if not site.orders:
         raise nothing_to_draw(site.name, "no orders to take the parts of")
@@ -22,7 +22,7 @@ def draw(site: Turning, orders: Orders, seed: int) -> Turning:
     drawn = []
     for at_ms in orders.moments_ms(chance):
         job = chance.choice(site.orders).job
-        drawn.append(Wanted(at_ms, replace(job, batch=chance.randint(*BATCH))))
+        drawn.append(BatchDemand(at_ms, replace(job, batch=chance.randint(*BATCH))))
     return replace(site, orders=tuple(drawn))
 
 

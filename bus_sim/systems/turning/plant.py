@@ -5,15 +5,15 @@ from dataclasses import dataclass
 from functools import partial
 from math import hypot
 
-from bus_sim.devices.link import BusDeviceLink, DeviceLink
+from bus_sim.devices.link import BusDeviceLink, DeviceBusLink
 from bus_sim.devices.timers import Timer, Timers
-from bus_sim.systems.turning.nc import ProgramError, Run, contour_error_mm, run_program
+from bus_sim.systems.turning.nc import ProgramError, ProgramRun, contour_error_mm, run_program
 from onboard.contract.codes import OrderResult
 from onboard.contract.messages import Message
 from onboard.contract.turning import LatheAction, NcMode
 from onboard.contract.turning_device import JobAnswer, JobEntry, LatheOrder, NcState, ProgramEnd, ProgramText, ToolState
 from onboard.systems.turning.fields import CHUNK, crc16
-from onboard.systems.turning.site import Drawing, Element, Lathe, Turning, Wanted
+from onboard.systems.turning.site import BatchDemand, ContourElement, Drawing, Lathe, Turning
 
 STATE_REPEAT_US = 2_000_000
 TOOL_REPEAT_US = 10_000_000
@@ -35,7 +35,7 @@ def contour_of(drawing: Drawing) -> list[tuple[float, float]]:
     return points
 
 
-def _points_of(element: Element) -> list[tuple[float, float]]:
+def _points_of(element: ContourElement) -> list[tuple[float, float]]:
     one, other = element.start, element.end
     shares = [i / 20 for i in range(21)]
     chord = [(one.r_um + (other.r_um - one.r_um) * s, one.u_um + (other.u_um - one.u_um) * s) for s in shares]
@@ -50,7 +50,7 @@ def _points_of(element: Element) -> list[tuple[float, float]]:
 class NcDevice:
     """Control, turret and chuck of one lathe. It makes what the loaded program says, and its edges wear."""
 
-    def __init__(self, lathe: Lathe, plant: "TurningPlant", link: DeviceLink) -> None:
+    def __init__(self, lathe: Lathe, plant: "TurningPlant", link: DeviceBusLink) -> None:
         self.lathe = lathe
         self.mode = NcMode.READY
         self.program = 0
@@ -65,7 +65,7 @@ class NcDevice:
         self._sequence = 0
         self._chunks: dict[int, bytes] = {}
         self._loading = 0
-        self._run: Run | None = None
+        self._run: ProgramRun | None = None
         self._set_up_for: tuple[str, int] | None = None
         self._timer: Timer | None = None
         link.subscribe(self._on_message)
@@ -138,7 +138,7 @@ class NcDevice:
         self.mode, self.parts = NcMode.READY, 0
         self._say()
 
-    def _made(self, run: Run) -> None:
+    def _made(self, run: ProgramRun) -> None:
         for number, minutes in run.cut_min.items():
             self.used_min[number] = self.used_min.get(number, 0.0) + minutes
         for tool in self.lathe.tools:
@@ -167,11 +167,11 @@ class NcDevice:
 
 
 @dataclass
-class Entry:
+class BatchEntry:
     """One order at the counter and what became of it."""
 
     number: int
-    wanted: Wanted
+    wanted: BatchDemand
     begun_us: int
     result: OrderResult | None = None
     winner: int = 0
@@ -179,22 +179,22 @@ class Entry:
     ended_us: int | None = None
 
 
-class Counter:
+class BatchCounter:
     """The desk's counter: says each order until it is answered."""
 
-    def __init__(self, node_id: int, plant: "TurningPlant", link: DeviceLink) -> None:
+    def __init__(self, node_id: int, plant: "TurningPlant", link: DeviceBusLink) -> None:
         self.node_id = node_id
-        self.entries: list[Entry] = []
+        self.entries: list[BatchEntry] = []
         self._plant, self._link = plant, link
         link.subscribe(self._on_message)
 
-    def add(self, wanted: Wanted) -> None:
+    def add(self, wanted: BatchDemand) -> None:
         """Somebody orders a batch at this moment; said to the desk, and again until it answers."""
-        entry = Entry(len(self.entries) + 1, wanted, self._plant.timers.now_us())
+        entry = BatchEntry(len(self.entries) + 1, wanted, self._plant.timers.now_us())
         self.entries.append(entry)
         self._say(entry)
 
-    def _say(self, entry: Entry) -> None:
+    def _say(self, entry: BatchEntry) -> None:
         if entry.result is not None:
             return
         job = entry.wanted.job
@@ -224,7 +224,7 @@ class TurningPlant:
         self.links = links
         self.violations: list[str] = []
         self.devices = {node: NcDevice(lathe, self, links[node]) for node, lathe in site.lathes.items()}
-        self.counters = {node: Counter(node, self, links[node]) for node in site.desks}
+        self.counters = {node: BatchCounter(node, self, links[node]) for node in site.desks}
         #: Worst distance of a made contour from its drawing, mm, by drawing number.
         self.errors_mm: dict[int, float] = {}
         self.programs: dict[tuple[int, int], str] = {}
@@ -240,12 +240,12 @@ class TurningPlant:
                 ORIGIN_US + wanted.at_ms * 1000, partial(self._come, desks[number % len(desks)], wanted)
             )
 
-    def _come(self, counter: Counter, wanted: Wanted) -> None:
+    def _come(self, counter: BatchCounter, wanted: BatchDemand) -> None:
         self._to_come -= 1
         counter.add(wanted)
 
     @property
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[BatchEntry]:
         """All orders that came so far, counter by counter."""
         return [entry for counter in self.counters.values() for entry in counter.entries]
 
@@ -258,7 +258,7 @@ class TurningPlant:
         """Something that must never happen has happened."""
         self.violations.append(f"{self.timers.now_us() / 1e6:.3f} s: {violation}")
 
-    def check_program(self, lathe: Lathe, text: str, run: Run) -> None:
+    def check_program(self, lathe: Lathe, text: str, run: ProgramRun) -> None:
         """What the program cuts is what is drawn, within the tolerance, and with tools that are there."""
         drawing = self.site.drawings.get(int(text.splitlines()[1][1:]))
         if drawing is None:

@@ -1,6 +1,6 @@
 """A turning cell in the simulator."""
 
-from bus_sim.systems.orders import OrderedSystem, Orders
+from bus_sim.systems.orders import OrderArrivals, OrderedSystem
 from bus_sim.systems.turning.orders import ORDER_S, draw, last_s
 from bus_sim.systems.turning.plant import make_plant
 from bus_sim.systems.turning.stage import TurningStage
@@ -14,6 +14,6 @@ SIMULATED = OrderedSystem(
     draw,
     last_s,
     lambda _: ORDER_S,
-    lambda _: Orders(4, 120.0),
+    lambda _: OrderArrivals(4, 120.0),
     worker=KindCode.LATHE,
 )

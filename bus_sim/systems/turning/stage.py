@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from bus_sim.systems.stage import Stage, Tally
+from bus_sim.systems.stage import SystemStage, Tally
 from bus_sim.systems.turning.orders import count
 from bus_sim.systems.turning.plant import TurningPlant
 from bus_sim.systems.turning.show import board
@@ -15,35 +15,35 @@ if TYPE_CHECKING:  # the page's libraries are an extra
     from bus_sim.web.run_source import RunSource
 
 
-class TurningStage(Stage[TurningPlant]):
-    """See ``Stage``."""
+class TurningStage(SystemStage[TurningPlant]):
+    """See ``SystemStage``."""
 
     def head(self) -> list[str]:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return [f"{super().head()[0]}, {len(self.plant.site.orders)} orders"]
 
     def tally(self) -> Tally:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return count(self.plant)
 
     def bring(self, site: Turning, node: int) -> None:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         lathe = site.lathes[node]
         fits = (one for one in site.orders if choose_clamping(one.job, site.drawings[one.job.drawing], lathe))
         wanted = next(fits)
         next(iter(self.plant.counters.values())).add(wanted)
 
     def power_up(self, node: int) -> None:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         if node in self.plant.devices:
             self.plant.devices[node].start()
 
     def picture(self) -> str:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return board(self.plant)
 
     def source(self) -> "RunSource":
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         from bus_sim.web.orders import let_order  # noqa: PLC0415  # its libraries are an extra
 
         return let_order(super().source(), self.plant.counters, self.plant.site.orders)

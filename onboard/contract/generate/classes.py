@@ -4,7 +4,7 @@ import textwrap
 import zlib
 from collections.abc import Iterable, Iterator
 
-from onboard.contract.generate.model import TUPLES, Contract, Field, Frame, FrameSet, Table
+from onboard.contract.generate.model import TUPLES, DbcFile, DbcMessage, Field, FrameSet, ValueTable
 
 WIDTH = 120
 #: What a summary line may hold: the quotes and the indentation off.
@@ -12,17 +12,17 @@ _SUMMARY = WIDTH - 4 - 3 - 3
 HEAD = '"""{what}\n\nWritten by ``make docs`` from ``dbc/{file}.dbc``: change that file, never this one.\n"""\n\n'
 
 
-def enumerations(tables: Iterable[Table]) -> str:
+def enumerations(tables: Iterable[ValueTable]) -> str:
     """The classes of value tables."""
     return "\n\n".join(_enumeration(table) for table in tables)
 
 
-def _enumeration(table: Table) -> str:
+def _enumeration(table: ValueTable) -> str:
     members = "\n".join(f"    {name} = {value}" for value, name in table.choices)
     return f"class {table.name}(IntEnum):\n{docstring(table.comment)}\n\n{members}\n"
 
 
-def version(contract: Contract) -> str:
+def version(contract: DbcFile) -> str:
     """The numbers by which machines of one contract know each other."""
     lines = [line for line in contract.text.splitlines() if line.startswith(("BO_ ", " SG_ "))]
     digest = zlib.crc32("\n".join(lines).encode()) & 0x7F | 0x80
@@ -34,7 +34,7 @@ def version(contract: Contract) -> str:
     )
 
 
-def message_class(frame: Frame) -> str:
+def message_class(frame: DbcMessage) -> str:
     """A frame's class."""
     base = "SetFrame" if frame.part_of else "Message"
     return _class(frame.layout.name, base, frame.layout.comment, frame.fields)

@@ -28,7 +28,7 @@ class ContractError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ValueTable:
     """An enumeration."""
 
     name: str
@@ -47,7 +47,7 @@ class Field(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class DbcMessage:
     """One message of a DBC; ``part_of`` names the set that it is a part of."""
 
     layout: MessageLayout
@@ -64,25 +64,25 @@ class FrameSet:
     name: str
     module: str
     comment: str
-    frames: tuple[Frame, ...]
+    frames: tuple[DbcMessage, ...]
     fields: tuple[Field, ...]
     repeated: str
     repeated_fields: tuple[Field, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Contract:
+class DbcFile:
     """One DBC file; ``name`` is the file's, ``text`` the DBC."""
 
     name: str
     text: str
     version: int
-    tables: tuple[Table, ...]
-    frames: tuple[Frame, ...]
+    tables: tuple[ValueTable, ...]
+    frames: tuple[DbcMessage, ...]
     sets: tuple[FrameSet, ...]
 
 
-def read_contract(name: str, text: str, module: str, known: tuple[Table, ...]) -> Contract:
+def read_contract(name: str, text: str, module: str, known: tuple[ValueTable, ...]) -> DbcFile:
     """A DBC text; ``module`` is for its enumerations, ``known`` those of the contracts of all. ``ContractError``."""
     notes = read_annotations(text)
     layouts = read_layouts(text)
@@ -92,18 +92,18 @@ def read_contract(name: str, text: str, module: str, known: tuple[Table, ...]) -
         for signal in layout.signals
         if "TableComment" in notes.signals.get((layout.name, signal.name), {})
     }
-    tables = tuple(Table(one, comments.get(choices, ""), choices, module) for one, choices in notes.tables.items())
+    tables = tuple(ValueTable(one, comments.get(choices, ""), choices, module) for one, choices in notes.tables.items())
     every = {table.choices: table for table in (*known, *tables)}
     frames = tuple(_frame(name, layout, notes, every) for layout in layouts)
     for table in tables:
         if not table.comment:
             raise ContractError(f"{name}.dbc: value table {table.name}: no signal that has it has a TableComment")
-    return Contract(name, text, notes.version, tables, frames, _sets(frames, notes))
+    return DbcFile(name, text, notes.version, tables, frames, _sets(frames, notes))
 
 
 def _frame(
-    file: str, layout: MessageLayout, notes: Annotations, tables: dict[tuple[tuple[int, str], ...], Table]
-) -> Frame:
+    file: str, layout: MessageLayout, notes: Annotations, tables: dict[tuple[tuple[int, str], ...], ValueTable]
+) -> DbcMessage:
     attributes = notes.messages[layout.name]
     by_name = {signal.name: signal for signal in layout.signals}
     names = list(notes.order[layout.name])
@@ -125,7 +125,7 @@ def _frame(
         fields.append(Field(signal.name, kind, (signal,), default))
     is_device = file == "device" or CONTROLLER in (*layout.senders, *layout.receivers)
     module = file if file == "device" or not is_device else f"{file}_device"
-    return Frame(layout, attributes.get("Noun") or module, tuple(fields), attributes.get("PartOf", ""), is_device)
+    return DbcMessage(layout, attributes.get("Noun") or module, tuple(fields), attributes.get("PartOf", ""), is_device)
 
 
 def _group(names: list[str]) -> tuple[str, str] | None:
@@ -137,7 +137,7 @@ def _group(names: list[str]) -> tuple[str, str] | None:
     return None
 
 
-def _kind(where: str, signal: SignalLayout, tables: dict[tuple[tuple[int, str], ...], Table]) -> str:
+def _kind(where: str, signal: SignalLayout, tables: dict[tuple[tuple[int, str], ...], ValueTable]) -> str:
     if not signal.choices:
         return "int"
     if signal.choices == YES_NO:
@@ -151,14 +151,14 @@ def _kind(where: str, signal: SignalLayout, tables: dict[tuple[tuple[int, str], 
     return tables[signal.choices].name
 
 
-def _sets(frames: tuple[Frame, ...], notes: Annotations) -> tuple[FrameSet, ...]:
+def _sets(frames: tuple[DbcMessage, ...], notes: Annotations) -> tuple[FrameSet, ...]:
     return tuple(
         _set(name, tuple(frame for frame in frames if frame.part_of == name), notes)
         for name in dict.fromkeys(frame.part_of for frame in frames if frame.part_of)
     )
 
 
-def _set(name: str, frames: tuple[Frame, ...], notes: Annotations) -> FrameSet:
+def _set(name: str, frames: tuple[DbcMessage, ...], notes: Annotations) -> FrameSet:
     attributes = notes.messages[frames[0].layout.name]
     repeats = notes.messages[frames[-1].layout.name].get("Repeats", "")
     fields = {field.name: field for frame in (frames[:-1] if repeats else frames) for field in frame.fields}

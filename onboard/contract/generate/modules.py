@@ -10,7 +10,7 @@ from pathlib import Path
 
 from dbc import device_dbc_text, fleet_dbc_text, system_dbc_text, systems
 from onboard.contract.generate.classes import HEAD, enumerations, message_class, set_classes, uses, version
-from onboard.contract.generate.model import TUPLES, Contract, ContractError, Frame, FrameSet, read_contract
+from onboard.contract.generate.model import TUPLES, ContractError, DbcFile, DbcMessage, FrameSet, read_contract
 from onboard.contract.generate.packing import (
     function_name,
     pack_function,
@@ -32,7 +32,7 @@ _ABOUT = {
 }
 
 
-def contracts() -> tuple[Contract, ...]:
+def contracts() -> tuple[DbcFile, ...]:
     """Every DBC in ``dbc/``, the two of all first. ``ContractError`` for one that is not fit for code."""
     fleet = read_contract("fleet", fleet_dbc_text(), CODES, ())
     device = read_contract("device", device_dbc_text(), CODES, fleet.tables)
@@ -45,7 +45,7 @@ def contracts() -> tuple[Contract, ...]:
     return _with_common_tables(tuple(found))
 
 
-def _with_common_tables(every: tuple[Contract, ...]) -> tuple[Contract, ...]:
+def _with_common_tables(every: tuple[DbcFile, ...]) -> tuple[DbcFile, ...]:
     """An enumeration that several systems name alike is one, and stands where those of all are.
 
     ``ContractError`` where they name alike what is not: other values, or another comment.
@@ -68,7 +68,7 @@ def _with_common_tables(every: tuple[Contract, ...]) -> tuple[Contract, ...]:
     )
 
 
-def generated(every: tuple[Contract, ...]) -> dict[str, str]:
+def generated(every: tuple[DbcFile, ...]) -> dict[str, str]:
     """The text of every generated file, by its name below ``onboard/contract``, in ruff's format."""
     fleet, device, *_ = every
     common = {table.name: table for one in every for table in one.tables if table.module == CODES}
@@ -93,7 +93,7 @@ def generated(every: tuple[Contract, ...]) -> dict[str, str]:
 
 
 def _classes(
-    contract: Contract, module: str, frames: tuple[Frame, ...], sets: tuple[FrameSet, ...], where: dict[str, str]
+    contract: DbcFile, module: str, frames: tuple[DbcMessage, ...], sets: tuple[FrameSet, ...], where: dict[str, str]
 ) -> str:
     about = _ABOUT.get(module, f"What the machines of the system {contract.name} say beyond the messages of all")
     about += ", on their device buses" if module.endswith("_device") else ""
@@ -119,7 +119,7 @@ def _classes(
 
 
 def _packing(
-    contract: Contract, module: str, frames: tuple[Frame, ...], sets: tuple[FrameSet, ...], where: dict[str, str]
+    contract: DbcFile, module: str, frames: tuple[DbcMessage, ...], sets: tuple[FrameSet, ...], where: dict[str, str]
 ) -> str:
     used = {name for frame in frames for name in uses(frame.fields)}
     tuples = used & set(TUPLES)
@@ -143,7 +143,7 @@ def _packing(
     return "".join(lines) + "\n\n" + "\n\n".join([*blocks, _frames(frames, first)])
 
 
-def _frames(frames: tuple[Frame, ...], first: dict[str, str]) -> str:
+def _frames(frames: tuple[DbcMessage, ...], first: dict[str, str]) -> str:
     """The list of a module's frames."""
     lines = ["#: Every frame of this module.", "FRAMES = ("]
     for frame in frames:

@@ -8,7 +8,7 @@ own for whole numbers, shifts and ``|`` have none (bench/codec.py).
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from onboard.contract.generate.model import TUPLES, Field, Frame
+from onboard.contract.generate.model import TUPLES, DbcMessage, Field
 from onboard.wire.dbc_file import SignalLayout
 
 #: Letters of ``struct`` by length in bytes.
@@ -41,7 +41,7 @@ class Word(NamedTuple):
         return len(self.signals) == 1 and self.signals[0].bits == self.length * 8
 
 
-def words(frame: Frame) -> tuple[Word, ...]:
+def words(frame: DbcMessage) -> tuple[Word, ...]:
     """The cheapest cut of a frame into words."""
     length = frame.layout.length
     best: dict[int, tuple[int, tuple[Word, ...]]] = {0: (0, ())}
@@ -59,7 +59,7 @@ def words(frame: Frame) -> tuple[Word, ...]:
     return best[length][1]
 
 
-def _word(frame: Frame, start: int, size: int) -> Word | None:
+def _word(frame: DbcMessage, start: int, size: int) -> Word | None:
     """The word there, None where a signal crosses one of its ends."""
     low, high = start * 8, (start + size) * 8
     inside = []
@@ -80,17 +80,17 @@ def _cost(word: Word) -> int:
     return _WORD_NS + (len(word.signals) - 1) * more
 
 
-def struct_format(frame: Frame) -> str:
+def struct_format(frame: DbcMessage) -> str:
     """The format of a frame, little-endian."""
     return "<" + "".join(word.letter for word in words(frame))
 
 
-def function_name(frame: Frame) -> str:
+def function_name(frame: DbcMessage) -> str:
     """``car_at`` of ``CarAt``."""
     return "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in frame.layout.name).lstrip("_")
 
 
-def pack_function(frame: Frame) -> str:
+def pack_function(frame: DbcMessage) -> str:
     """The function from a message to its bytes."""
     name = function_name(frame)
     lines = [f"def pack_{name}(message: {frame.layout.name}) -> bytes:"]
@@ -115,7 +115,7 @@ def _paths(field: Field) -> Iterator[tuple[SignalLayout, str]]:
         yield signal, f"{field.name}.{TUPLES[field.kind][number]}" if field.kind in TUPLES else field.name
 
 
-def _refusal(frame: Frame, signal: SignalLayout) -> list[str]:
+def _refusal(frame: DbcMessage, signal: SignalLayout) -> list[str]:
     where = f'"{frame.layout.name}.{signal.name}"'
     return [
         f"    if not {signal.minimum} <= {signal.name} <= {signal.maximum}:",
@@ -158,7 +158,7 @@ def _mask(signal: SignalLayout) -> str:
     return f"0x{(1 << signal.bits) - 1:X}"
 
 
-def _shape(frame: Frame) -> str:
+def _shape(frame: DbcMessage) -> str:
     """The name of the frame's ``Struct``."""
     return (
         struct_format(frame)
@@ -171,13 +171,13 @@ def _shape(frame: Frame) -> str:
     )
 
 
-def shapes(frames: tuple[Frame, ...]) -> str:
+def shapes(frames: tuple[DbcMessage, ...]) -> str:
     """A ``Struct`` for each format in use."""
     found = {_shape(frame): struct_format(frame) for frame in frames}
     return "".join(f'_{shape} = Struct("{found[shape]}")\n' for shape in sorted(found))
 
 
-def unpack_function(frame: Frame) -> str:
+def unpack_function(frame: DbcMessage) -> str:
     """The function from a sender and bytes to a message, or None."""
     name, parts = function_name(frame), [word for word in words(frame) if word.signals]
     lines = [f"def unpack_{name}(sender: int, data: bytes) -> {frame.layout.name} | None:"]

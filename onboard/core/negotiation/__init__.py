@@ -2,7 +2,7 @@
 
 from onboard.core.negotiation.bidding import (
     DelayRule,
-    Slot,
+    SpeakingSlot,
     beats,
     cost_difference,
     cut_off_us,
@@ -13,18 +13,18 @@ from onboard.core.negotiation.bidding import (
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import (
     EVENT_TYPES,
-    Answer,
     Awarded,
     AwardedAgain,
     CallKey,
-    CallTerms,
     Closed,
     Estimator,
-    Needs,
+    NeededAnswers,
     NegotiationEvent,
     PreAssigned,
     Proposal,
     Released,
+    RequestedTerms,
+    SubCallAnswer,
 )
 from onboard.core.negotiation.initiator import Initiator, RestartPolicy, RestartStep
 from onboard.core.negotiation.negotiation import Negotiation, negotiation_of
@@ -32,26 +32,26 @@ from onboard.core.negotiation.participant import Participant
 
 __all__ = [
     "EVENT_TYPES",
-    "Answer",
     "Awarded",
     "AwardedAgain",
     "CallKey",
-    "CallTerms",
     "Closed",
     "Counters",
     "DelayRule",
     "Estimator",
     "Initiator",
-    "Needs",
+    "NeededAnswers",
     "Negotiation",
     "NegotiationEvent",
     "Participant",
     "PreAssigned",
     "Proposal",
     "Released",
+    "RequestedTerms",
     "RestartPolicy",
     "RestartStep",
-    "Slot",
+    "SpeakingSlot",
+    "SubCallAnswer",
     "beats",
     "cost_difference",
     "cut_off_us",

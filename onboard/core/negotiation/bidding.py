@@ -50,7 +50,7 @@ def delay_us(cost: int, floor: int, criterion: Criterion, timing: Timing) -> int
     return timing.bid_delay_us * above // (above + timing.bid_half_us)
 
 
-class Slot(NamedTuple):
+class SpeakingSlot(NamedTuple):
     """When in each round of ``slots`` times ``length_us`` a machine may begin to speak: in slot ``number``, from 0.
 
     A length of 0 means at any time.
@@ -62,16 +62,16 @@ class Slot(NamedTuple):
 
 
 #: No slots: machines whose delays end within one bus latency then speak all at once.
-ANY_TIME = Slot(0, 1, 0)
+ANY_TIME = SpeakingSlot(0, 1, 0)
 
 
-def slot_of(site: Site, node_id: int) -> Slot:
+def slot_of(site: Site, node_id: int) -> SpeakingSlot:
     """A machine's slot: its rank by node-ID among all of the site's. Raises ``ValueError`` for a node not of the site.
 
     Of two machines that are equally good, or nearly so, the second hears the first and stays silent: a queued frame
     cannot be recalled. So the bids of a call strictly improve on the wire (row P08), as long as no controller is late.
     """
-    return Slot(sorted(site.machines).index(node_id), len(site.machines), slot_length_us(site.bitrate))
+    return SpeakingSlot(sorted(site.machines).index(node_id), len(site.machines), slot_length_us(site.bitrate))
 
 
 def slot_length_us(bitrate: int) -> int:
@@ -79,7 +79,7 @@ def slot_length_us(bitrate: int) -> int:
     return _FRAMES_TO_HEAR * _FRAME_BITS * 1_000_000 // bitrate + _READING_US
 
 
-def in_slot(delay_us: int, slot: Slot) -> int:
+def in_slot(delay_us: int, slot: SpeakingSlot) -> int:
     """A delay moved within its round to the machine's own slot; rounds are short beside W: better is still sooner."""
     round_us = slot.slots * slot.length_us
     return delay_us // round_us * round_us + slot.number * slot.length_us if round_us else delay_us

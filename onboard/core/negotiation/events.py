@@ -33,7 +33,7 @@ class Proposal(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class CallTerms:
+class RequestedTerms:
     """What an initiator asks for; the negotiation adds call number, attempt and deadline.
 
     ``ready_us`` (bus time) is when a part can begin at the earliest, 0 for at once. The negotiation numbers the parts
@@ -60,16 +60,16 @@ class CallTerms:
     floor: Callable[[CallForProposals, int], int] | None = field(default=None, compare=False)
 
 
-class Answer(NamedTuple):
+class SubCallAnswer(NamedTuple):
     """What came of a sub-call: its number and terms, the best bid's ``cost``, and its ``winner``, 0 for nobody."""
 
     part: int
-    terms: CallTerms
+    terms: RequestedTerms
     winner: int
     cost: int
 
 
-class Needs(NamedTuple):
+class NeededAnswers(NamedTuple):
     """The cost cannot be named before others have answered ``parts``; it will be ``cost`` or more, as far as is known.
 
     ``combine`` gets all answers so far, of earlier rounds too, and the time (bus us): the proposal, or what else is
@@ -77,8 +77,8 @@ class Needs(NamedTuple):
     """
 
     cost: int
-    parts: tuple[CallTerms, ...]
-    combine: "Callable[[tuple[Answer, ...], int], Proposal | Needs | None]"
+    parts: tuple[RequestedTerms, ...]
+    combine: "Callable[[tuple[SubCallAnswer, ...], int], Proposal | NeededAnswers | None]"
 
 
 class Estimator(Protocol):
@@ -93,7 +93,7 @@ class Estimator(Protocol):
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         """A cheap bound of this machine's cost; None where it cannot do the task at all."""
 
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | Needs | None:
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
         """The real cost around everybody's plans, or what must be asked first; None where there is no solution."""
 
 
@@ -127,7 +127,7 @@ class Awarded:
     call: CallForProposals
     proposal: Proposal
     award: Award | None
-    parts: tuple[Answer, ...] = ()
+    parts: tuple[SubCallAnswer, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from onboard.contract.messages import Award, Bid, CallForProposals, Itinerary, R
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.negotiation.bidding import beats, cut_off_us, is_below
 from onboard.core.negotiation.counters import Counters
-from onboard.core.negotiation.events import CallTerms, Closed, NegotiationEvent
+from onboard.core.negotiation.events import Closed, NegotiationEvent, RequestedTerms
 from onboard.core.negotiation.trust import Trust, left_out_words
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Timing
@@ -49,7 +49,7 @@ def is_any_sound(task: Reference, bid: Bid) -> bool:
     return True
 
 
-class State(Enum):
+class InitiatorState(Enum):
     """Where an initiator stands with one task."""
 
     OPEN = "bids may come"
@@ -58,7 +58,7 @@ class State(Enum):
     CLOSED = "over"
 
 
-class Event(Enum):
+class InitiatorEvent(Enum):
     """What can happen to an initiator."""
 
     DEADLINE_WITH_BID = "the deadline has passed and there is a best bid"
@@ -86,7 +86,7 @@ class RestartStep:
     to_station: int | None = None
     criterion: Criterion | None = None
 
-    def changed(self, terms: CallTerms) -> CallTerms:
+    def changed(self, terms: RequestedTerms) -> RequestedTerms:
         """The terms of this attempt."""
         return replace(
             terms,
@@ -119,7 +119,7 @@ class Initiator:
     """
 
     node_id: int
-    terms: CallTerms
+    terms: RequestedTerms
     timing: Timing
     policy: RestartPolicy
     number: Callable[[], int]
@@ -134,7 +134,7 @@ class Initiator:
     left_out_above: frozenset[int] = frozenset()
     deadline_us: int | None = None
     hold_until_us: int = 0
-    state: State = State.OPEN
+    state: InitiatorState = InitiatorState.OPEN
     call: CallForProposals | None = None
     attempt: int = 0
     best: tuple[int, int] | None = None
@@ -189,7 +189,7 @@ class Initiator:
     def on_bid(self, bid: Bid, now_us: int) -> Outcome:
         """A bid counts if received before the deadline minus the guard, by my own bus time (decision on flag 11)."""
         assert self.call is not None and self.due_us is not None
-        if self.state is not State.OPEN or now_us > cut_off_us(self.due_us, self.timing):
+        if self.state is not InitiatorState.OPEN or now_us > cut_off_us(self.due_us, self.timing):
             self.counters.late_bids_ignored += 1
             return []
         no_account = bid.sender in self.left_out or self.is_obstacle(bid.sender) or self._is_below_floor(bid.cost)
@@ -222,7 +222,7 @@ class Initiator:
         named = stamp.initiator == self.node_id and stamp.call == self.call.call & 0xFF
         if itinerary.grade is not Grade.FIRM or not named or self.best is None or itinerary.sender != self.best[1]:
             return []
-        return self._fire(Event.HEARD, now_us)
+        return self._fire(InitiatorEvent.HEARD, now_us)
 
     def on_report(self, report: TaskReport, now_us: int) -> Outcome:
         """A report on the task by its winner ends the award as well; one that gives the task back rejects it."""
@@ -230,48 +230,48 @@ class Initiator:
             return []
         if report.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED):
             self._lost_reason = report.reason
-            return self._fire(Event.FORFEIT, now_us)
+            return self._fire(InitiatorEvent.FORFEIT, now_us)
         if self.terms.operation is Operation.RIDE and report.station != self.terms.from_station:
             # Of another ride of the same task: the word for this one is lost, or has not been heard yet.
             return []
-        return self._fire(Event.HEARD, now_us)
+        return self._fire(InitiatorEvent.HEARD, now_us)
 
     def confirm(self, now_us: int) -> Outcome:
         """What the option hangs on was awarded: award the option."""
-        return self._fire(Event.CONFIRM, now_us)
+        return self._fire(InitiatorEvent.CONFIRM, now_us)
 
     def withdraw(self, now_us: int) -> Outcome:
         """Close the call for nobody while it is open or an option; an award under way is not taken back."""
-        return self._fire(Event.WITHDRAW, now_us)
+        return self._fire(InitiatorEvent.WITHDRAW, now_us)
 
     def abandon(self, reason: Reason, now_us: int) -> Outcome:
         """The winner was never heard and will not have the object: its custodian calls anew, under a raised version."""
         self._lost_reason = reason
-        return self._fire(Event.ABANDON, now_us)
+        return self._fire(InitiatorEvent.ABANDON, now_us)
 
     def begin_anew(self, now_us: int) -> None:
         """A machine has come back: it may be the winner, and hears the award soon."""
-        if self.state is State.AWARDING and self.awards_sent > QUICK_AWARDS:
+        if self.state is InitiatorState.AWARDING and self.awards_sent > QUICK_AWARDS:
             self.awards_sent = QUICK_AWARDS + 1
             self.due_us = min(self.due_us or now_us, now_us + self.timing.award_repeat_us)
 
     def silent_winner(self, now_us: int) -> int:
         """The winner that was awarded the task long ago and has said nothing of it since; 0 for nobody."""
-        is_late = self.state is State.AWARDING and now_us - self.awarded_us >= ACCEPT_WITHIN_US
+        is_late = self.state is InitiatorState.AWARDING and now_us - self.awarded_us >= ACCEPT_WITHIN_US
         return self.best[1] if is_late and self.best is not None else NOBODY
 
     def next_wake(self) -> int | None:
         """When ``wake`` has something to do, bus time in us."""
-        return None if self.is_round and self.state is State.OPEN else self.due_us
+        return None if self.is_round and self.state is InitiatorState.OPEN else self.due_us
 
     def wake(self, now_us: int) -> Outcome:
         """Let the deadline pass, or say the award again."""
         if self.due_us is None or self.due_us > now_us:
             return []
-        if self.state is State.AWARDING:
-            return self._fire(Event.REPEAT, now_us)
-        if self.state is State.HELD:
-            return self._fire(Event.EXPIRE, now_us)
+        if self.state is InitiatorState.AWARDING:
+            return self._fire(InitiatorEvent.REPEAT, now_us)
+        if self.state is InitiatorState.HELD:
+            return self._fire(InitiatorEvent.EXPIRE, now_us)
         return [] if self.is_round else self.conclude(now_us)
 
     def conclude(self, now_us: int) -> Outcome:
@@ -279,11 +279,13 @@ class Initiator:
         self.choose()
         if self.best is not None:
             option = self.deadline_us is not None
-            return self._fire(Event.DEADLINE_WITH_OPTION if option else Event.DEADLINE_WITH_BID, now_us)
+            return self._fire(
+                InitiatorEvent.DEADLINE_WITH_OPTION if option else InitiatorEvent.DEADLINE_WITH_BID, now_us
+            )
         last = self.attempt >= self.timing.max_attempts or self.deadline_us is not None
-        return self._fire(Event.EXHAUSTED if last else Event.DEADLINE_EMPTY, now_us)
+        return self._fire(InitiatorEvent.EXHAUSTED if last else InitiatorEvent.DEADLINE_EMPTY, now_us)
 
-    def _fire(self, event: Event, now_us: int) -> Outcome:
+    def _fire(self, event: InitiatorEvent, now_us: int) -> Outcome:
         entry = TABLE.get((self.state, event))
         if entry is None:
             return []
@@ -294,7 +296,7 @@ class Initiator:
 
     def decide(self, now_us: int) -> Outcome:
         """The best bid has won; in the silent form everybody is taken to know that."""
-        return self._fire(Event.HEARD, now_us) if self.silent else self.award(now_us)
+        return self._fire(InitiatorEvent.HEARD, now_us) if self.silent else self.award(now_us)
 
     def award(self, now_us: int) -> Outcome:
         """Say who has won.
@@ -380,17 +382,17 @@ def _in_steps_ms(duration_us: int, step_ms: int, most_ms: int) -> int:
 
 
 #: The whole protocol of an initiator: (state, event) to the next state and what is done on the way.
-TABLE: dict[tuple[State, Event], tuple[State, Callable[[Initiator, int], Outcome]]] = {
-    (State.OPEN, Event.DEADLINE_WITH_BID): (State.AWARDING, Initiator.decide),
-    (State.OPEN, Event.DEADLINE_EMPTY): (State.OPEN, Initiator.reopen),
-    (State.OPEN, Event.EXHAUSTED): (State.CLOSED, Initiator.refuse),
-    (State.OPEN, Event.WITHDRAW): (State.CLOSED, Initiator.cancel),
-    (State.OPEN, Event.DEADLINE_WITH_OPTION): (State.HELD, Initiator.hold),
-    (State.HELD, Event.CONFIRM): (State.AWARDING, Initiator.take_up),
-    (State.HELD, Event.WITHDRAW): (State.CLOSED, Initiator.give_up),
-    (State.HELD, Event.EXPIRE): (State.CLOSED, Initiator.expire),
-    (State.AWARDING, Event.REPEAT): (State.AWARDING, Initiator.award),
-    (State.AWARDING, Event.FORFEIT): (State.CLOSED, Initiator.reject),
-    (State.AWARDING, Event.ABANDON): (State.CLOSED, Initiator.reject),
-    (State.AWARDING, Event.HEARD): (State.CLOSED, Initiator.end),
+TABLE: dict[tuple[InitiatorState, InitiatorEvent], tuple[InitiatorState, Callable[[Initiator, int], Outcome]]] = {
+    (InitiatorState.OPEN, InitiatorEvent.DEADLINE_WITH_BID): (InitiatorState.AWARDING, Initiator.decide),
+    (InitiatorState.OPEN, InitiatorEvent.DEADLINE_EMPTY): (InitiatorState.OPEN, Initiator.reopen),
+    (InitiatorState.OPEN, InitiatorEvent.EXHAUSTED): (InitiatorState.CLOSED, Initiator.refuse),
+    (InitiatorState.OPEN, InitiatorEvent.WITHDRAW): (InitiatorState.CLOSED, Initiator.cancel),
+    (InitiatorState.OPEN, InitiatorEvent.DEADLINE_WITH_OPTION): (InitiatorState.HELD, Initiator.hold),
+    (InitiatorState.HELD, InitiatorEvent.CONFIRM): (InitiatorState.AWARDING, Initiator.take_up),
+    (InitiatorState.HELD, InitiatorEvent.WITHDRAW): (InitiatorState.CLOSED, Initiator.give_up),
+    (InitiatorState.HELD, InitiatorEvent.EXPIRE): (InitiatorState.CLOSED, Initiator.expire),
+    (InitiatorState.AWARDING, InitiatorEvent.REPEAT): (InitiatorState.AWARDING, Initiator.award),
+    (InitiatorState.AWARDING, InitiatorEvent.FORFEIT): (InitiatorState.CLOSED, Initiator.reject),
+    (InitiatorState.AWARDING, InitiatorEvent.ABANDON): (InitiatorState.CLOSED, Initiator.reject),
+    (InitiatorState.AWARDING, InitiatorEvent.HEARD): (InitiatorState.CLOSED, Initiator.end),
 }

@@ -8,11 +8,10 @@ from onboard.contract.codes import KindCode, Reason, TaskPhase
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Award, Bid, CallForProposals, Itinerary, LeftOut, Message, Reference, TaskReport
 from onboard.core.effects import Effect
-from onboard.core.negotiation.bidding import ANY_TIME, DelayRule, Slot, delay_us, last_bid_us, slot_of
+from onboard.core.negotiation.bidding import ANY_TIME, DelayRule, SpeakingSlot, delay_us, last_bid_us, slot_of
 from onboard.core.negotiation.counters import Counters
-from onboard.core.negotiation.events import Awarded, CallKey, CallTerms, Estimator, NegotiationEvent, PreAssigned
-from onboard.core.negotiation.initiator import Initiator, RestartPolicy, is_any_sound, nobody_is
-from onboard.core.negotiation.initiator import State as InitiatorState
+from onboard.core.negotiation.events import Awarded, CallKey, Estimator, NegotiationEvent, PreAssigned, RequestedTerms
+from onboard.core.negotiation.initiator import Initiator, InitiatorState, RestartPolicy, is_any_sound, nobody_is
 from onboard.core.negotiation.participant import Participant
 from onboard.core.negotiation.sub_calls import SubCalls
 from onboard.core.negotiation.trust import Trust
@@ -54,7 +53,7 @@ class Negotiation:
     initiators: list[Initiator] = field(default_factory=list)
     boot: int = 0
     delay: DelayRule = delay_us
-    slot: Slot = ANY_TIME
+    slot: SpeakingSlot = ANY_TIME
     trust: Trust = field(default_factory=Trust)
     #: Whether a node's bids count for nothing, by this machine's mirror.
     is_obstacle: Callable[[int], bool] = nobody_is
@@ -63,7 +62,7 @@ class Negotiation:
     #: Whether a call stands: this machine looks at it in its initiator's rounds, and not when it is heard.
     stands: Callable[[CallForProposals], bool] = never
     #: Own calls that stand and are open in this round, by number, and the end of the round.
-    _standing: Mapping[int, CallTerms] = field(default_factory=dict)
+    _standing: Mapping[int, RequestedTerms] = field(default_factory=dict)
     _until_us: int = 0
     #: The newest word of each initiator about whom it leaves out: the call, and the nodes.
     _left_out: dict[int, tuple[int, frozenset[int]]] = field(default_factory=dict)
@@ -72,7 +71,7 @@ class Negotiation:
     def __post_init__(self) -> None:
         self._last_call = (self.boot & 0xFF) << 8
 
-    def open(self, terms: CallTerms, now_us: int) -> list[Effect]:
+    def open(self, terms: RequestedTerms, now_us: int) -> list[Effect]:
         """Call for a task. The answer comes as a ``Closed`` event from ``receive`` or ``wake``."""
         initiator = Initiator(
             self.node_id,
@@ -89,7 +88,7 @@ class Negotiation:
         self.initiators.append(initiator)
         return [item for item in initiator.open(now_us) if not isinstance(item, NegotiationEvent)]
 
-    def withdraw(self, terms: CallTerms, now_us: int) -> Outcome:
+    def withdraw(self, terms: RequestedTerms, now_us: int) -> Outcome:
         """Close the open call for a task, for nobody."""
         outcome: Outcome = []
         for initiator in self.initiators:
@@ -197,7 +196,7 @@ class Negotiation:
         """A round of another's calls is over: what came of it was told, or is told by the next."""
         self.participants = {key: one for key, one in self.participants.items() if key.initiator != initiator}
 
-    def begin_round(self, standing: Mapping[int, CallTerms], until_us: int) -> None:
+    def begin_round(self, standing: Mapping[int, RequestedTerms], until_us: int) -> None:
         """Own calls, by number, were told to all and are open again until then: their bids count."""
         self.end_round()
         self._standing, self._until_us = standing, until_us
@@ -335,7 +334,7 @@ class Negotiation:
         return replace(self.timing, bid_delay_us=self.timing.bid_delay_us * window_us // self.timing.call_window_us)
 
     def _open_sub_call(
-        self, left_out: frozenset[int], terms: CallTerms, deadline_us: int, hold_until_us: int, now_us: int
+        self, left_out: frozenset[int], terms: RequestedTerms, deadline_us: int, hold_until_us: int, now_us: int
     ) -> tuple[Initiator, Outcome]:
         initiator = Initiator(
             self.node_id,

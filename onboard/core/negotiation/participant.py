@@ -19,7 +19,7 @@ from onboard.core.effects import Effect, Send
 from onboard.core.negotiation.bidding import (
     ANY_TIME,
     DelayRule,
-    Slot,
+    SpeakingSlot,
     beats,
     cut_off_us,
     delay_us,
@@ -33,7 +33,7 @@ from onboard.core.negotiation.events import (
     AwardedAgain,
     CallKey,
     Estimator,
-    Needs,
+    NeededAnswers,
     NegotiationEvent,
     PreAssigned,
     Proposal,
@@ -50,7 +50,7 @@ Outcome = list[Effect | NegotiationEvent]
 LAPSE_REPEATS = 100
 
 
-class State(Enum):
+class ParticipantState(Enum):
     """Where a participant stands in one call."""
 
     WAITING_BOUND = "waiting for what the free-flow bound owes"
@@ -65,7 +65,7 @@ class State(Enum):
     LOST = "closed for another, or for nobody"
 
 
-class Event(Enum):
+class ParticipantEvent(Enum):
     """What can happen to a participant."""
 
     DUE = "own delay has run out"
@@ -95,23 +95,23 @@ class Participant:
     deadline_us: int
     subs: SubCalls
     delay: DelayRule = delay_us
-    slot: Slot = ANY_TIME
+    slot: SpeakingSlot = ANY_TIME
     #: Whose bids do not count: obstacles, by my mirror, and those that the initiator named.
     is_obstacle: Callable[[int], bool] = nobody_is
     left_out: frozenset[int] = frozenset()
     is_sound: Callable[[Reference, Bid], bool] = is_any_sound
-    state: State = State.WAITING_BOUND
+    state: ParticipantState = ParticipantState.WAITING_BOUND
     due_us: int | None = None
     heard_us: int = 0
     floor: int = 0
     bound: int = 0
     proposal: Proposal | None = None
-    needs: Needs | None = None
+    needs: NeededAnswers | None = None
     best: tuple[int, int] | None = None
     award: Award | None = None
     rivals_until_us: int = 0
     is_stale: bool = False
-    searched: Proposal | Needs | None = None
+    searched: Proposal | NeededAnswers | None = None
     has_bid: bool = False
     last_bid_us: int = field(init=False)
     cut_off_us: int = field(init=False)
@@ -131,12 +131,12 @@ class Participant:
     @property
     def is_over(self) -> bool:
         """Whether nothing can happen any more."""
-        return self.state in (State.ASSIGNED, State.LOST)
+        return self.state in (ParticipantState.ASSIGNED, ParticipantState.LOST)
 
     @property
     def is_committed(self) -> bool:
         """Whether the machine keeps reservations for this call."""
-        return self.state in (State.PRE_ASSIGNED, State.BELIEVING, State.OPTION)
+        return self.state in (ParticipantState.PRE_ASSIGNED, ParticipantState.BELIEVING, ParticipantState.OPTION)
 
     # --- events ------------------------------------------------------------------------------------------------
 
@@ -146,7 +146,7 @@ class Participant:
         self.heard_us = now_us
         bound = None if self.node_id in self.left_out else self.estimator.lower_bound(self.call, now_us)
         if bound is None:
-            return self._fire(Event.IMPOSSIBLE, now_us)
+            return self._fire(ParticipantEvent.IMPOSSIBLE, now_us)
         self.bound = bound
         self.floor = self.estimator.floor(self.call, now_us)
         self.due_us = now_us + self._delay_us(bound)
@@ -163,7 +163,7 @@ class Participant:
             return []
         if self.best is None or beats(bid.cost, bid.sender, *self.best, self.call.criterion):
             self.best = (bid.cost, bid.sender)
-        return self._fire(Event.BEATEN, now_us) if self._is_beaten() else []
+        return self._fire(ParticipantEvent.BEATEN, now_us) if self._is_beaten() else []
 
     def on_rival(self, deadline_us: int) -> None:
         """Another bidder asks others first, until ``deadline_us``: it was sooner, so its cost is likely to be less.
@@ -171,25 +171,25 @@ class Participant:
         Where there is still time afterwards, own sub-calls wait for its bid: most bidders then ask nobody.
         """
         self.rivals_until_us = max(self.rivals_until_us, deadline_us)
-        if self.state is State.WAITING_COST and self.needs is not None and self.due_us is not None:
+        if self.state is ParticipantState.WAITING_COST and self.needs is not None and self.due_us is not None:
             self.due_us = self._behind_rivals_us(self.due_us)
 
     def on_change(self, now_us: int) -> Outcome:
         """This machine has bid, or won, in another call: what it does there, it does first."""
-        return self._fire(Event.CHANGED, now_us)
+        return self._fire(ParticipantEvent.CHANGED, now_us)
 
     def on_award(self, award: Award, now_us: int) -> Outcome:
         """The initiator closes the call, or holds the best bid as an option. Idempotent."""
         self.award = award
         named = award.winner == self.node_id and self.has_bid
         if named and award.result is CallResult.OPTION:
-            return self._fire(Event.OPTION_ME, now_us)
+            return self._fire(ParticipantEvent.OPTION_ME, now_us)
         mine = named and award.result is CallResult.AWARDED
-        return self._fire(Event.AWARD_ME if mine else Event.AWARD_OTHER, now_us)
+        return self._fire(ParticipantEvent.AWARD_ME if mine else ParticipantEvent.AWARD_OTHER, now_us)
 
     def supersede(self, now_us: int) -> Outcome:
         """The call is void: a newer one is for the same task, or there is no room to remember this one."""
-        return self._fire(Event.SUPERSEDED, now_us)
+        return self._fire(ParticipantEvent.SUPERSEDED, now_us)
 
     def wake(self, now_us: int) -> Outcome:
         """Let the delay, the deadline and the patience after it pass where they are due."""
@@ -197,29 +197,29 @@ class Participant:
         # A search may owe no further delay, so being due can follow being due; the table ends that after two.
         while self.due_us is not None and min(self.due_us, self.last_bid_us) <= now_us:
             self.due_us = None
-            due = Event.DUE if self.needs is None else Event.NEED
-            outcome += self._fire(due if now_us < self.last_bid_us else Event.DEADLINE, now_us)
+            due = ParticipantEvent.DUE if self.needs is None else ParticipantEvent.NEED
+            outcome += self._fire(due if now_us < self.last_bid_us else ParticipantEvent.DEADLINE, now_us)
         if now_us >= self.deadline_us:
-            outcome += self._fire(Event.DEADLINE, now_us)
+            outcome += self._fire(ParticipantEvent.DEADLINE, now_us)
         if now_us >= self.lapse_us:
-            outcome += self._fire(Event.LAPSE, now_us)
+            outcome += self._fire(ParticipantEvent.LAPSE, now_us)
         return outcome
 
     def collect(self, now_us: int) -> Outcome:
         """Go on where the last sub-call asked for has come to its deadline."""
-        if self.state is not State.ASKING or not self.subs.is_answered:
+        if self.state is not ParticipantState.ASKING or not self.subs.is_answered:
             return []
-        return self._fire(Event.ANSWERED, now_us)
+        return self._fire(ParticipantEvent.ANSWERED, now_us)
 
     def next_wake(self) -> int | None:
         """The delay's end, or the moment at which waiting for something else ends."""
         if self.due_us is not None:
             return min(self.due_us, self.last_bid_us)
-        if self.state is State.PRE_ASSIGNED:
+        if self.state is ParticipantState.PRE_ASSIGNED:
             return self.deadline_us
-        return self.lapse_us if self.state in (State.BELIEVING, State.OPTION) else None
+        return self.lapse_us if self.state in (ParticipantState.BELIEVING, ParticipantState.OPTION) else None
 
-    def _fire(self, event: Event, now_us: int) -> Outcome:
+    def _fire(self, event: ParticipantEvent, now_us: int) -> Outcome:
         entry = TABLE.get((self.state, event))
         if entry is None:
             return []
@@ -243,13 +243,13 @@ class Participant:
         before, self.searched = self.searched, self.estimator.estimate(self.call, now_us)
         return before is None or self.searched is None or _essence(before) != _essence(self.searched)
 
-    def _weigh(self, found: Proposal | Needs | None, now_us: int) -> Outcome:
+    def _weigh(self, found: Proposal | NeededAnswers | None, now_us: int) -> Outcome:
         if found is None:
-            return self._fire(Event.IMPOSSIBLE, now_us)
-        self.proposal, self.needs = (None, found) if isinstance(found, Needs) else (found, None)
+            return self._fire(ParticipantEvent.IMPOSSIBLE, now_us)
+        self.proposal, self.needs = (None, found) if isinstance(found, NeededAnswers) else (found, None)
         self.bound = found.cost
         if self._is_beaten():
-            return self._fire(Event.BEATEN, now_us)
+            return self._fire(ParticipantEvent.BEATEN, now_us)
         due_us = self._turn_us(self._delay_us(found.cost), now_us)
         self.due_us = due_us if self.needs is None else self._behind_rivals_us(due_us)
         return []
@@ -259,7 +259,7 @@ class Participant:
         assert self.needs is not None
         outcome = self.subs.ask(self.needs.parts, now_us)
         if outcome is None:
-            return self._fire(Event.IMPOSSIBLE, now_us)
+            return self._fire(ParticipantEvent.IMPOSSIBLE, now_us)
         self.counters.sub_calls_opened += len(self.needs.parts)
         self.due_us = self.last_bid_us
         return outcome
@@ -300,7 +300,7 @@ class Participant:
     def believe(self, now_us: int) -> Outcome:
         """The deadline passed with my bid best. I may prepare; I act only on the award (but in the silent form)."""
         if self.silent and not self.call.hold_ms:
-            return self._fire(Event.AWARD_ME, now_us)
+            return self._fire(ParticipantEvent.AWARD_ME, now_us)
         self.counters.beliefs_without_award += 1
         return []
 
@@ -397,59 +397,64 @@ class Participant:
         return heard_us if heard_us > due_us and self.subs.may_ask(heard_us) else due_us
 
 
-def _essence(found: Proposal | Needs) -> tuple[object, ...]:
+def _essence(found: Proposal | NeededAnswers) -> tuple[object, ...]:
     """What two searches must have in common for the answers to the first to do for the second."""
-    return (found.cost, found.parts) if isinstance(found, Needs) else (found.cost, found.program)
+    return (found.cost, found.parts) if isinstance(found, NeededAnswers) else (found.cost, found.program)
 
 
 #: States in which nothing more is hoped for from a call.
-_HOPELESS = (State.SILENT, State.LAPSED, State.LOST)
+_HOPELESS = (ParticipantState.SILENT, ParticipantState.LAPSED, ParticipantState.LOST)
 
 
 #: The whole protocol of a participant: (state, event) to the next state and what is done on the way.
-TABLE: dict[tuple[State, Event], tuple[State, Callable[[Participant, int], Outcome]]] = {
-    (State.WAITING_BOUND, Event.DUE): (State.WAITING_COST, Participant.search),
-    (State.WAITING_BOUND, Event.IMPOSSIBLE): (State.SILENT, Participant.give_up),
-    (State.WAITING_BOUND, Event.BEATEN): (State.SILENT, Participant.save_search),
-    (State.WAITING_BOUND, Event.DEADLINE): (State.SILENT, Participant.save_search),
-    (State.WAITING_BOUND, Event.AWARD_OTHER): (State.LOST, Participant.save_search),
-    (State.WAITING_BOUND, Event.SUPERSEDED): (State.LOST, Participant.save_search),
-    (State.WAITING_COST, Event.DUE): (State.PRE_ASSIGNED, Participant.bid),
-    (State.WAITING_COST, Event.IMPOSSIBLE): (State.SILENT, Participant.give_up),
-    (State.WAITING_COST, Event.BEATEN): (State.SILENT, Participant.save_bid),
-    (State.WAITING_COST, Event.DEADLINE): (State.SILENT, Participant.save_bid),
-    (State.WAITING_COST, Event.AWARD_OTHER): (State.LOST, Participant.save_bid),
-    (State.WAITING_COST, Event.SUPERSEDED): (State.LOST, Participant.save_bid),
-    (State.WAITING_COST, Event.NEED): (State.ASKING, Participant.ask),
-    (State.WAITING_COST, Event.CHANGED): (State.WAITING_BOUND, Participant.search_again),
-    (State.ASKING, Event.CHANGED): (State.ASKING, Participant.note_change),
-    (State.ASKING, Event.ANSWERED): (State.WAITING_COST, Participant.combine),
-    (State.ASKING, Event.IMPOSSIBLE): (State.SILENT, Participant.give_up),
-    (State.ASKING, Event.BEATEN): (State.SILENT, Participant.save_bid),
-    (State.ASKING, Event.DEADLINE): (State.SILENT, Participant.save_bid),
-    (State.ASKING, Event.AWARD_OTHER): (State.LOST, Participant.save_bid),
-    (State.ASKING, Event.SUPERSEDED): (State.LOST, Participant.save_bid),
-    (State.PRE_ASSIGNED, Event.BEATEN): (State.SILENT, Participant.release_beaten),
-    (State.PRE_ASSIGNED, Event.DEADLINE): (State.BELIEVING, Participant.believe),
-    (State.PRE_ASSIGNED, Event.OPTION_ME): (State.OPTION, Participant.rest),
-    (State.PRE_ASSIGNED, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
-    (State.PRE_ASSIGNED, Event.AWARD_OTHER): (State.LOST, Participant.release_closed),
-    (State.PRE_ASSIGNED, Event.SUPERSEDED): (State.LOST, Participant.release_void),
-    (State.SILENT, Event.OPTION_ME): (State.OPTION, Participant.hold_again),
-    (State.SILENT, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
-    (State.SILENT, Event.AWARD_OTHER): (State.LOST, Participant.rest),
-    (State.SILENT, Event.SUPERSEDED): (State.LOST, Participant.rest),
-    (State.BELIEVING, Event.LAPSE): (State.LAPSED, Participant.release_lapsed),
-    (State.BELIEVING, Event.OPTION_ME): (State.OPTION, Participant.rest),
-    (State.BELIEVING, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
-    (State.BELIEVING, Event.AWARD_OTHER): (State.LOST, Participant.release_closed),
-    (State.BELIEVING, Event.SUPERSEDED): (State.LOST, Participant.release_void),
-    (State.OPTION, Event.LAPSE): (State.LAPSED, Participant.release_lapsed),
-    (State.OPTION, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
-    (State.OPTION, Event.AWARD_OTHER): (State.LOST, Participant.release_closed),
-    (State.OPTION, Event.SUPERSEDED): (State.LOST, Participant.release_void),
-    (State.ASSIGNED, Event.AWARD_ME): (State.ASSIGNED, Participant.answer),
-    (State.LAPSED, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
-    (State.LAPSED, Event.AWARD_OTHER): (State.LOST, Participant.rest),
-    (State.LAPSED, Event.SUPERSEDED): (State.LOST, Participant.rest),
+TABLE: dict[
+    tuple[ParticipantState, ParticipantEvent], tuple[ParticipantState, Callable[[Participant, int], Outcome]]
+] = {
+    (ParticipantState.WAITING_BOUND, ParticipantEvent.DUE): (ParticipantState.WAITING_COST, Participant.search),
+    (ParticipantState.WAITING_BOUND, ParticipantEvent.IMPOSSIBLE): (ParticipantState.SILENT, Participant.give_up),
+    (ParticipantState.WAITING_BOUND, ParticipantEvent.BEATEN): (ParticipantState.SILENT, Participant.save_search),
+    (ParticipantState.WAITING_BOUND, ParticipantEvent.DEADLINE): (ParticipantState.SILENT, Participant.save_search),
+    (ParticipantState.WAITING_BOUND, ParticipantEvent.AWARD_OTHER): (ParticipantState.LOST, Participant.save_search),
+    (ParticipantState.WAITING_BOUND, ParticipantEvent.SUPERSEDED): (ParticipantState.LOST, Participant.save_search),
+    (ParticipantState.WAITING_COST, ParticipantEvent.DUE): (ParticipantState.PRE_ASSIGNED, Participant.bid),
+    (ParticipantState.WAITING_COST, ParticipantEvent.IMPOSSIBLE): (ParticipantState.SILENT, Participant.give_up),
+    (ParticipantState.WAITING_COST, ParticipantEvent.BEATEN): (ParticipantState.SILENT, Participant.save_bid),
+    (ParticipantState.WAITING_COST, ParticipantEvent.DEADLINE): (ParticipantState.SILENT, Participant.save_bid),
+    (ParticipantState.WAITING_COST, ParticipantEvent.AWARD_OTHER): (ParticipantState.LOST, Participant.save_bid),
+    (ParticipantState.WAITING_COST, ParticipantEvent.SUPERSEDED): (ParticipantState.LOST, Participant.save_bid),
+    (ParticipantState.WAITING_COST, ParticipantEvent.NEED): (ParticipantState.ASKING, Participant.ask),
+    (ParticipantState.WAITING_COST, ParticipantEvent.CHANGED): (
+        ParticipantState.WAITING_BOUND,
+        Participant.search_again,
+    ),
+    (ParticipantState.ASKING, ParticipantEvent.CHANGED): (ParticipantState.ASKING, Participant.note_change),
+    (ParticipantState.ASKING, ParticipantEvent.ANSWERED): (ParticipantState.WAITING_COST, Participant.combine),
+    (ParticipantState.ASKING, ParticipantEvent.IMPOSSIBLE): (ParticipantState.SILENT, Participant.give_up),
+    (ParticipantState.ASKING, ParticipantEvent.BEATEN): (ParticipantState.SILENT, Participant.save_bid),
+    (ParticipantState.ASKING, ParticipantEvent.DEADLINE): (ParticipantState.SILENT, Participant.save_bid),
+    (ParticipantState.ASKING, ParticipantEvent.AWARD_OTHER): (ParticipantState.LOST, Participant.save_bid),
+    (ParticipantState.ASKING, ParticipantEvent.SUPERSEDED): (ParticipantState.LOST, Participant.save_bid),
+    (ParticipantState.PRE_ASSIGNED, ParticipantEvent.BEATEN): (ParticipantState.SILENT, Participant.release_beaten),
+    (ParticipantState.PRE_ASSIGNED, ParticipantEvent.DEADLINE): (ParticipantState.BELIEVING, Participant.believe),
+    (ParticipantState.PRE_ASSIGNED, ParticipantEvent.OPTION_ME): (ParticipantState.OPTION, Participant.rest),
+    (ParticipantState.PRE_ASSIGNED, ParticipantEvent.AWARD_ME): (ParticipantState.ASSIGNED, Participant.assign),
+    (ParticipantState.PRE_ASSIGNED, ParticipantEvent.AWARD_OTHER): (ParticipantState.LOST, Participant.release_closed),
+    (ParticipantState.PRE_ASSIGNED, ParticipantEvent.SUPERSEDED): (ParticipantState.LOST, Participant.release_void),
+    (ParticipantState.SILENT, ParticipantEvent.OPTION_ME): (ParticipantState.OPTION, Participant.hold_again),
+    (ParticipantState.SILENT, ParticipantEvent.AWARD_ME): (ParticipantState.ASSIGNED, Participant.assign),
+    (ParticipantState.SILENT, ParticipantEvent.AWARD_OTHER): (ParticipantState.LOST, Participant.rest),
+    (ParticipantState.SILENT, ParticipantEvent.SUPERSEDED): (ParticipantState.LOST, Participant.rest),
+    (ParticipantState.BELIEVING, ParticipantEvent.LAPSE): (ParticipantState.LAPSED, Participant.release_lapsed),
+    (ParticipantState.BELIEVING, ParticipantEvent.OPTION_ME): (ParticipantState.OPTION, Participant.rest),
+    (ParticipantState.BELIEVING, ParticipantEvent.AWARD_ME): (ParticipantState.ASSIGNED, Participant.assign),
+    (ParticipantState.BELIEVING, ParticipantEvent.AWARD_OTHER): (ParticipantState.LOST, Participant.release_closed),
+    (ParticipantState.BELIEVING, ParticipantEvent.SUPERSEDED): (ParticipantState.LOST, Participant.release_void),
+    (ParticipantState.OPTION, ParticipantEvent.LAPSE): (ParticipantState.LAPSED, Participant.release_lapsed),
+    (ParticipantState.OPTION, ParticipantEvent.AWARD_ME): (ParticipantState.ASSIGNED, Participant.assign),
+    (ParticipantState.OPTION, ParticipantEvent.AWARD_OTHER): (ParticipantState.LOST, Participant.release_closed),
+    (ParticipantState.OPTION, ParticipantEvent.SUPERSEDED): (ParticipantState.LOST, Participant.release_void),
+    (ParticipantState.ASSIGNED, ParticipantEvent.AWARD_ME): (ParticipantState.ASSIGNED, Participant.answer),
+    (ParticipantState.LAPSED, ParticipantEvent.AWARD_ME): (ParticipantState.ASSIGNED, Participant.assign),
+    (ParticipantState.LAPSED, ParticipantEvent.AWARD_OTHER): (ParticipantState.LOST, Participant.rest),
+    (ParticipantState.LAPSED, ParticipantEvent.SUPERSEDED): (ParticipantState.LOST, Participant.rest),
 }

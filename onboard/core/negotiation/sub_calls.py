@@ -12,8 +12,8 @@ from onboard.contract.constants import NOBODY
 from onboard.contract.messages import CallForProposals, Reference
 from onboard.core.effects import Effect
 from onboard.core.negotiation.bidding import last_bid_us
-from onboard.core.negotiation.events import Answer, CallTerms, NegotiationEvent
-from onboard.core.negotiation.initiator import Initiator, State
+from onboard.core.negotiation.events import NegotiationEvent, RequestedTerms, SubCallAnswer
+from onboard.core.negotiation.initiator import Initiator, InitiatorState
 from onboard.core.site import Timing
 
 Outcome = list[Effect | NegotiationEvent]
@@ -26,7 +26,7 @@ MAX_PARTS = 15
 HOLD_REPEATS = 10
 
 #: Opens a sub-call: terms, deadline, end of the option, now (bus us).
-Open = Callable[[CallTerms, int, int, int], tuple[Initiator, Outcome]]
+Open = Callable[[RequestedTerms, int, int, int], tuple[Initiator, Outcome]]
 
 
 def inner_deadline_us(outer_deadline_us: int, now_us: int, timing: Timing) -> int | None:
@@ -54,7 +54,7 @@ class SubCalls:
     asked: dict[int, Initiator] = field(default_factory=dict)
     _before: int = 0
 
-    def ask(self, parts: tuple[CallTerms, ...], now_us: int) -> Outcome | None:
+    def ask(self, parts: tuple[RequestedTerms, ...], now_us: int) -> Outcome | None:
         """Open a sub-call for each part; None where depth, part numbers or time do not allow any."""
         deadline_us = inner_deadline_us(self.deadline_us, now_us, self.timing)
         if deadline_us is None or self.call.depth >= MAX_DEPTH or len(self.asked) + len(parts) > MAX_PARTS:
@@ -76,14 +76,14 @@ class SubCalls:
     @property
     def is_answered(self) -> bool:
         """Whether every sub-call has come to its deadline."""
-        return all(one.state is not State.OPEN for one in self.asked.values())
+        return all(one.state is not InitiatorState.OPEN for one in self.asked.values())
 
-    def answers(self) -> tuple[Answer, ...]:
+    def answers(self) -> tuple[SubCallAnswer, ...]:
         """The answers so far, in the order of part numbers."""
         return tuple(
             _answer(number, one)
             for number, one in self.asked.items()
-            if number > self._before and one.state is not State.OPEN
+            if number > self._before and one.state is not InitiatorState.OPEN
         )
 
     def begin_anew(self, now_us: int) -> Outcome:
@@ -91,9 +91,9 @@ class SubCalls:
         self._before = len(self.asked)
         return self.drop(now_us)
 
-    def confirm(self, parts: Iterable[int], now_us: int) -> tuple[tuple[Answer, ...], Outcome]:
+    def confirm(self, parts: Iterable[int], now_us: int) -> tuple[tuple[SubCallAnswer, ...], Outcome]:
         """Award the options that the bid rests on; those that have lapsed are not among the answers."""
-        held = [number for number in parts if self.asked[number].state is State.HELD]
+        held = [number for number in parts if self.asked[number].state is InitiatorState.HELD]
         outcome: Outcome = []
         for number in held:
             outcome += self.asked[number].confirm(now_us)
@@ -108,6 +108,6 @@ class SubCalls:
         return outcome
 
 
-def _answer(number: int, asked: Initiator) -> Answer:
+def _answer(number: int, asked: Initiator) -> SubCallAnswer:
     cost, winner = asked.best if asked.best is not None else (0, NOBODY)
-    return Answer(number, asked.terms, winner, cost)
+    return SubCallAnswer(number, asked.terms, winner, cost)

@@ -28,7 +28,7 @@ def patience_us(obstacle: Obstacle) -> int:
 
 
 @dataclass
-class _Task:
+class _TaskInHand:
     """One task in hand: who has it, the call that it won, 0 for unknown, since when (bus us), how long it may stand."""
 
     winner: int
@@ -44,7 +44,7 @@ class Winners:
     node_id: int
     negotiation: Negotiation
     obstacles: Mapping[int, Obstacle]
-    _tasks: dict[Reference, _Task] = field(default_factory=dict)
+    _tasks: dict[Reference, _TaskInHand] = field(default_factory=dict)
     #: The newest sign of work of each machine and since when it is so.
     _signs: dict[int, tuple[Hashable, int]] = field(default_factory=dict)
     _kept: set[Reference] = field(default_factory=set)
@@ -64,7 +64,7 @@ class Winners:
         """
         if self.negotiation.trust.winner(task) is None:
             self.negotiation.trust.given(task, winner, 0, Criterion.MONEY)
-        self._tasks[task] = _Task(winner, call, now_us, stands_us)
+        self._tasks[task] = _TaskInHand(winner, call, now_us, stands_us)
 
     def works(self, node: int, sign: Hashable, now_us: int) -> None:
         """What a machine told of its place or its work; only what differs from before is a sign of work."""
@@ -161,7 +161,7 @@ class Winners:
     def _rejects(self, task: Reference, call: int, reason: Reason) -> Send:
         return Send(Award(self.node_id, call, NOBODY, task, 1, CallResult.REJECTED, reason))
 
-    def _stands_at_us(self, known: _Task) -> int:
+    def _stands_at_us(self, known: _TaskInHand) -> int:
         return max(self._worked_us(known.winner, known.since_us), known.since_us) + known.stands_us
 
     def _worked_us(self, node: int, otherwise_us: int) -> int:

@@ -8,15 +8,15 @@ that lift taken until then, and asks again for what has changed.
 from dataclasses import dataclass
 
 from onboard.contract.messages import CallForProposals
-from onboard.core.negotiation import Answer, Needs, Proposal
+from onboard.core.negotiation import NeededAnswers, Proposal, SubCallAnswer
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.systems.car_park.generation import Alternative, CarParkGeneration, Solution
-from onboard.systems.car_park.program import Step
+from onboard.systems.car_park.program import CarStep
 from onboard.systems.car_park.ride_calls import answer_for, ride_terms, rides_of
 from onboard.ways.lift_uses import ride_us
 from onboard.ways.lifts import platform
 from onboard.ways.occupancy import itinerary_windows
-from onboard.ways.reservations import Use, Window
+from onboard.ways.reservations import SlotWindow, Use
 
 #: A ride planned this much earlier than the lift has answered still counts as what it answered: the sub-call told its
 #: begin in steps of 100 ms, rounded up, and ends are whole milliseconds.
@@ -29,7 +29,7 @@ MAX_ROUNDS = 2
 class AskingGeneration(CarParkGeneration):
     """As its base, but an estimate with rides in it needs the lifts' answers first."""
 
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | Needs | None:
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
         """The bid where the best solution rides no lift; else what the lifts must be asked."""
         solution, alternatives = self.solve(call, now_us)
         if solution is None:
@@ -56,10 +56,10 @@ class AskingGeneration(CarParkGeneration):
         call: CallForProposals,
         solution: Solution,
         alternatives: list[Alternative],
-        answers: tuple[Answer, ...],
+        answers: tuple[SubCallAnswer, ...],
         number: int,
         now_us: int,
-    ) -> Proposal | Needs:
+    ) -> Proposal | NeededAnswers:
         """Ask for the rides that no lift has promised yet in round ``number``, or bid."""
         rides = rides_of(solution.steps)
         open_rides = [step for step in rides if not self._is_promised(call, step, answers, now_us)]
@@ -68,21 +68,21 @@ class AskingGeneration(CarParkGeneration):
             parts = tuple(sorted({answer.part for answer in found if answer is not None}))
             return self.proposal(call, solution, alternatives)._replace(parts=parts)
 
-        def combine(heard: tuple[Answer, ...], then_us: int) -> Proposal | Needs | None:
+        def combine(heard: tuple[SubCallAnswer, ...], then_us: int) -> Proposal | NeededAnswers | None:
             return self._combine(call, solution, alternatives, heard, number + 1, then_us)
 
         wanted = tuple(ride_terms(self.site, call, step) for step in open_rides)
-        return Needs(to_bus_ms(solution.finish_us), wanted, combine)
+        return NeededAnswers(to_bus_ms(solution.finish_us), wanted, combine)
 
     def _combine(
         self,
         call: CallForProposals,
         solution: Solution,
         alternatives: list[Alternative],
-        answers: tuple[Answer, ...],
+        answers: tuple[SubCallAnswer, ...],
         number: int,
         now_us: int,
-    ) -> Proposal | Needs | None:
+    ) -> Proposal | NeededAnswers | None:
         late = self._late_uses(call, solution, answers, now_us)
         if late:
             again, alternatives = self._solve_around(call, late, now_us)
@@ -91,12 +91,14 @@ class AskingGeneration(CarParkGeneration):
             solution = again
         return self._next(call, solution, alternatives, answers, number, now_us)
 
-    def _is_promised(self, call: CallForProposals, step: Step, answers: tuple[Answer, ...], now_us: int) -> bool:
+    def _is_promised(
+        self, call: CallForProposals, step: CarStep, answers: tuple[SubCallAnswer, ...], now_us: int
+    ) -> bool:
         answer = answer_for(ride_terms(self.site, call, step), answers)
         return answer is not None and abs(from_bus_ms(answer.cost, now_us) - step.end_us) <= TOLERANCE_US
 
     def _late_uses(
-        self, call: CallForProposals, solution: Solution, answers: tuple[Answer, ...], now_us: int
+        self, call: CallForProposals, solution: Solution, answers: tuple[SubCallAnswer, ...], now_us: int
     ) -> list[Use]:
         """For each ride that its lift does not give so early: the lift taken by others until it does."""
         late = []
@@ -117,7 +119,7 @@ class AskingGeneration(CarParkGeneration):
         """All solutions with some lifts taken for a while; the mirror is as it was afterwards."""
         reservations = self.mirror.reservations
         for use in late:
-            reservations.reserve(use.owner, [Window(platform(use.lift_track), use.from_us, use.to_us)], [use])
+            reservations.reserve(use.owner, [SlotWindow(platform(use.lift_track), use.from_us, use.to_us)], [use])
         try:
             return self.solve(call, now_us)
         finally:

@@ -20,7 +20,7 @@ from onboard.contract.constants import OUTSIDE
 from onboard.contract.messages import Award, BayState, CallForProposals, Reference, TaskReport, TokenRefusal
 from onboard.core.authority import TokenKey
 from onboard.core.effects import Effect, Send
-from onboard.core.negotiation import CallTerms
+from onboard.core.negotiation import RequestedTerms
 from onboard.systems.car_park.site import CarLimits
 from onboard.ways.mirror import WayMirror
 from onboard.ways.tokens import car_token
@@ -89,9 +89,9 @@ class BayTask:
         """Its next call is made a whole pause from now, us."""
         self.retry_at_us = now_us + min(LONGEST_RETRY_US, RETRY_US << min(self.refusals - 1, 10))
 
-    def terms(self, source: int, sink: int, floor: Callable[[CallForProposals, int], int]) -> CallTerms:
+    def terms(self, source: int, sink: int, floor: Callable[[CallForProposals, int], int]) -> RequestedTerms:
         """The call for it, between two stations by number; no robot can be better than ``floor``."""
-        return CallTerms(
+        return RequestedTerms(
             task=self.task,
             operation=self.operation,
             kind=KindCode.ROBOT,

@@ -4,7 +4,7 @@ from onboard.contract.codes import KindCode
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.outlines import Box, Outlines
 from onboard.systems.car_park.site import CarPark
-from onboard.trace.chart.svg import Drawing, colour
+from onboard.trace.chart.svg import SvgDrawing, colour
 from onboard.ways.lifts import stop_mm
 from onboard.ways.site import BayUse, TrackKind
 
@@ -19,7 +19,7 @@ _NUMBERED = 5
 _BAR_MM = 10_000
 
 
-def draw(site: CarPark) -> Drawing:
+def draw(site: CarPark) -> SvgDrawing:
     """The picture of a site; raises nothing that its reader has not."""
     return _Building(site).draw()
 
@@ -38,10 +38,10 @@ class _Building:
         self.named: list[float] = []
         self.heights_mm = _level_heights_mm(site, self.levels)
 
-    def draw(self) -> Drawing:
+    def draw(self) -> SvgDrawing:
         section = (max(self.heights_mm.values()) + self.site.floor_height_mm) * self.scale + 2 * _GAP
         plans = sum((box.high - box.low) * self.scale + _GAP for box in self.boxes.values())
-        self.drawing = Drawing(_WIDTH, _HEAD + section + plans + 30, f"{self.site.name}: the building")
+        self.drawing = SvgDrawing(_WIDTH, _HEAD + section + plans + 30, f"{self.site.name}: the building")
         self._head()
         top = _HEAD + self._section(_HEAD)
         for level in self.levels:

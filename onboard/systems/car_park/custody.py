@@ -39,9 +39,9 @@ def state(fleet: WayFleet, car: Reference, station: int, wheelbase_mm: int) -> l
     key = car_token(*car)
     if not fleet.tokens.holds(key):
         return []
-    said = CarAt(fleet.node_id, car, station, fleet.tokens.seen[key], wheelbase_mm)
-    fleet.mirror.on_car(said)
-    return [car_record(said), Send(said)]
+    statement = CarAt(fleet.node_id, car, station, fleet.tokens.seen[key], wheelbase_mm)
+    fleet.mirror.on_car(statement)
+    return [car_record(statement), Send(statement)]
 
 
 def place_of(fleet: WayFleet, car: Reference) -> Station | None:
@@ -55,13 +55,13 @@ def others_in(mirror: WayMirror, station: Station, car: Reference | None = None)
     return [one for one, record in mirror.cars.items() if record.station == station.number and one != car]
 
 
-def replay(fleet: WayFleet, said: Iterable[CarAt]) -> None:
+def replay(fleet: WayFleet, statements: Iterable[CarAt]) -> None:
     """Take up what the journal tells of cars in my custody, and of those whose new custodian was not heard yet.
 
     What was said under an older version is no knowledge of the place: the car has been elsewhere since.
     """
     tokens = fleet.tokens
-    for one in said:
+    for one in statements:
         key = car_token(*one.car)
         leaving = tokens.leaving.get(key)
         given = leaving is not None and leaving.version == one.version + 1
@@ -99,9 +99,9 @@ def before_taking(fleet: WayFleet, grant: TokenGrant) -> list[Effect] | None:
     ):
         fleet.drops[Reason.MIRROR_BEHIND] += 1
         return None
-    said = CarAt(fleet.node_id, car_of(grant), record.station, grant.version, record.wheelbase_mm)
-    fleet.mirror.on_car(said)
-    return [car_record(said)]
+    statement = CarAt(fleet.node_id, car_of(grant), record.station, grant.version, record.wheelbase_mm)
+    fleet.mirror.on_car(statement)
+    return [car_record(statement)]
 
 
 def give_back(fleet: WayFleet, needed: Container[TokenKey], now_us: int) -> list[Effect]:

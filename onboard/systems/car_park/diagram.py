@@ -15,15 +15,15 @@ from onboard.contract.messages import BusTime, Itinerary, Leg, Progress, TokenGr
 from onboard.core.serial import ms_after
 from onboard.core.site import Segment, Site
 from onboard.trace.chart.over_time import BOTTOM, GAP, LEFT, RIGHT, TOP, WIDTH, name_machines, time_axis
-from onboard.trace.chart.svg import Drawing, colour, dashes
-from onboard.trace.listener import Said
+from onboard.trace.chart.svg import SvgDrawing, colour, dashes
+from onboard.trace.listener import LoggedMessage
 from onboard.ways.site import way_site
 
 #: Height of a segment's row, and of a lift's floor, pixels.
 _ROW, _MOST_HEIGHT = 14.0, 260.0
 
 
-class Point(NamedTuple):
+class TrackPoint(NamedTuple):
     """Where a machine was: us of the log, place along the track in segments from index 1, speed as it said."""
 
     time_us: int
@@ -43,10 +43,10 @@ class Band(NamedTuple):
 
 
 @dataclass
-class Picture:
+class TrackDiagram:
     """What is drawn: runs of points by node and track, bands of both layers."""
 
-    runs: list[tuple[int, int, list[Point]]] = field(default_factory=list)
+    runs: list[tuple[int, int, list[TrackPoint]]] = field(default_factory=list)
     reservations: list[Band] = field(default_factory=list)
     authority: list[Band] = field(default_factory=list)
     first_us: int = 0
@@ -57,41 +57,41 @@ class Watcher:
     """A fold over the fleet bus: feed every message, then ``finish``."""
 
     def __init__(self, site: Site, from_us: int | None = None, until_us: int | None = None) -> None:
-        self.picture = Picture()
+        self.picture = TrackDiagram()
         self._site = site
         self._from_us, self._until_us = from_us, until_us
-        self._open: dict[int, tuple[int, list[Point]]] = {}
+        self._open: dict[int, tuple[int, list[TrackPoint]]] = {}
         self._plans: dict[int, tuple[int, Itinerary]] = {}
         self._held: dict[Segment, tuple[int, int]] = {}
         self._offset_us = 0
         self._started = False
 
-    def feed(self, said: Said) -> None:
+    def feed(self, logged: LoggedMessage) -> None:
         """Take up one message of the fleet bus."""
-        if self._until_us is not None and said.time_us > self._until_us:
+        if self._until_us is not None and logged.time_us > self._until_us:
             return
         if not self._started:
             self._started = True
-            self.picture.first_us = said.time_us if self._from_us is None else self._from_us
-        self.picture.last_us = max(self.picture.last_us, said.time_us)
-        match said.message:
+            self.picture.first_us = logged.time_us if self._from_us is None else self._from_us
+        self.picture.last_us = max(self.picture.last_us, logged.time_us)
+        match logged.message:
             case BusTime():
-                self._offset_us = said.time_us - said.message.bus_time_us
+                self._offset_us = logged.time_us - logged.message.bus_time_us
             case Progress():
-                self._on_progress(said.message, said.time_us)
-            case Itinerary() if said.message.grade is Grade.FIRM:
-                self._end_plan(said.message.sender, said.time_us)
-                self._plans[said.message.sender] = said.time_us, said.message
-            case TokenHeld() if said.message.token_kind is TokenKind.SEGMENT:
-                self._hold(said.message.token, said.message.sender, said.time_us)
-            case TokenGrant() if said.message.token_kind is TokenKind.SEGMENT:
-                self._let_go(_segment(said.message.token), said.time_us, of=said.message.sender)
+                self._on_progress(logged.message, logged.time_us)
+            case Itinerary() if logged.message.grade is Grade.FIRM:
+                self._end_plan(logged.message.sender, logged.time_us)
+                self._plans[logged.message.sender] = logged.time_us, logged.message
+            case TokenHeld() if logged.message.token_kind is TokenKind.SEGMENT:
+                self._hold(logged.message.token, logged.message.sender, logged.time_us)
+            case TokenGrant() if logged.message.token_kind is TokenKind.SEGMENT:
+                self._let_go(_segment(logged.message.token), logged.time_us, of=logged.message.sender)
 
-    def finish(self) -> Picture:
+    def finish(self) -> TrackDiagram:
         """The log is over: what is still going on ends with it."""
         end_us = self.picture.last_us
         for node, (track, points) in self._open.items():
-            points.append(Point(end_us, points[-1].place, 0))
+            points.append(TrackPoint(end_us, points[-1].place, 0))
             self.picture.runs.append((node, track, points))
         for node in list(self._plans):
             self._end_plan(node, end_us)
@@ -107,7 +107,7 @@ class Watcher:
         if track is None:
             return
         place = progress.index - 1 + progress.offset_mm / track.pitch_mm
-        point = Point(time_us, place, progress.speed_mm_s)
+        point = TrackPoint(time_us, place, progress.speed_mm_s)
         run = self._open.get(progress.sender)
         if run is not None and run[0] == progress.track:
             run[1].append(point)
@@ -174,21 +174,23 @@ def _cut(band: Band, from_us: int, until_us: int) -> Band | None:
     return band._replace(begin_us=begin_us, end_us=end_us, begin=at(begin_us), end=at(end_us))
 
 
-def watch(site: Site, said: Iterable[Said], from_us: int | None = None, until_us: int | None = None) -> Picture:
+def watch(
+    site: Site, logged: Iterable[LoggedMessage], from_us: int | None = None, until_us: int | None = None
+) -> TrackDiagram:
     """What a log of the fleet bus shows, within a time of it."""
     watcher = Watcher(site, from_us, until_us)
-    for one in said:
+    for one in logged:
         if one.is_fleet:
             watcher.feed(one)
     return watcher.finish()
 
 
-def draw(site: Site, picture: Picture, start_us: int) -> Drawing:
+def draw(site: Site, picture: TrackDiagram, start_us: int) -> SvgDrawing:
     """The diagram: a panel for each floor, lift and spur; seconds since ``start_us`` along the top."""
     ways = way_site(site)
     tracks = list(ways.tracks.values())
     heights = [min(_MOST_HEIGHT, _ROW * max(3, track.length + 2)) for track in tracks]
-    drawing = Drawing(WIDTH, TOP + sum(heights) + GAP * len(tracks) + BOTTOM, f"{site.name}: time and space")
+    drawing = SvgDrawing(WIDTH, TOP + sum(heights) + GAP * len(tracks) + BOTTOM, f"{site.name}: time and space")
     numbers = {node: number for number, node in enumerate(sorted(site.machines))}
     moving = [site.machines[node] for node in sorted({node for node, _, _ in picture.runs} & set(site.machines))]
     names = [(machine.name, numbers[machine.node_id]) for machine in moving]
@@ -217,8 +219,8 @@ def draw(site: Site, picture: Picture, start_us: int) -> Drawing:
 
 @dataclass
 class _Panel:
-    drawing: Drawing
-    picture: Picture
+    drawing: SvgDrawing
+    picture: TrackDiagram
     track: int
     top: float
     height: float
@@ -259,7 +261,7 @@ class _Panel:
                 self.drawing.line(line, colour(numbers[node]), width=2, dash=dashes(numbers[node]))
 
 
-def _line(points: list[Point], pitch_mm: int, speed_mm_s: int) -> list[tuple[float, float]]:
+def _line(points: list[TrackPoint], pitch_mm: int, speed_mm_s: int) -> list[tuple[float, float]]:
     """Points to draw through: a machine that said it stands did so until it must have started for the next point."""
     found: list[tuple[float, float]] = []
     for before, after in pairwise(points):
@@ -290,11 +292,11 @@ class TimeSpace:
         """When the last message was heard, time of the log in us."""
         return self._watcher.picture.last_us
 
-    def feed(self, said: Said) -> None:
+    def feed(self, logged: LoggedMessage) -> None:
         """Take up one message of the fleet bus."""
-        self._watcher.feed(said)
+        self._watcher.feed(logged)
 
-    def draw(self, start_us: int) -> Drawing:
+    def draw(self, start_us: int) -> SvgDrawing:
         """The diagram of all that was heard; its time axis begins at ``start_us``."""
         return draw(self._site, self._watcher.finish(), start_us)
 

@@ -9,10 +9,10 @@ from typing import Any
 from onboard.contract.codes import Operation, OperatorAction
 from onboard.contract.constants import ANY_STATION, OUTSIDE
 from onboard.contract.messages import CallForProposals, CarAt, Message, OperatorOrder, Reference
+from onboard.gateway.bus_orders import BusOrders, NoBusOrders, OrderMessages, RefusedError, refuse_load
 from onboard.gateway.dialect import Json
-from onboard.gateway.edge import Body, Edge
-from onboard.gateway.order import Order, Wish
-from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes, refuse_load
+from onboard.gateway.edge import PhysicalLimits, SystemEdge
+from onboard.gateway.order import GatewayOrder, OrderRequest
 from onboard.systems.car_park.site import CarPark
 from onboard.trace.view import SiteView
 from onboard.ways.site import WaySite, way_site
@@ -23,7 +23,7 @@ TICKET_AGAIN_US = 30_000_000
 KEY_PATIENCE_US = 20_000_000
 
 
-class ParkWishes(NoWishes):
+class CarParkOrders(NoBusOrders):
     """A robotized car park; ``view`` is what was heard of it."""
 
     def __init__(self, site: WaySite, view: SiteView, place: Callable[[int], str | None]) -> None:
@@ -31,47 +31,49 @@ class ParkWishes(NoWishes):
         self._view, self._place = view, place
         self._desks = {machine.name: node for node, machine in site.machines.items() if node in site.compartments}
 
-    def transport(self, told: dict[str, Any]) -> Wish:
+    def transport(self, body: dict[str, Any]) -> OrderRequest:
         """``to`` a compartment: fetch. ``from`` a compartment: park what stands in it."""
-        urgent = told.get("priority", 0) > 0
-        refuse_load(told)
-        if "to" in told:
-            node = self._desk(told["to"], "$.to")
-            if "car" not in told and "from" not in told:
+        urgent = body.get("priority", 0) > 0
+        refuse_load(body)
+        if "to" in body:
+            node = self._desk(body["to"], "$.to")
+            if "car" not in body and "from" not in body:
                 raise RefusedError("INCOMPLETE", "name the car, or from where", "$.car")
-            car = _car(told["car"]) if "car" in told else self._standing(told["from"])
-            return Wish("fetch", node, car, urgent=urgent)
-        if "from" not in told:
+            car = _car(body["car"]) if "car" in body else self._standing(body["from"])
+            return OrderRequest("fetch", node, car, urgent=urgent)
+        if "from" not in body:
             raise RefusedError("INCOMPLETE", "name a compartment to hand out at, or one to park from", "$.to")
-        return Wish("park", self._desk(told["from"], "$.from"), urgent=urgent)
+        return OrderRequest("park", self._desk(body["from"], "$.from"), urgent=urgent)
 
-    def say(self, order: Order, sender: int, wall_us: int) -> Said:
+    def say(self, order: GatewayOrder, sender: int, wall_us: int) -> OrderMessages:
         """A ticket, or the key."""
-        wish = order.wish
-        if wish.car is None:
+        request = order.request
+        if request.car is None:
             if order.was_said:
                 raise RefusedError("NOT_TAKEN", "the compartment has not called for it: no car in it, or not ready")
-            return Said((OperatorOrder(sender, wish.node, OperatorAction.PRESS_KEY, Reference(0, 0)),), KEY_PATIENCE_US)
-        if wish.car not in self._view.cars:
+            return OrderMessages(
+                (OperatorOrder(sender, request.node, OperatorAction.PRESS_KEY, Reference(0, 0)),), KEY_PATIENCE_US
+            )
+        if request.car not in self._view.cars:
             raise RefusedError("UNKNOWN_TICKET", "no such car is in the park", "$.car")
-        action = OperatorAction.URGENT_TICKET if wish.urgent else OperatorAction.INSERT_TICKET
-        return Said((OperatorOrder(sender, wish.node, action, wish.car),), TICKET_AGAIN_US)
+        action = OperatorAction.URGENT_TICKET if request.urgent else OperatorAction.INSERT_TICKET
+        return OrderMessages((OperatorOrder(sender, request.node, action, request.car),), TICKET_AGAIN_US)
 
-    def task_of(self, order: Order, message: Message) -> Reference | None:
+    def task_of(self, order: GatewayOrder, message: Message) -> Reference | None:
         """The compartment's call for the car, or its next call to park."""
-        if not isinstance(message, CallForProposals) or message.sender != order.wish.node or message.depth:
+        if not isinstance(message, CallForProposals) or message.sender != order.request.node or message.depth:
             return None
-        if order.wish.car is None:
+        if order.request.car is None:
             return message.task if message.operation is Operation.PARK and order.was_said else None
-        is_it = message.operation is Operation.RETRIEVE and message.car == order.wish.car
+        is_it = message.operation is Operation.RETRIEVE and message.car == order.request.car
         return message.task if is_it else None
 
-    def is_done(self, order: Order, message: Message) -> bool:
+    def is_done(self, order: GatewayOrder, message: Message) -> bool:
         """The car has left; or it stands in a place, and its parking was the task, which has the car's own name."""
         if not isinstance(message, CarAt) or order.task is None:
             return False
-        if order.wish.car is not None:
-            return message.car == order.wish.car and message.station == OUTSIDE
+        if order.request.car is not None:
+            return message.car == order.request.car and message.station == OUTSIDE
         bays = {station.number for station in way_site(self._site).compartments.values()}
         return message.car == order.task and message.station not in (*bays, ANY_STATION, OUTSIDE)
 
@@ -94,21 +96,21 @@ def _car(text: str) -> Reference:
     return Reference(int(origin), int(number))
 
 
-class CarParkEdge(Edge):
+class CarParkEdge(SystemEdge):
     """A car park: carriers with a speed and a length, cars with limits."""
 
     def __init__(self, site: CarPark) -> None:
         super().__init__(site)
         self._park = site
 
-    def wishes(self, view: SiteView, place: Callable[[int], str | None]) -> Wishes:
+    def bus_orders(self, view: SiteView, place: Callable[[int], str | None]) -> BusOrders:
         """Orders from outside become tickets and keys at the compartments' desks."""
-        return ParkWishes(self._park, view, place)
+        return CarParkOrders(self._park, view, place)
 
-    def body(self) -> Body:
+    def body(self) -> PhysicalLimits:
         """The carrier's axis and length; it takes the heaviest car."""
         axis = self._park.carrier
-        return Body(
+        return PhysicalLimits(
             axis.speed_mm_s / 1000,
             axis.acceleration_mm_s2 / 1000,
             self._park.carrier_length_mm / 1000,

@@ -13,10 +13,18 @@ from typing import NamedTuple
 from onboard.contract.codes import Criterion, Grade, LegAction, Operation
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import CallForProposals, Stamp
-from onboard.core.negotiation import Needs, Proposal
+from onboard.core.negotiation import NeededAnswers, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine, Segment, Station
-from onboard.systems.car_park.program import MAX_STEPS, STAMP_AHEAD_US, Handling, Program, Step, Work, to_itinerary
+from onboard.systems.car_park.program import (
+    MAX_STEPS,
+    STAMP_AHEAD_US,
+    CarHandling,
+    CarStep,
+    Program,
+    StationWork,
+    to_itinerary,
+)
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayMirror
@@ -74,7 +82,7 @@ class Solution(NamedTuple):
     kept: int
     origin: Segment
     start_us: int
-    steps: tuple[Step, ...]
+    steps: tuple[CarStep, ...]
     finish_us: int
     place: Station
 
@@ -115,7 +123,7 @@ class CarParkGeneration:
         least_us = min(bounds.values(), default=FOREVER)
         return to_bus_ms(least_us) if least_us < FOREVER else None
 
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | Needs | None:
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
         """First request: the best solution as a bid with a tentative itinerary, or None: silence (row P45)."""
         solution, alternatives = self.solve(call, now_us)
         return None if solution is None else self.proposal(call, solution, alternatives)
@@ -273,7 +281,9 @@ class CarParkGeneration:
         )
         return None if isinstance(route, NoRoute) else route
 
-    def reroute(self, origin: Segment, start_us: int, works: list[Work], now_us: int) -> tuple[Step, ...] | None:
+    def reroute(
+        self, origin: Segment, start_us: int, works: list[StationWork], now_us: int
+    ) -> tuple[CarStep, ...] | None:
         """The same work by another way, from standing at ``origin`` at bus time ``start_us``; None where there is none.
 
         Without work the way to another refuge: so a machine that only stands gives way.
@@ -282,8 +292,8 @@ class CarParkGeneration:
         route = self._plan(self.mirror.reservations, origin, start_us, visits, now_us)
         return None if route is None else _steps_of(route, works)
 
-    def _work_visit(self, work: Work, now_us: int) -> Visit:
-        if work.handling is Handling.TAKE and work.station in self.site.compartments.values():
+    def _work_visit(self, work: StationWork, now_us: int) -> Visit:
+        if work.handling is CarHandling.TAKE and work.station in self.site.compartments.values():
             return self._visits(work.call, work.station, now_us)[0]
         return Visit(work.station.segment, self.handling_us(work.station))
 
@@ -371,11 +381,11 @@ class CarParkGeneration:
         promised |= {solution.place.number for solution in self.tentative.values()}
         return promised
 
-    def _steps(self, call: CallForProposals, place: Station, route: Route) -> tuple[Step, ...]:
+    def _steps(self, call: CallForProposals, place: Station, route: Route) -> tuple[CarStep, ...]:
         source, sink = self.ends(call, place)
         works = [
-            Work(Handling.TAKE, source, call.car, call.wheelbase_mm, call),
-            Work(Handling.LEAVE, sink, call.car, call.wheelbase_mm, call),
+            StationWork(CarHandling.TAKE, source, call.car, call.wheelbase_mm, call),
+            StationWork(CarHandling.LEAVE, sink, call.car, call.wheelbase_mm, call),
         ]
         return _steps_of(route, works)
 
@@ -390,11 +400,11 @@ def _one_a_segment(places: list[Station]) -> list[Station]:
     return list({place.segment: place for place in reversed(places)}.values())
 
 
-def _steps_of(route: Route, works: list[Work]) -> tuple[Step, ...]:
+def _steps_of(route: Route, works: list[StationWork]) -> tuple[CarStep, ...]:
     """The legs of a route as steps, each WORK leg with the next work."""
     ahead = iter(works)
     return tuple(
-        Step(
+        CarStep(
             leg.action,
             leg.track,
             leg.from_index,

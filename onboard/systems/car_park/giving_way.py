@@ -15,7 +15,7 @@ from enum import Enum
 from onboard.contract.codes import LegAction
 from onboard.core.authority import segment_token
 from onboard.core.serial import ranks_before
-from onboard.systems.car_park.program import Program, Step
+from onboard.systems.car_park.program import CarStep, Program
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayFleet
 from onboard.ways.passing import TOLERANCE_US
@@ -24,7 +24,7 @@ from onboard.ways.reservations import FOREVER
 from onboard.ways.site import WaySite
 
 
-class Answer(Enum):
+class YieldDecision(Enum):
     """What a machine does about another's plan."""
 
     NOTHING = "nothing"
@@ -39,14 +39,14 @@ class GivingWay:
     fleet: WayFleet
     program: Program
 
-    def heed(self, sender: int, now_us: int) -> Answer:
+    def heed(self, sender: int, now_us: int) -> YieldDecision:
         """What the newest plan of ``sender`` means; at LATER the program's times have been changed."""
         meetings = self._meetings(sender, now_us)
         if any(self._has_to_turn(meeting, sender) for meeting in meetings):
-            return Answer.ANEW
+            return YieldDecision.ANEW
         return self._come_behind([meeting for meeting in meetings if meeting.first == sender])
 
-    def fall_back(self, sender: int, now_us: int) -> Answer:
+    def fall_back(self, sender: int, now_us: int) -> YieldDecision:
         """Where no other way was found: come behind ``sender`` on the way that I have."""
         return self._come_behind([one for one in self._meetings(sender, now_us) if one.first != self.fleet.node_id])
 
@@ -67,14 +67,14 @@ class GivingWay:
         plans = self.fleet.mirror.itineraries
         return ranks_before(plans[sender].stamp, plans[self.fleet.node_id].stamp)
 
-    def _come_behind(self, meetings: list[Meeting]) -> Answer:
+    def _come_behind(self, meetings: list[Meeting]) -> YieldDecision:
         """Move each of my steps so far that it begins when the others' turns are over; work in hand stays as it is."""
         ends_us: dict[int, list[Meeting]] = {}
         for meeting in meetings:
             if meeting.theirs.to_us < FOREVER:
                 ends_us.setdefault(meeting.mine.to_come, []).append(meeting)
         planned = {_to_come(self.program.remaining, number): step for number, step in _moving(self.program.remaining)}
-        answer = Answer.NOTHING
+        answer = YieldDecision.NOTHING
         for to_come in sorted(ends_us, reverse=True):
             step = planned.get(to_come)
             if step is None:
@@ -93,19 +93,19 @@ class GivingWay:
                 by_us = lacking_us - (now.begin_us - step.begin_us)
             if by_us > TOLERANCE_US:
                 self.program.delay(number, by_us)
-                answer = Answer.LATER
+                answer = YieldDecision.LATER
         return answer
 
 
-def _moving(steps: list[Step]) -> list[tuple[int, Step]]:
+def _moving(steps: list[CarStep]) -> list[tuple[int, CarStep]]:
     return [(number, step) for number, step in enumerate(steps) if step.action is not LegAction.STAND]
 
 
-def _to_come(steps: list[Step], number: int) -> int:
+def _to_come(steps: list[CarStep], number: int) -> int:
     return len(_moving(steps[number + 1 :]))
 
 
-def _slack_us(site: WaySite, step: Step) -> int:
+def _slack_us(site: WaySite, step: CarStep) -> int:
     """How much later than at once a run in hand may still enter what lies ahead, by its planned end."""
     if step.action is not LegAction.TRAVEL:
         return 0

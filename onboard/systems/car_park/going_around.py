@@ -17,15 +17,15 @@ from onboard.core.site import Segment
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
-from onboard.systems.car_park.places import Places
-from onboard.systems.car_park.program import Handling, Phase, Program, Step, Work, to_itinerary
+from onboard.systems.car_park.places import PlaceChoice
+from onboard.systems.car_park.program import CarHandling, CarStep, HandlingPhase, Program, StationWork, to_itinerary
 from onboard.systems.car_park.recovery import forfeited_record, sink_record
 from onboard.systems.car_park.standoff import Standoff
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.lifts import gate, lift_at
 from onboard.ways.mirror import WayFleet
 from onboard.ways.occupancy import itinerary_windows
-from onboard.ways.reservations import FOREVER, Window
+from onboard.ways.reservations import FOREVER, SlotWindow
 from onboard.ways.tokens import car_token
 
 #: A plan that finds no way is tried again after this, us: others' plans change within seconds.
@@ -49,7 +49,7 @@ class GoingAround:
     generation: CarParkGeneration
     carriage: Carriage
     shuttle: ShuttleWork
-    take_up: Callable[[int, Sequence[Step], list[Work], int], list[Effect]]
+    take_up: Callable[[int, Sequence[CarStep], list[StationWork], int], list[Effect]]
     #: Tasks given back, with why, how often to say so still, and when next.
     given_back: dict[Reference, tuple[Reason, int, int]] = field(default_factory=dict)
     #: Whether the drive does not do what it is told.
@@ -67,7 +67,7 @@ class GoingAround:
     _stands_since_us: int | None = None
 
     def __post_init__(self) -> None:
-        self.places = Places(self.fleet, self.generation, self.shuttle)
+        self.places = PlaceChoice(self.fleet, self.generation, self.shuttle)
         self.standoff = Standoff(self.fleet, self.carriage)
 
     @property
@@ -115,7 +115,7 @@ class GoingAround:
         stands = False
         if slot is not None and self.carriage.refresh_at_us is None:
             holder = self.fleet.tokens.holder_of(segment_token(slot))
-            window = Window(slot, now_us, FOREVER)
+            window = SlotWindow(slot, now_us, FOREVER)
             stands = holder != me and holder in self.fleet.mirror.reservations.standing_in(me, [window])
         if not stands:
             self._stands_since_us = None
@@ -180,9 +180,9 @@ class GoingAround:
         tokens = self.fleet.tokens
         found = []
         for work in self.program.works():
-            begun = self.shuttle.work == work and self.shuttle.phase not in (Phase.ACQUIRE, Phase.DONE)
+            begun = self.shuttle.work == work and self.shuttle.phase not in (HandlingPhase.ACQUIRE, HandlingPhase.DONE)
             has_right = tokens.holds(car_token(*work.car)) or tokens.holds(station_token(work.station))
-            if work.handling is Handling.TAKE and not begun and not has_right:
+            if work.handling is CarHandling.TAKE and not begun and not has_right:
                 found.append(work.call.task)
         return found
 
@@ -206,7 +206,7 @@ class GoingAround:
         if self.fleet.tokens.changes == self._tokens_seen:
             return []
         works, at_hand = self.program.works(), self.shuttle.work
-        if at_hand is not None and self.shuttle.phase is not Phase.DONE:
+        if at_hand is not None and self.shuttle.phase is not HandlingPhase.DONE:
             works.append(at_hand)
         needed = {key for work in works for key in (station_token(work.station), car_token(*work.car))}
         effects = custody.give_back(self.fleet, needed, now_us)
@@ -236,7 +236,7 @@ class GoingAround:
             self._place_at_us = now_us + RETRY_US
         return []
 
-    def _choose_for(self, work: Work, now_us: int) -> list[Effect]:
+    def _choose_for(self, work: StationWork, now_us: int) -> list[Effect]:
         """Nothing where there is no other place, or no way there, now: it waits at its own then."""
         in_hand = self.program.step is not None and self.program.step.work == work
         kept, origin, start_us = self._turning([work.call.task] if in_hand else (), now_us)
@@ -307,12 +307,12 @@ class GoingAround:
                 return 0, here, now_us
         return self.program.turning(now_us)
 
-    def _ahead(self, works: list[Work], kept: int) -> list[Work]:
+    def _ahead(self, works: list[StationWork], kept: int) -> list[StationWork]:
         """Works that are not in the steps that are kept."""
         done = [step.work for step in self.program.remaining[:kept] if step.work is not None]
         return [work for work in works if work not in done]
 
-    def _is_hindered(self, steps: Sequence[Step], now_us: int) -> bool:
+    def _is_hindered(self, steps: Sequence[CarStep], now_us: int) -> bool:
         """Whether steps lead through an obstacle, but for slots whose tokens I hold myself."""
         if not steps:
             return False

@@ -15,7 +15,7 @@ from onboard.core.effects import Effect, Record
 from onboard.core.motion_authority import Permit, authorised
 from onboard.core.serial import successor
 from onboard.systems.car_park import custody
-from onboard.systems.car_park.program import Handling, Phase, Work
+from onboard.systems.car_park.program import CarHandling, HandlingPhase, StationWork
 from onboard.systems.car_park.records import StepRecord
 from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.travel import Carriage
@@ -25,22 +25,30 @@ from onboard.ways.tokens import car_token
 
 #: (phase, handling) -> (shuttle's order on leaving the phase, or None, and the next phase).
 #: CLAMP grips when a car is taken and releases when it is left.
-TABLE: dict[tuple[Phase, Handling], tuple[ShuttleAction | None, Phase]] = {
-    (Phase.ACQUIRE, Handling.TAKE): (ShuttleAction.REACH, Phase.REACH),
-    (Phase.REACH, Handling.TAKE): (ShuttleAction.GRIP, Phase.CLAMP),
-    (Phase.CLAMP, Handling.TAKE): (ShuttleAction.RETRACT, Phase.RETRACT),
-    (Phase.RETRACT, Handling.TAKE): (None, Phase.DONE),
-    (Phase.ACQUIRE, Handling.LEAVE): (ShuttleAction.REACH, Phase.REACH),
-    (Phase.REACH, Handling.LEAVE): (ShuttleAction.RELEASE, Phase.CLAMP),
-    (Phase.CLAMP, Handling.LEAVE): (ShuttleAction.RETRACT, Phase.RETRACT),
-    (Phase.RETRACT, Handling.LEAVE): (None, Phase.DONE),
+TABLE: dict[tuple[HandlingPhase, CarHandling], tuple[ShuttleAction | None, HandlingPhase]] = {
+    (HandlingPhase.ACQUIRE, CarHandling.TAKE): (ShuttleAction.REACH, HandlingPhase.REACH),
+    (HandlingPhase.REACH, CarHandling.TAKE): (ShuttleAction.GRIP, HandlingPhase.CLAMP),
+    (HandlingPhase.CLAMP, CarHandling.TAKE): (ShuttleAction.RETRACT, HandlingPhase.RETRACT),
+    (HandlingPhase.RETRACT, CarHandling.TAKE): (None, HandlingPhase.DONE),
+    (HandlingPhase.ACQUIRE, CarHandling.LEAVE): (ShuttleAction.REACH, HandlingPhase.REACH),
+    (HandlingPhase.REACH, CarHandling.LEAVE): (ShuttleAction.RELEASE, HandlingPhase.CLAMP),
+    (HandlingPhase.CLAMP, CarHandling.LEAVE): (ShuttleAction.RETRACT, HandlingPhase.RETRACT),
+    (HandlingPhase.RETRACT, CarHandling.LEAVE): (None, HandlingPhase.DONE),
 }
 
 #: The phase that is left by the order of each phase.
-_BEFORE = {Phase.REACH: Phase.ACQUIRE, Phase.CLAMP: Phase.REACH, Phase.RETRACT: Phase.CLAMP}
+_BEFORE = {
+    HandlingPhase.REACH: HandlingPhase.ACQUIRE,
+    HandlingPhase.CLAMP: HandlingPhase.REACH,
+    HandlingPhase.RETRACT: HandlingPhase.CLAMP,
+}
 
 #: The shuttle's mode that ends each phase, for the order given on entering it.
-ENDS = {Phase.REACH: ShuttleMode.REACHED, Phase.CLAMP: ShuttleMode.REACHED, Phase.RETRACT: ShuttleMode.HOME}
+ENDS = {
+    HandlingPhase.REACH: ShuttleMode.REACHED,
+    HandlingPhase.CLAMP: ShuttleMode.REACHED,
+    HandlingPhase.RETRACT: ShuttleMode.HOME,
+}
 
 
 @dataclass
@@ -48,8 +56,8 @@ class ShuttleWork:
     """One robot's shuttle and the handling in hand."""
 
     fleet: WayFleet
-    work: Work | None = None
-    phase: Phase = Phase.DONE
+    work: StationWork | None = None
+    phase: HandlingPhase = HandlingPhase.DONE
     sequence: int = 0
     sensed: ShuttleState | None = None
     fault: bool = False
@@ -58,20 +66,20 @@ class ShuttleWork:
     _ordered: ShuttleOrder | None = None
     _unheard: Unheard = field(default_factory=Unheard)
 
-    def begin(self, work: Work) -> list[Effect]:
+    def begin(self, work: StationWork) -> list[Effect]:
         """Start one handling in front of its station."""
         self.work = work
-        self.phase = Phase.ACQUIRE
+        self.phase = HandlingPhase.ACQUIRE
         return []
 
-    def resume(self, work: Work, phase: Phase) -> None:
+    def resume(self, work: StationWork, phase: HandlingPhase) -> None:
         """Go on with a handling after a restart: the journal names its last step, the sensors whether it is over."""
         self.work, self.phase, self._resuming = work, phase, True
 
     @property
     def is_out(self) -> bool:
         """Whether the shuttle may be outside the carrier: then the carrier must not move (row P32)."""
-        return self.phase in (Phase.REACH, Phase.CLAMP, Phase.RETRACT)
+        return self.phase in (HandlingPhase.REACH, HandlingPhase.CLAMP, HandlingPhase.RETRACT)
 
     @property
     def is_astray(self) -> bool:
@@ -83,7 +91,7 @@ class ShuttleWork:
         if self.work is not None:
             for key in self._rights():
                 self.fleet.tokens.forget(key)
-        self.work, self.phase = None, Phase.DONE
+        self.work, self.phase = None, HandlingPhase.DONE
 
     @property
     def is_home(self) -> bool:
@@ -105,13 +113,13 @@ class ShuttleWork:
 
     def advance(self, now_us: int) -> list[Effect]:
         """Take the next step of the table where its condition is met."""
-        if self.work is None or self.phase is Phase.DONE:
+        if self.work is None or self.phase is HandlingPhase.DONE:
             return []
         if self._resuming:
             return self._resume(self.work, now_us)
-        if self.phase is Phase.ACQUIRE:
+        if self.phase is HandlingPhase.ACQUIRE:
             effects = self._acquire(now_us)
-            is_taken = self.work.handling is Handling.LEAVE and custody.others_in(
+            is_taken = self.work.handling is CarHandling.LEAVE and custody.others_in(
                 self.fleet.mirror, self.work.station, self.work.car
             )
             if is_taken:
@@ -121,17 +129,17 @@ class ShuttleWork:
             return []
         return self._next(now_us)
 
-    def _resume(self, work: Work, now_us: int) -> list[Effect]:
+    def _resume(self, work: StationWork, now_us: int) -> list[Effect]:
         """What the last step was to bring about is taken as over where the sensors say so, else ordered again."""
         state = self.sensed
         if state is None or state.mode not in (ShuttleMode.HOME, ShuttleMode.REACHED):
             return []
         self._resuming = False
         is_home = state.mode is ShuttleMode.HOME
-        clamped = (state.load_kg > 0) is (work.handling is Handling.TAKE)
-        if self.phase is Phase.CLAMP and clamped and is_home:
-            self.phase = Phase.RETRACT
-        over = {Phase.REACH: not is_home, Phase.CLAMP: clamped, Phase.RETRACT: is_home}
+        clamped = (state.load_kg > 0) is (work.handling is CarHandling.TAKE)
+        if self.phase is HandlingPhase.CLAMP and clamped and is_home:
+            self.phase = HandlingPhase.RETRACT
+        over = {HandlingPhase.REACH: not is_home, HandlingPhase.CLAMP: clamped, HandlingPhase.RETRACT: is_home}
         if not over[self.phase]:
             self.phase = _BEFORE[self.phase]
         return self._next(now_us)
@@ -167,10 +175,10 @@ class ShuttleWork:
         begun = StepRecord(self.phase, self.work.handling, self.work.station.number, self.work.car.number)
         return [Record(begun), *permit.order(self._ordered)]
 
-    def _finish(self, work: Work, now_us: int) -> list[Effect]:
+    def _finish(self, work: StationWork, now_us: int) -> list[Effect]:
         """The shuttle is home: state where the car is, pass custody on after leaving it, give the station back."""
         key = car_token(*work.car)
-        taken = work.handling is Handling.TAKE
+        taken = work.handling is CarHandling.TAKE
         # After a restart it may be with its new custodian already, who states it then.
         effects = custody.state(self.fleet, work.car, ANY_STATION if taken else work.station.number, work.wheelbase_mm)
         owner = custody.keeper(self.fleet.site, work.station)

@@ -12,7 +12,7 @@ from onboard.contract.messages import ManualOrder, Message, Reference, TaskRepor
 from onboard.core.effects import Effect
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
-from onboard.systems.car_park.program import Phase
+from onboard.systems.car_park.program import HandlingPhase
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.mirror import WayFleet
 from onboard.ways.site import TrackKind
@@ -20,7 +20,7 @@ from onboard.work.manual import Manual
 
 
 @dataclass
-class Holding:
+class RobotHold:
     """One robot's mode. The order is kept by its journal, so a robot that was held is held after a restart."""
 
     fleet: WayFleet
@@ -69,7 +69,7 @@ class Holding:
         if step is None or not begun or step.action is LegAction.STAND:
             return True
         if step.work is not None:
-            return self.shuttle.phase is Phase.ACQUIRE
+            return self.shuttle.phase is HandlingPhase.ACQUIRE
         tracks = (step.track, self.carriage.track)
         return step.action is LegAction.TRAVEL and all(site.tracks[one].kind is not TrackKind.SPUR for one in tracks)
 

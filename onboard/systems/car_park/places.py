@@ -15,37 +15,37 @@ from onboard.core.site import Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
-from onboard.systems.car_park.program import Handling, Phase, Work
+from onboard.systems.car_park.program import CarHandling, HandlingPhase, StationWork
 from onboard.ways.mirror import WayFleet
 
 
 @dataclass
-class Places:
+class PlaceChoice:
     """Which places are one robot's to put a car into, and what it does when another has promised the same."""
 
     fleet: WayFleet
     generation: CarParkGeneration
     shuttle: ShuttleWork
 
-    def lost(self) -> list[Work]:
+    def lost(self) -> list[StationWork]:
         """Cars in hand that cannot be left where it was planned, though there is a choice."""
         return [
             work
             for work in self.generation.program.works()
-            if work.handling is Handling.LEAVE
+            if work.handling is CarHandling.LEAVE
             and work.call.to_station == ANY_STATION
             and not self._is_begun(work)
             and (custody.others_in(self.fleet.mirror, work.station, work.car) or self._is_anothers(work.station))
         ]
 
-    def instead(self, work: Work, now_us: int) -> list[Station]:
+    def instead(self, work: StationWork, now_us: int) -> list[Station]:
         """Free places that nobody has promised, the nearest to where the car was to be left first."""
         here = work.station
         free = self.generation.free_places(now_us)
         return sorted(free, key=lambda one: (one.track != here.track, abs(one.index - here.index)))
 
-    def _is_begun(self, work: Work) -> bool:
-        return self.shuttle.work == work and self.shuttle.phase not in (Phase.ACQUIRE, Phase.DONE)
+    def _is_begun(self, work: StationWork) -> bool:
+        return self.shuttle.work == work and self.shuttle.phase not in (HandlingPhase.ACQUIRE, HandlingPhase.DONE)
 
     def _is_anothers(self, station: Station) -> bool:
         me, mirror = self.fleet.node_id, self.fleet.mirror

@@ -25,14 +25,14 @@ MAX_LEG_US = ((1 << 24) - 1) * 1000
 STAMP_AHEAD_US = 60_000_000
 
 
-class Handling(StrEnum):
+class CarHandling(StrEnum):
     """What the shuttle does with a car at a station."""
 
     TAKE = "take"
     LEAVE = "leave"
 
 
-class Phase(StrEnum):
+class HandlingPhase(StrEnum):
     """How far one handling of a car is."""
 
     ACQUIRE = "acquire"
@@ -42,17 +42,17 @@ class Phase(StrEnum):
     DONE = "done"
 
 
-class Work(NamedTuple):
+class StationWork(NamedTuple):
     """One handling of ``car`` (wheelbase in mm) at ``station``, for the task of ``call``."""
 
-    handling: Handling
+    handling: CarHandling
     station: Station
     car: Reference
     wheelbase_mm: int
     call: CallForProposals
 
 
-class Step(NamedTuple):
+class CarStep(NamedTuple):
     """One leg with its planned ``[begin_us, end_us)`` in bus time; ``work`` where the action is WORK."""
 
     action: LegAction
@@ -61,14 +61,14 @@ class Step(NamedTuple):
     to_index: int
     begin_us: int
     end_us: int
-    work: Work | None = None
+    work: StationWork | None = None
 
     @property
     def destination(self) -> Segment:
         """The segment in which the step ends."""
         return Segment(self.track, self.to_index)
 
-    def shifted(self, by_us: int) -> "Step":
+    def shifted(self, by_us: int) -> "CarStep":
         """The same step later (or earlier) by ``by_us``."""
         return self._replace(begin_us=self.begin_us + by_us, end_us=self.end_us + by_us)
 
@@ -97,23 +97,23 @@ class Program:
 
     site: WaySite
     standing: Segment | None = None
-    steps: list[Step] = field(default_factory=list)
-    unplanned: list[Work] = field(default_factory=list)
+    steps: list[CarStep] = field(default_factory=list)
+    unplanned: list[StationWork] = field(default_factory=list)
     current: int = 0
     version: int = 0
     stamp: Stamp = field(default_factory=lambda: Stamp(0, 0, 0))
 
     @property
-    def step(self) -> Step | None:
+    def step(self) -> CarStep | None:
         """The step in hand, or None where all is done."""
         return self.steps[self.current] if self.current < len(self.steps) else None
 
     @property
-    def remaining(self) -> list[Step]:
+    def remaining(self) -> list[CarStep]:
         """The step in hand and all later ones."""
         return self.steps[self.current :]
 
-    def works(self) -> list[Work]:
+    def works(self) -> list[StationWork]:
         """All handlings not yet done, in order."""
         return [*(step.work for step in self.remaining if step.work is not None), *self.unplanned]
 
@@ -157,7 +157,7 @@ class Program:
         last = remaining[kept - 1]
         return kept, last.destination, max(last.end_us, now_us)
 
-    def _is_on_platform(self, step: Step) -> bool:
+    def _is_on_platform(self, step: CarStep) -> bool:
         """Whether a step ends aboard a lift: nobody changes plans there."""
         return step.action is LegAction.RIDE or lift_at(self.site, step.destination) is not None
 
@@ -166,12 +166,12 @@ class Program:
             raise ValueError("no position is known yet")
         return self.standing
 
-    def begin(self, place: Segment, steps: list[Step], stamp: Stamp, unplanned: Sequence[Work] = ()) -> None:
+    def begin(self, place: Segment, steps: list[CarStep], stamp: Stamp, unplanned: Sequence[StationWork] = ()) -> None:
         """The robot stands at ``place`` and knows what is in hand: from now on the program is there."""
         self.standing = place
         self.replace(steps, stamp, unplanned)
 
-    def replace(self, steps: list[Step], stamp: Stamp, unplanned: Sequence[Work] = ()) -> None:
+    def replace(self, steps: list[CarStep], stamp: Stamp, unplanned: Sequence[StationWork] = ()) -> None:
         """Take up a new programme of remaining ``steps`` under the next version."""
         self.stamp = stamp
         self.unplanned = list(unplanned)
@@ -210,10 +210,10 @@ class Program:
             place, begin_us = last.destination, after[0].begin_us
             if last.action is LegAction.RIDE:
                 place = Segment(after[0].track, after[0].from_index)
-            before.append(Step(LegAction.STAND, place.track, place.index, place.index, begin_us, begin_us + by_us))
+            before.append(CarStep(LegAction.STAND, place.track, place.index, place.index, begin_us, begin_us + by_us))
         self._tell_anew([*before, *_later(after, by_us)])
 
-    def _tell_anew(self, steps: list[Step]) -> None:
+    def _tell_anew(self, steps: list[CarStep]) -> None:
         self._place()
         self.steps = steps
         self.current = 0
@@ -232,12 +232,12 @@ class Program:
 
 def standing_itinerary(sender: int, version: int, stamp: Stamp, place: Segment, now_us: int) -> Itinerary:
     """The firm itinerary of a robot that only stands at ``place``, from ``now_us`` on: one STAND leg."""
-    steps = [Step(LegAction.STAND, place.track, place.index, place.index, now_us, now_us + 1000)]
+    steps = [CarStep(LegAction.STAND, place.track, place.index, place.index, now_us, now_us + 1000)]
     # What was awarded is long done: an old award time could not be reached by the leg's 24 bits.
     return to_itinerary(sender, version, Grade.FIRM, stamp._replace(award_ms=to_bus_ms(now_us)), steps)
 
 
-def ends_at(site: WaySite, step: Step) -> Segment:
+def ends_at(site: WaySite, step: CarStep) -> Segment:
     """Where a carrier is after a step; after a ride on the platform, as a position of the floor's alley."""
     if step.action is not LegAction.RIDE:
         return step.destination
@@ -246,12 +246,12 @@ def ends_at(site: WaySite, step: Step) -> Segment:
     return there
 
 
-def _later(steps: list[Step], by_us: int) -> list[Step]:
+def _later(steps: list[CarStep], by_us: int) -> list[CarStep]:
     """The same steps later (or earlier); a planned wait keeps its end and takes up a delay as far as it can.
 
     So does time that no step fills: behind a run that is very late, what follows may have been planned anew already.
     """
-    shifted: list[Step] = []
+    shifted: list[CarStep] = []
     for step in steps:
         if shifted and by_us > 0:
             by_us = max(0, min(by_us, shifted[-1].end_us - step.begin_us))
@@ -263,7 +263,7 @@ def _later(steps: list[Step], by_us: int) -> list[Step]:
     return shifted
 
 
-def to_itinerary(sender: int, version: int, grade: Grade, stamp: Stamp, steps: list[Step]) -> Itinerary:
+def to_itinerary(sender: int, version: int, grade: Grade, stamp: Stamp, steps: list[CarStep]) -> Itinerary:
     """Steps as legs on the wire; ends are rounded up to the millisecond.
 
     An end that a delay has pushed before the stamp, or beyond what 24 bits hold, is told as the nearest that fits.
@@ -282,7 +282,7 @@ def to_itinerary(sender: int, version: int, grade: Grade, stamp: Stamp, steps: l
     return Itinerary(sender, version, grade, stamp, legs)
 
 
-def _reaches(stamp: Stamp, steps: list[Step], now_us: int) -> bool:
+def _reaches(stamp: Stamp, steps: list[CarStep], now_us: int) -> bool:
     """Whether a stamp is of before now, and all legs' ends can be told from it."""
     award_us = from_bus_ms(stamp.award_ms, now_us)
     return award_us <= now_us + STAMP_AHEAD_US and steps[-1].end_us - award_us <= MAX_LEG_US

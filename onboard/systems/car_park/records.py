@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 from onboard.contract.codes import DoorAction, DoorName, Operation
 from onboard.contract.messages import Reference
-from onboard.core.journal_records import UNSAID, End, JournalRecord, Keep, RecordTypes, Which
-from onboard.systems.car_park.program import Handling, Phase
+from onboard.core.journal_records import UNSAID, JournalRecord, Keep, RecordEnd, RecordTypes, Which
+from onboard.systems.car_park.program import CarHandling, HandlingPhase
 
 _CAR = ("car",)
 _TASK = ("task",)
@@ -54,7 +54,7 @@ class ForfeitedRecord(JournalRecord):
     """A task was given back, or is another's."""
 
     NAME = "forfeited"
-    RULES = (End(("award", "handled", "sink"), _TASK),)
+    RULES = (RecordEnd(("award", "handled", "sink"), _TASK),)
 
     task: Reference
 
@@ -67,12 +67,12 @@ class HandledRecord(JournalRecord):
     RULES = (
         Keep("handled", _TASK),
         Keep("last_handled"),
-        End(("award", "handled", "sink"), _TASK, ("handling", (Handling.LEAVE,))),
+        RecordEnd(("award", "handled", "sink"), _TASK, ("handling", (CarHandling.LEAVE,))),
         Keep("left", ("handling",)),
     )
 
     task: Reference
-    handling: Handling
+    handling: CarHandling
     station: int = 0
 
 
@@ -83,8 +83,8 @@ class StepRecord(JournalRecord):
     NAME = "step"
     RULES = (Keep("step"),)
 
-    phase: Phase
-    handling: Handling
+    phase: HandlingPhase
+    handling: CarHandling
     station: int
     car: int
 
@@ -106,7 +106,7 @@ class FloorRecord(JournalRecord):
     """The track on which the carrier is: after a ride, or about to turn into a spur."""
 
     NAME = "floor"
-    RULES = (Keep("floor"), End(("riding",)))
+    RULES = (Keep("floor"), RecordEnd(("riding",)))
 
     track: int
 
@@ -165,7 +165,7 @@ class BayJobRecord(JournalRecord):
     """A task of the bay begins, for this car."""
 
     NAME = "job"
-    RULES = (Keep("job"), End(("ticket",), _CAR, ("operation", (Operation.RETRIEVE,))))
+    RULES = (Keep("job"), RecordEnd(("ticket",), _CAR, ("operation", (Operation.RETRIEVE,))))
 
     task: Reference
     operation: Operation
@@ -178,7 +178,7 @@ class BayFreeRecord(JournalRecord):
     """The bay is free again."""
 
     NAME = "job_over"
-    RULES = (End(("job",)),)
+    RULES = (RecordEnd(("job",)),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,7 +222,7 @@ class RideOverRecord(JournalRecord):
     """The robot's ride has ended at its floor."""
 
     NAME = "ride_over"
-    RULES = (End(("ride",)),)
+    RULES = (RecordEnd(("ride",)),)
 
     robot: int
 

@@ -17,7 +17,7 @@ from onboard.core.records import BootRecord
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.bay_memory import cars_at
-from onboard.systems.car_park.program import Handling, Phase, Step, Work
+from onboard.systems.car_park.program import CarHandling, CarStep, HandlingPhase, StationWork
 from onboard.systems.car_park.records import (
     AwardRecord,
     FloorRecord,
@@ -51,7 +51,7 @@ def award_record(call: CallForProposals, source: Station, sink: Station, version
     )
 
 
-def handled_record(work: Work) -> Record:
+def handled_record(work: StationWork) -> Record:
     """The journal's word that one handling of a task is over."""
     return Record(HandledRecord(work.call.task, work.handling, work.station.number))
 
@@ -66,7 +66,7 @@ def sink_record(task: Reference, station: Station) -> Record:
     return Record(SinkRecord(task, station.number))
 
 
-def ride_record(step: Step) -> Record:
+def ride_record(step: CarStep) -> Record:
     """A ride begins: from now on the floor is the lift's business."""
     return Record(RidingRecord(step.track, step.from_index, step.to_index))
 
@@ -89,12 +89,12 @@ _READ = (
 
 
 @dataclass
-class Recovery:
+class JournalRecovery:
     """The journal read from its oldest entry on. ``works`` is what is left to do, in order."""
 
-    works: list[Work] = field(default_factory=list)
+    works: list[StationWork] = field(default_factory=list)
     #: The shuttle's phase in the first of ``works``, None where it was not begun.
-    phase: Phase | None = None
+    phase: HandlingPhase | None = None
     floor: int | None = None
     #: Lift track, board and leave index of a ride that was begun and not ended.
     riding: tuple[int, int, int] | None = None
@@ -109,7 +109,7 @@ class Recovery:
     versions: dict[Reference, int] = field(default_factory=dict)
 
     @classmethod
-    def read(cls, node_id: int, entries: Sequence[Entry]) -> "Recovery":
+    def read(cls, node_id: int, entries: Sequence[Entry]) -> "JournalRecovery":
         """From the journal of node ``node_id``; entries of other kinds are passed over."""
         found = cls(cars=cars_at(node_id, entries))
         for record in records_in(entries, *_READ):
@@ -125,7 +125,7 @@ class Recovery:
                 self.works += _works(record)
                 self.versions[record.task] = record.version
             case SinkRecord():
-                place, last = Station.from_number(record.station), (record.task, Handling.LEAVE)
+                place, last = Station.from_number(record.station), (record.task, CarHandling.LEAVE)
                 self.works = [
                     one._replace(station=place) if (one.call.task, one.handling) == last else one for one in self.works
                 ]
@@ -137,7 +137,7 @@ class Recovery:
                 ended = (record.task, record.handling)
                 self.works = [one for one in self.works if (one.call.task, one.handling) != ended]
                 self.phase = None
-                if record.handling is Handling.LEAVE:
+                if record.handling is CarHandling.LEAVE:
                     self.versions.pop(record.task, None)
                     self.last_done, self.is_news = (record.task, record.station), True
             case RidingRecord():
@@ -146,12 +146,12 @@ class Recovery:
                 self.floor, self.riding = record.track, None
 
     @property
-    def ride(self) -> Step | None:
+    def ride(self) -> CarStep | None:
         """The ride that the restart fell into, without its times."""
         if self.riding is None:
             return None
         lift, board, leave = self.riding
-        return Step(LegAction.RIDE, lift, board, leave, 0, 0)
+        return CarStep(LegAction.RIDE, lift, board, leave, 0, 0)
 
     def contradiction(self, place: Segment | None, shuttle: ShuttleState) -> str:
         """What the sensors say that the journal cannot explain, in words; empty where they agree.
@@ -169,7 +169,7 @@ class Recovery:
         if begun:
             # The gripper may just have closed, or opened.
             return ""
-        is_loaded = first is not None and first.handling is Handling.LEAVE
+        is_loaded = first is not None and first.handling is CarHandling.LEAVE
         if is_loaded and not shuttle.load_kg:
             return "no car is aboard, and the journal has one there"
         if shuttle.load_kg and not is_loaded:
@@ -184,17 +184,17 @@ class Recovery:
         if self.phase is None or not self.works:
             return False
         first = self.works[0]
-        has_gripped = (shuttle.load_kg > 0) is (first.handling is Handling.TAKE)
-        is_handled = shuttle.mode is ShuttleMode.HOME and self.phase is not Phase.REACH and has_gripped
+        has_gripped = (shuttle.load_kg > 0) is (first.handling is CarHandling.TAKE)
+        is_handled = shuttle.mode is ShuttleMode.HOME and self.phase is not HandlingPhase.REACH and has_gripped
         return place == first.station.segment or is_handled
 
     def untouched(self) -> list[Reference]:
         """Tasks whose car was not taken and whose handling was not begun, in order."""
         begun = self.works[0].call.task if self.works and self.phase is not None else None
-        return [one.call.task for one in self.works if one.handling is Handling.TAKE and one.call.task != begun]
+        return [one.call.task for one in self.works if one.handling is CarHandling.TAKE and one.call.task != begun]
 
     def forfeit_unknown(
-        self, fleet: WayFleet, award: Award, known: Iterable[Work], done: Collection[Reference]
+        self, fleet: WayFleet, award: Award, known: Iterable[StationWork], done: Collection[Reference]
     ) -> list[Effect]:
         """An award for a bid of my life before: the bid is not in the journal, so the task is given back at once."""
         mine = award.winner == fleet.node_id and award.result is CallResult.AWARDED
@@ -214,7 +214,7 @@ class Recovery:
         self.versions.pop(task, None)
 
 
-def _works(record: AwardRecord) -> list[Work]:
+def _works(record: AwardRecord) -> list[StationWork]:
     call = CallForProposals(
         sender=record.initiator,
         call=record.call,
@@ -230,5 +230,7 @@ def _works(record: AwardRecord) -> list[Work]:
         car=record.car,
         wheelbase_mm=record.wheelbase_mm,
     )
-    ends = ((Handling.TAKE, record.source), (Handling.LEAVE, record.sink))
-    return [Work(handling, Station.from_number(end), record.car, record.wheelbase_mm, call) for handling, end in ends]
+    ends = ((CarHandling.TAKE, record.source), (CarHandling.LEAVE, record.sink))
+    return [
+        StationWork(handling, Station.from_number(end), record.car, record.wheelbase_mm, call) for handling, end in ends
+    ]

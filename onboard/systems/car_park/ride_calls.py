@@ -6,21 +6,21 @@ from dataclasses import replace
 from onboard.contract.codes import Criterion, KindCode, LegAction, Operation
 from onboard.contract.messages import CallForProposals, Reference
 from onboard.core.effects import Effect
-from onboard.core.negotiation import Answer, CallTerms
-from onboard.systems.car_park.program import Step
+from onboard.core.negotiation import RequestedTerms, SubCallAnswer
+from onboard.systems.car_park.program import CarStep
 from onboard.ways.lifts import sill
 from onboard.ways.mirror import WayFleet
 from onboard.ways.site import WaySite
 
 
-def rides_of(steps: Iterable[Step]) -> list[Step]:
+def rides_of(steps: Iterable[CarStep]) -> list[CarStep]:
     """The rides of a plan, in order."""
     return [step for step in steps if step.action is LegAction.RIDE]
 
 
-def ride_terms(site: WaySite, call: CallForProposals, step: Step) -> CallTerms:
+def ride_terms(site: WaySite, call: CallForProposals, step: CarStep) -> RequestedTerms:
     """The call for one ride of a plan for ``call``, wanted when the plan has the carrier stand aboard."""
-    return CallTerms(
+    return RequestedTerms(
         task=call.task,
         operation=Operation.RIDE,
         kind=KindCode.LIFT,
@@ -34,8 +34,8 @@ def ride_terms(site: WaySite, call: CallForProposals, step: Step) -> CallTerms:
 
 
 def calls_after_winning(
-    site: WaySite, call: CallForProposals, steps: Iterable[Step], confirmed: tuple[Answer, ...] = ()
-) -> list[CallTerms]:
+    site: WaySite, call: CallForProposals, steps: Iterable[CarStep], confirmed: tuple[SubCallAnswer, ...] = ()
+) -> list[RequestedTerms]:
     """A call for each ride of a plan for the task won by ``call``, but for those that a confirmed option answers."""
     parent = Reference(call.sender, call.call)
     number = max((answer.part for answer in confirmed), default=0)
@@ -49,7 +49,11 @@ def calls_after_winning(
 
 
 def call_lifts(
-    fleet: WayFleet, call: CallForProposals, steps: Iterable[Step], now_us: int, confirmed: tuple[Answer, ...] = ()
+    fleet: WayFleet,
+    call: CallForProposals,
+    steps: Iterable[CarStep],
+    now_us: int,
+    confirmed: tuple[SubCallAnswer, ...] = (),
 ) -> list[Effect]:
     """Each ride is a call, made after winning (step 15) where no lift has promised it before (row P39)."""
     effects: list[Effect] = []
@@ -58,7 +62,7 @@ def call_lifts(
     return effects
 
 
-def answer_for(terms: CallTerms, answers: Iterable[Answer]) -> Answer | None:
+def answer_for(terms: RequestedTerms, answers: Iterable[SubCallAnswer]) -> SubCallAnswer | None:
     """The last lift's answer to a call for this ride, or None."""
     stations = (terms.from_station, terms.to_station)
     found = [one for one in answers if one.winner and (one.terms.from_station, one.terms.to_station) == stations]

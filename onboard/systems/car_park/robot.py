@@ -22,22 +22,29 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.effects import Effect, Halt, Report, Send
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Answer as LiftAnswer
-from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
+from onboard.core.negotiation import (
+    Awarded,
+    AwardedAgain,
+    Estimator,
+    NegotiationEvent,
+    PreAssigned,
+    Released,
+    SubCallAnswer,
+)
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.asking import AskingGeneration
 from onboard.systems.car_park.generation import CarParkGeneration, Solution, weighed
-from onboard.systems.car_park.giving_way import Answer, GivingWay
+from onboard.systems.car_park.giving_way import GivingWay, YieldDecision
 from onboard.systems.car_park.going_around import GoingAround
 from onboard.systems.car_park.handling import ShuttleWork, handle
-from onboard.systems.car_park.holding import Holding
-from onboard.systems.car_park.program import MAX_STEPS, Handling, Phase, Program, Step, Work
-from onboard.systems.car_park.recovery import Recovery, award_record, floor_record, handled_record, ride_record
+from onboard.systems.car_park.holding import RobotHold
+from onboard.systems.car_park.program import MAX_STEPS, CarHandling, CarStep, HandlingPhase, Program, StationWork
+from onboard.systems.car_park.recovery import JournalRecovery, award_record, floor_record, handled_record, ride_record
 from onboard.systems.car_park.ride_calls import call_lifts
 from onboard.systems.car_park.riding import Riding
 from onboard.systems.car_park.site import RideCalls, car_park
-from onboard.systems.car_park.starting import Body, Stage, Starting
+from onboard.systems.car_park.starting import RobotDevices, Starting, StartStage
 from onboard.systems.car_park.travel import Carriage
 from onboard.systems.car_park.way import way_to_refuge
 from onboard.ways.lifts import sill
@@ -53,7 +60,7 @@ OVERDUE_US = 2_000_000
 
 
 @dataclass(frozen=True)
-class RobotFactory(BehaviourFactory):
+class ParkingRobotFactory(BehaviourFactory):
     """Makes mobile robots."""
 
     fleet_type = WayFleet
@@ -64,15 +71,15 @@ class RobotFactory(BehaviourFactory):
         generation = AskingGeneration if park.rides is RideCalls.BEFORE else CarParkGeneration
         return generation(park, machine, way_mirror(mirror), Program(park))
 
-    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Robot":
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "ParkingRobot":
         """The robot's steps; ``estimator`` is the one made above."""
         if not isinstance(estimator, CarParkGeneration):
             raise TypeError("a robot needs the car park's task-generation function")
-        return Robot(way_fleet(fleet), estimator)
+        return ParkingRobot(way_fleet(fleet), estimator)
 
 
 @dataclass
-class Robot:
+class ParkingRobot:
     """One mobile robot: waits for awards, drives, handles cars, and stands in a refuge in between."""
 
     fleet: WayFleet
@@ -82,9 +89,9 @@ class Robot:
     shuttle: ShuttleWork = field(init=False)
     riding: Riding = field(init=False)
     giving_way: GivingWay = field(init=False)
-    recovery: Recovery = field(init=False)
+    recovery: JournalRecovery = field(init=False)
     going_around: GoingAround = field(init=False)
-    holding: Holding = field(init=False)
+    holding: RobotHold = field(init=False)
     starting: Starting = field(init=False)
     #: The last tasks that were done: a late word about one of them is no news.
     _done: deque[Reference] = field(default_factory=lambda: deque(maxlen=16))
@@ -95,15 +102,15 @@ class Robot:
         self.carriage = Carriage(self.fleet, self.fleet.machine.home.track)
         self.shuttle = ShuttleWork(self.fleet)
         self.carriage.is_clear = lambda: self.shuttle.is_home
-        self.carriage.way_on = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
+        self.carriage.route_ahead = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
         self.riding = Riding(self.fleet)
         self.giving_way = GivingWay(self.fleet, self.program)
-        self.recovery = Recovery.read(self.fleet.node_id, self.fleet.entries)
+        self.recovery = JournalRecovery.read(self.fleet.node_id, self.fleet.entries)
         custody.replay(self.fleet, self.recovery.cars.values())
         self.fleet.tokens.before_grant = partial(custody.before_grant, self.fleet)
         self.going_around = GoingAround(self.fleet, self.generation, self.carriage, self.shuttle, self._take_up)
-        self.holding = Holding(self.fleet, self.generation, self.carriage, self.shuttle)
-        machine = Body(self.carriage, self.shuttle, self.riding)
+        self.holding = RobotHold(self.fleet, self.generation, self.carriage, self.shuttle)
+        machine = RobotDevices(self.carriage, self.shuttle, self.riding)
         self.starting = Starting(
             self.fleet, self.generation, machine, self.recovery, self._say_what_is_mine, self._started
         )
@@ -119,7 +126,7 @@ class Robot:
     def state(self) -> MachineState:
         """Heartbeat state."""
         is_astray = self.starting.is_over and self.shuttle.is_astray
-        is_held_back = self.starting.stage is Stage.HELD or self.going_around.is_stuck or is_astray
+        is_held_back = self.starting.stage is StartStage.HELD or self.going_around.is_stuck or is_astray
         if self._fault is not Reason.NONE or is_held_back:
             return MachineState.STOPPED
         if self.holding.is_at_rest:
@@ -167,9 +174,9 @@ class Robot:
         if self.holding.is_at_rest or self.fleet.mirror.itineraries.get(message.sender) is not message:
             return []
         answer = self.giving_way.heed(message.sender, now_us)
-        if answer is Answer.ANEW:
+        if answer is YieldDecision.ANEW:
             return self._reroute(message.sender, now_us)
-        return self._publish(now_us) if answer is Answer.LATER else []
+        return self._publish(now_us) if answer is YieldDecision.LATER else []
 
     def _yield_task(self, award: Award, now_us: int) -> list[Effect]:
         """A task of mine is not mine by a newer version, or its call is void: I was lost for its initiator.
@@ -197,7 +204,7 @@ class Robot:
         gone = self.going_around.lose(task)
         return gone + (self.going_around.drop([task], now_us) if self.starting.is_over else [])
 
-    def _take_up(self, kept: int, steps: Sequence[Step], works: list[Work], now_us: int) -> list[Effect]:
+    def _take_up(self, kept: int, steps: Sequence[CarStep], works: list[StationWork], now_us: int) -> list[Effect]:
         """A program made anew for the same or fewer tasks, under the same stamp."""
         rest = [*self.program.remaining[:kept], *steps]
         if not kept:
@@ -223,7 +230,7 @@ class Robot:
             # What finds no way now must not stand in the way of others either.
             steps = self.generation.reroute(origin, start_us, works, now_us)
         if steps is None:
-            return self._publish(now_us) if self.giving_way.fall_back(sender, now_us) is Answer.LATER else []
+            return self._publish(now_us) if self.giving_way.fall_back(sender, now_us) is YieldDecision.LATER else []
         calls = [work.call for work in works]
         if not kept:
             self._begun = False
@@ -266,15 +273,15 @@ class Robot:
         # A bid of before: of a life before, or of when there was still a way for all that is in hand.
         return Reason.IMPOSSIBLE if self.program.unplanned or not self.starting.is_over else Reason.NONE
 
-    def _works(self) -> list[Work]:
+    def _works(self) -> list[StationWork]:
         """What is in hand, or what a restart has left to do."""
         return self.program.works() if self.starting.is_over else self.recovery.works
 
     def _tell_again(self, task: Reference) -> Effect:
         """What became of a task whose award is said again."""
         handlings = [work.handling for work in self._works() if work.call.task == task]
-        if Handling.TAKE in handlings or Handling.LEAVE in handlings:
-            return self._report(task, TaskPhase.AWARDED if Handling.TAKE in handlings else TaskPhase.LOADED, 0)
+        if CarHandling.TAKE in handlings or CarHandling.LEAVE in handlings:
+            return self._report(task, TaskPhase.AWARDED if CarHandling.TAKE in handlings else TaskPhase.LOADED, 0)
         if task in self._done:
             return self._report(task, TaskPhase.DONE, 0)
         return Send(TaskReport(self.fleet.node_id, task, TaskPhase.FORFEITED, 0, Reason.CANCELLED))
@@ -345,8 +352,8 @@ class Robot:
         effects += custody.statements(self.fleet) + self.holding.manual.statement()
         return effects + self.fleet.tokens.statements()
 
-    def _taken_on(self, works: list[Work]) -> list[Effect]:
-        to_take = [work for work in works if work.handling is Handling.TAKE]
+    def _taken_on(self, works: list[StationWork]) -> list[Effect]:
+        to_take = [work for work in works if work.handling is CarHandling.TAKE]
         return [self._report(work.call.task, TaskPhase.AWARDED, work.station.number) for work in to_take]
 
     # --- steps -------------------------------------------------------------------------------------------------
@@ -362,7 +369,7 @@ class Robot:
                 mine = [self._report(task, TaskPhase.DONE, station), *mine]
         return mine
 
-    def _started(self, planned: tuple[Step, ...] | None, calls: list[CallForProposals], now_us: int) -> list[Effect]:
+    def _started(self, planned: tuple[CarStep, ...] | None, calls: list[CallForProposals], now_us: int) -> list[Effect]:
         """The start is over, and the program taken up: tell the plan, and call for rides in what was planned now."""
         # What a restart has left in hand is the first step, and was begun before.
         self._begun = len(planned or ()) < len(self.program.steps)
@@ -376,7 +383,7 @@ class Robot:
         return effects + (call_lifts(self.fleet, calls[0], planned or (), now_us) if calls else [])
 
     def _take_on(
-        self, call: CallForProposals, promised: Solution, parts: tuple[LiftAnswer, ...], version: int, now_us: int
+        self, call: CallForProposals, promised: Solution, parts: tuple[SubCallAnswer, ...], version: int, now_us: int
     ) -> list[Effect]:
         """Second request of the task-generation function: the operating sequence that is really carried out."""
         solution = self.generation.renewed(call, promised, now_us)
@@ -392,7 +399,7 @@ class Robot:
         effects.append(self._report(call.task, TaskPhase.AWARDED, solution.place.number))
         return effects + call_lifts(self.fleet, call, solution.steps, now_us, parts)
 
-    def _begin(self, step: Step, now_us: int) -> list[Effect]:
+    def _begin(self, step: CarStep, now_us: int) -> list[Effect]:
         if step.action is LegAction.TRAVEL:
             self.carriage.go(step.destination)
             if self.fleet.site.tracks[step.track].kind is TrackKind.SPUR:
@@ -406,12 +413,12 @@ class Robot:
             self.carriage.go(step.destination)
         return [] if step.work is None else self.shuttle.begin(step.work) + self._announce_start(step.work)
 
-    def _announce_start(self, work: Work) -> list[Effect]:
-        if work.handling is Handling.LEAVE:
+    def _announce_start(self, work: StationWork) -> list[Effect]:
+        if work.handling is CarHandling.LEAVE:
             return []
         return [self._report(work.call.task, TaskPhase.STARTED, work.station.number)]
 
-    def _carry_on(self, step: Step, now_us: int) -> list[Effect]:
+    def _carry_on(self, step: CarStep, now_us: int) -> list[Effect]:
         if step.action is LegAction.RIDE:
             return self.riding.advance(now_us)
         if step.work is not None:
@@ -420,16 +427,16 @@ class Robot:
             return [Halt("the carrier should move while its shuttle is out")]
         return self.carriage.advance(now_us)
 
-    def _is_done(self, step: Step, now_us: int) -> bool:
+    def _is_done(self, step: CarStep, now_us: int) -> bool:
         if step.action is LegAction.TRAVEL:
             return self.carriage.standing_at == step.destination
         if step.action is LegAction.RIDE:
             return self.riding.done
         if step.work is not None:
-            return self.shuttle.phase is Phase.DONE
+            return self.shuttle.phase is HandlingPhase.DONE
         return now_us >= step.end_us
 
-    def _tell_delay(self, step: Step, now_us: int) -> list[Effect]:
+    def _tell_delay(self, step: CarStep, now_us: int) -> list[Effect]:
         """A step that takes longer than planned moves the rest of the plan while it still lasts, so others can plan."""
         late_us = now_us - step.end_us
         if late_us < OVERDUE_US:
@@ -442,10 +449,10 @@ class Robot:
         # Whoever waits for rights in vain may have lost the task: its initiator answers then.
         return self._publish(now_us) + ([] if step.work is None else self._announce_start(step.work))
 
-    def _end(self, step: Step, now_us: int) -> list[Effect]:
+    def _end(self, step: CarStep, now_us: int) -> list[Effect]:
         effects: list[Effect] = []
         if step.work is not None:
-            taken = step.work.handling is Handling.TAKE
+            taken = step.work.handling is CarHandling.TAKE
             phase = TaskPhase.LOADED if taken else TaskPhase.DONE
             effects.append(handled_record(step.work))
             if not taken:

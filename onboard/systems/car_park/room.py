@@ -7,8 +7,8 @@ is the only way to another; every other alley and every spur takes one carrier.
 
 from itertools import groupby
 
-from onboard.config.fleet import Fleet
-from onboard.config.reader import Table
+from onboard.config.fleet import FleetReader
+from onboard.config.reader import TomlTable
 from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.ways.reach import passages
@@ -30,7 +30,7 @@ def refuge_tracks(site: WaySite, robots: int) -> list[int]:
     return sorted(found)
 
 
-def check_room(root: Table, site: WaySite, fleet: Fleet) -> None:
+def check_room(root: TomlTable, site: WaySite, fleet: FleetReader) -> None:
     """Note too few refuges as one problem, else each home where a robot may not stand for ever."""
     robots = robots_of(site)
     tracks = refuge_tracks(site, robots)

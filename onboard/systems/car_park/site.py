@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import ClassVar
 
-from onboard.core.site import Needs, Site, Station
+from onboard.core.site import MotionNeeds, Site, Station
 from onboard.ways.site import Axis, WaySite
 from onboard.work.timing import DeviceTiming
 
@@ -59,10 +59,10 @@ class CarPark(WaySite):
 
     system: ClassVar[str] = "car-park"
     has_regeneration: ClassVar[bool] = True
-    moved_by: ClassVar[Mapping[str, Needs]] = {
-        "DriveOrder": Needs.RIGHT,
-        "ShuttleOrder": Needs.RIGHT,
-        "DoorOrder": Needs.PLACE,
+    moved_by: ClassVar[Mapping[str, MotionNeeds]] = {
+        "DriveOrder": MotionNeeds.RIGHT,
+        "ShuttleOrder": MotionNeeds.RIGHT,
+        "DoorOrder": MotionNeeds.PLACE,
     }
 
     timing: DeviceTiming

@@ -18,8 +18,8 @@ from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Segment
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
-from onboard.systems.car_park.program import Step, ends_at, standing_itinerary
-from onboard.systems.car_park.recovery import Recovery, floor_record
+from onboard.systems.car_park.program import CarStep, ends_at, standing_itinerary
+from onboard.systems.car_park.recovery import JournalRecovery, floor_record
 from onboard.systems.car_park.riding import Riding
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.lift_uses import ride_us
@@ -31,7 +31,7 @@ SETTLING_US = 2_000_000
 AT_REST = (ShuttleMode.HOME, ShuttleMode.REACHED)
 
 
-class Stage(Enum):
+class StartStage(Enum):
     """How far a robot has come since power-up."""
 
     UNPLACED = "looks for its place"
@@ -40,7 +40,7 @@ class Stage(Enum):
     OVER = "takes part"
 
 
-class Found(Enum):
+class StartEvent(Enum):
     """What leads from one stage to the next."""
 
     FIRST_PLACE = auto()
@@ -51,18 +51,18 @@ class Found(Enum):
     PLAN = auto()
 
 
-TABLE: Final[dict[tuple[Stage, Found], Stage]] = {
-    (Stage.UNPLACED, Found.FIRST_PLACE): Stage.OVER,
-    (Stage.UNPLACED, Found.PLACE_AGAIN): Stage.SETTLING,
-    (Stage.UNPLACED, Found.CONTRADICTION): Stage.HELD,
-    (Stage.SETTLING, Found.PLACE_LOST): Stage.UNPLACED,
-    (Stage.SETTLING, Found.CONTRADICTION): Stage.HELD,
-    (Stage.SETTLING, Found.PLAN): Stage.OVER,
-    (Stage.HELD, Found.AGREEMENT): Stage.UNPLACED,
+TABLE: Final[dict[tuple[StartStage, StartEvent], StartStage]] = {
+    (StartStage.UNPLACED, StartEvent.FIRST_PLACE): StartStage.OVER,
+    (StartStage.UNPLACED, StartEvent.PLACE_AGAIN): StartStage.SETTLING,
+    (StartStage.UNPLACED, StartEvent.CONTRADICTION): StartStage.HELD,
+    (StartStage.SETTLING, StartEvent.PLACE_LOST): StartStage.UNPLACED,
+    (StartStage.SETTLING, StartEvent.CONTRADICTION): StartStage.HELD,
+    (StartStage.SETTLING, StartEvent.PLAN): StartStage.OVER,
+    (StartStage.HELD, StartEvent.AGREEMENT): StartStage.UNPLACED,
 }
 
 
-class Body(NamedTuple):
+class RobotDevices(NamedTuple):
     """What a robot senses and moves."""
 
     carriage: Carriage
@@ -79,18 +79,18 @@ class Starting:
 
     fleet: WayFleet
     generation: CarParkGeneration
-    body: Body
-    recovery: Recovery
+    body: RobotDevices
+    recovery: JournalRecovery
     announce: Callable[[], list[Effect]]
-    started: Callable[[tuple[Step, ...] | None, list[CallForProposals], int], list[Effect]]
-    stage: Stage = Stage.UNPLACED
+    started: Callable[[tuple[CarStep, ...] | None, list[CallForProposals], int], list[Effect]]
+    stage: StartStage = StartStage.UNPLACED
     place: Segment | None = field(default=None, init=False)
     _due_us: int | None = None
 
     @property
     def is_over(self) -> bool:
         """Whether the robot takes part."""
-        return self.stage is Stage.OVER
+        return self.stage is StartStage.OVER
 
     def next_wake(self) -> int | None:
         """When the others have had their time; what else is waited for is told by sensors."""
@@ -100,13 +100,13 @@ class Starting:
         """One step of the table, where what leads to it was found."""
         if self.body.carriage.sensed is None:
             return []
-        if self.stage is Stage.HELD:
+        if self.stage is StartStage.HELD:
             return self._look_again(now_us)
-        if self.stage is Stage.UNPLACED:
+        if self.stage is StartStage.UNPLACED:
             return self._find_place(now_us)
         return self._settle(now_us)
 
-    def _enter(self, found: Found) -> None:
+    def _enter(self, found: StartEvent) -> None:
         self.stage = TABLE[self.stage, found]
 
     # --- the place ---------------------------------------------------------------------------------------------
@@ -145,7 +145,7 @@ class Starting:
         self.body.carriage.go(here)
         if not self.recovery.is_restart:
             return self._start_first(here, now_us)
-        self._enter(Found.PLACE_AGAIN)
+        self._enter(StartEvent.PLACE_AGAIN)
         self._due_us = now_us + SETTLING_US
         program, node = self.generation.program, self.fleet.node_id
         program.version = successor(program.version, 8)
@@ -161,7 +161,7 @@ class Starting:
         why = self.recovery.contradiction(here, shuttle)
         if why:
             return self._hold(why)
-        self._enter(Found.FIRST_PLACE)
+        self._enter(StartEvent.FIRST_PLACE)
         return self._go_on(here, (), now_us)
 
     # --- what is in hand ---------------------------------------------------------------------------------------
@@ -170,7 +170,7 @@ class Starting:
         """Ask for what it is in; once the others were heard and the shuttle is at rest, go on where they agree."""
         if self.body.carriage.standing_at != self.place:
             # Pushed away meanwhile: what was said of the place is wrong.
-            self._enter(Found.PLACE_LOST)
+            self._enter(StartEvent.PLACE_LOST)
             self.body.carriage.stay()
             self._due_us = None
             return self._find_place(now_us)
@@ -185,7 +185,7 @@ class Starting:
         return effects + (self._hold(why) if why else self._take_part(now_us))
 
     def _hold(self, why: str) -> list[Effect]:
-        self._enter(Found.CONTRADICTION)
+        self._enter(StartEvent.CONTRADICTION)
         self._due_us = None
         self.body.carriage.stay()
         return [Report(f"held for a person: {why}")]
@@ -198,15 +198,15 @@ class Starting:
         place = self.body.carriage.standing_at
         if self.recovery.contradiction(place, shuttle):
             return []
-        self._enter(Found.AGREEMENT)
+        self._enter(StartEvent.AGREEMENT)
         return [Report("sensors and journal agree again"), *self._find_place(now_us)]
 
     def _take_part(self, now_us: int) -> list[Effect]:
         assert self.place is not None
-        self._enter(Found.PLAN)
+        self._enter(StartEvent.PLAN)
         return self._go_on(self.place, self._in_hand(self.place, now_us), now_us)
 
-    def _go_on(self, place: Segment, in_hand: tuple[Step, ...], now_us: int) -> list[Effect]:
+    def _go_on(self, place: Segment, in_hand: tuple[CarStep, ...], now_us: int) -> list[Effect]:
         """Go on from ``place`` with what the journal says is mine, by a way planned anew (rows P14, P20)."""
         works, self.recovery.works = self.recovery.works, []
         stamp = Stamp(to_bus_ms(now_us), self.fleet.node_id, 0)
@@ -225,14 +225,14 @@ class Starting:
         self.generation.program.begin(place, [*in_hand, *(more or ())], stamp, ahead if more is None else ())
         return self.started(more, calls, now_us)
 
-    def _resume(self, step: Step) -> None:
+    def _resume(self, step: CarStep) -> None:
         """The step in hand goes on from where the journal and the sensors say that it was."""
         if step.work is not None and self.recovery.phase is not None:
             self.body.shuttle.resume(step.work, self.recovery.phase)
         elif step.action is LegAction.RIDE:
             self.body.riding.begin(step.track, step.to_index)
 
-    def _in_hand(self, here: Segment, now_us: int) -> tuple[Step, ...]:
+    def _in_hand(self, here: Segment, now_us: int) -> tuple[CarStep, ...]:
         """The handling or the ride that the restart fell into, as the first step of the new program."""
         ride = self.recovery.ride
         if ride is not None:
@@ -243,4 +243,4 @@ class Starting:
             return ()
         work = self.recovery.works[0]
         end_us = now_us + self.generation.handling_us(work.station)
-        return (Step(LegAction.WORK, here.track, here.index, here.index, now_us, end_us, work),)
+        return (CarStep(LegAction.WORK, here.track, here.index, here.index, now_us, end_us, work),)

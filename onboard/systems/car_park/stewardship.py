@@ -127,7 +127,7 @@ class Stewardship:
             self._admissions, self._since_us = self.fleet.admissions, now_us
             self._unheard_us = dict.fromkeys(self._unheard_us, now_us)
         obstacles, forgetful = self.fleet.mirror.obstacles.machines, self.fleet.forgetful
-        if not (obstacles or forgetful or self._unheard_us or self.fleet.mirror.told or self._say_at_us):
+        if not (obstacles or forgetful or self._unheard_us or self.fleet.mirror.taken_over or self._say_at_us):
             return effects
         lost = {winner for winner in obstacles if self._is_lost(winner, now_us)} | (forgetful - set(obstacles))
         deaf = {car for car, since_us in self._unheard_us.items() if now_us - since_us >= UNHEARD_AFTER_US}
@@ -138,12 +138,12 @@ class Stewardship:
                 effects += self.won(car, NOBODY, task, version)
                 self._say_at_us[car] = now_us
         forgetful &= set(obstacles)
-        for car, told in list(self.fleet.mirror.told.items()):
+        for car, statement in list(self.fleet.mirror.taken_over.items()):
             if self.fleet.tokens.holds(car_token(*car)):
-                del self.fleet.mirror.told[car]
-                effects += custody.state(self.fleet, car, told.station, told.wheelbase_mm)
+                del self.fleet.mirror.taken_over[car]
+                effects += custody.state(self.fleet, car, statement.station, statement.wheelbase_mm)
                 own = self.fleet.site.compartments.get(self.fleet.node_id)
-                self.left = told if own is not None and told.station == own.number else self.left
+                self.left = statement if own is not None and statement.station == own.number else self.left
         for car in [car for car, due_us in self._say_at_us.items() if due_us <= now_us]:
             record = self.fleet.mirror.cars.get(car)
             gone = record is None or record.station == OUTSIDE

@@ -50,7 +50,7 @@ class Numbers(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class TrafficBound:
     """At most ``burst`` frames of ``message`` at once from each machine of ``kinds``, or from all together (``()``)."""
 
     message: str
@@ -90,73 +90,87 @@ def _late(_: Numbers) -> int:
 
 
 _OPERATION = (
-    Row("EmergencyStop", _ALL, _one, _second, "a person presses a button"),
-    Row(
+    TrafficBound("EmergencyStop", _ALL, _one, _second, "a person presses a button"),
+    TrafficBound(
         "TokenRequest",
         _ROBOT,
         lambda n: n.rights,
         lambda n: n.token_repeat_us,
         "each right is asked for again so often",
     ),
-    Row(
+    TrafficBound(
         "TokenRefusal",
         (),
         lambda n: n.robots * n.rights,
         lambda n: n.token_repeat_us,
         "the holder answers each request",
     ),
-    Row("TokenGrant", (), lambda n: 2 * n.robots * n.rights, _second, "all rights of all robots come and go"),
-    Row("TokenHeld", (), lambda n: 2 * n.robots * n.rights, _second, "one for each grant"),
-    Row("BusTime", (), _one, lambda n: n.bus_time_us, "its period; one machine sends it", _late),
-    Row("Heartbeat", _ALL, _one, lambda n: n.heartbeat_us, "its period", _late),
-    Row("Diagnostic", _ALL, _two, lambda n: n.heartbeat_us, "with a heartbeat, for each reason that grew", _late),
+    TrafficBound("TokenGrant", (), lambda n: 2 * n.robots * n.rights, _second, "all rights of all robots come and go"),
+    TrafficBound("TokenHeld", (), lambda n: 2 * n.robots * n.rights, _second, "one for each grant"),
+    TrafficBound("BusTime", (), _one, lambda n: n.bus_time_us, "its period; one machine sends it", _late),
+    TrafficBound("Heartbeat", _ALL, _one, lambda n: n.heartbeat_us, "its period", _late),
+    TrafficBound(
+        "Diagnostic", _ALL, _two, lambda n: n.heartbeat_us, "with a heartbeat, for each reason that grew", _late
+    ),
     *(
         row
         for part in ("Call", "CallTerms", "CallLoad")
         for row in (
-            Row(part, _COMPARTMENT, _one, _window, "a desk has one call open at a time"),
-            Row(part, (), _rides, _window, "all rides of the tasks that desks call for"),
+            TrafficBound(part, _COMPARTMENT, _one, _window, "a desk has one call open at a time"),
+            TrafficBound(part, (), _rides, _window, "all rides of the tasks that desks call for"),
         )
     ),
-    Row("CallParent", (), _rides, _window, "with each ride's call"),
-    Row("Award", _COMPARTMENT, _two, _window, "one for each call, said again once"),
-    Row("Award", (), lambda n: 2 * _rides(n), _window, "one for each ride, said again once"),
-    Row("ManualOrder", (), _one, _second, "a person holds one machine at a time; said again until it answers"),
-    Row("ManualState", (), _two, _second, "it answers, and comes to rest"),
-    Row("Bid", _ROBOT, lambda n: n.compartments, _window, "one for each desk's call"),
-    Row("Bid", (), _rides, _window, "one for each ride called for"),
-    Row("ItineraryHead", _ROBOT, _two, _window, "tentative with a bid, firm with its award, and a delay", _window),
-    Row("ItineraryLeg", _ROBOT, lambda _: _MOST_LEGS, _window, "the most legs, of all these together", _window),
-    Row(
+    TrafficBound("CallParent", (), _rides, _window, "with each ride's call"),
+    TrafficBound("Award", _COMPARTMENT, _two, _window, "one for each call, said again once"),
+    TrafficBound("Award", (), lambda n: 2 * _rides(n), _window, "one for each ride, said again once"),
+    TrafficBound("ManualOrder", (), _one, _second, "a person holds one machine at a time; said again until it answers"),
+    TrafficBound("ManualState", (), _two, _second, "it answers, and comes to rest"),
+    TrafficBound("Bid", _ROBOT, lambda n: n.compartments, _window, "one for each desk's call"),
+    TrafficBound("Bid", (), _rides, _window, "one for each ride called for"),
+    TrafficBound(
+        "ItineraryHead", _ROBOT, _two, _window, "tentative with a bid, firm with its award, and a delay", _window
+    ),
+    TrafficBound(
+        "ItineraryLeg", _ROBOT, lambda _: _MOST_LEGS, _window, "the most legs, of all these together", _window
+    ),
+    TrafficBound(
         "Progress",
         (KindCode.ROBOT, KindCode.LIFT),
         _three,
         lambda _: _SECOND_US // 2,
         "segments at top speed; it stops, is at its place, and the next leg begins",
     ),
-    Row("Blocked", _STEWARDS, _one, _second, "a person says so, and the track's steward says it again, once"),
-    Row("Clear", _STEWARDS, _one, _second, "the same"),
-    Row("Waiting", _ROBOT, _two, _second, "once for each thing waited for"),
-    Row("TaskReport", _ROBOT, _two, _second, "one phase ends and the next begins"),
-    Row("TaskReport", (), _rides, _window, "one for each ride won"),
-    Row("TaskReport", _COMPARTMENT, _two, _second, "as a robot"),
-    Row("CarAt", _ALL, _two, _second, "a car changes hands"),
+    TrafficBound("Blocked", _STEWARDS, _one, _second, "a person says so, and the track's steward says it again, once"),
+    TrafficBound("Clear", _STEWARDS, _one, _second, "the same"),
+    TrafficBound("Waiting", _ROBOT, _two, _second, "once for each thing waited for"),
+    TrafficBound("TaskReport", _ROBOT, _two, _second, "one phase ends and the next begins"),
+    TrafficBound("TaskReport", (), _rides, _window, "one for each ride won"),
+    TrafficBound("TaskReport", _COMPARTMENT, _two, _second, "as a robot"),
+    TrafficBound("CarAt", _ALL, _two, _second, "a car changes hands"),
 )
 
 #: Every machine says all it has to each of the others as it hears of it, which is twice for those that ask all at
 #: first. Nobody holds cars or has plans yet.
 _POWER_UP = (
-    Row("SyncRequest", _ALL, lambda n: n.nodes, lambda n: 5 * n.heartbeat_us, "to all, and to each new peer"),
-    Row("SyncDone", _ALL, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "after all that is said to who asks"),
-    Row("TokenHeld", _ALL, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks"),
-    Row("ItineraryHead", _ROBOT, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks"),
-    Row("ItineraryLeg", _ROBOT, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "an idle robot's one leg"),
-    Row(
+    TrafficBound("SyncRequest", _ALL, lambda n: n.nodes, lambda n: 5 * n.heartbeat_us, "to all, and to each new peer"),
+    TrafficBound(
+        "SyncDone", _ALL, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "after all that is said to who asks"
+    ),
+    TrafficBound("TokenHeld", _ALL, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks"),
+    TrafficBound("ItineraryHead", _ROBOT, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks"),
+    TrafficBound(
+        "ItineraryLeg", _ROBOT, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "an idle robot's one leg"
+    ),
+    TrafficBound(
         "Progress", (KindCode.ROBOT, KindCode.LIFT), lambda n: 2 * n.nodes + 2, lambda n: 5 * n.heartbeat_us, "the same"
     ),
-    Row("BusTime", (), lambda n: 3 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks, by two for a moment"),
-    Row("Heartbeat", _ALL, _two, lambda n: n.heartbeat_us, "at once, when bus time is heard, then its period", _late),
-    Row("Diagnostic", _ALL, _two, lambda n: n.heartbeat_us, "as in operation", _late),
+    TrafficBound(
+        "BusTime", (), lambda n: 3 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks, by two for a moment"
+    ),
+    TrafficBound(
+        "Heartbeat", _ALL, _two, lambda n: n.heartbeat_us, "at once, when bus time is heard, then its period", _late
+    ),
+    TrafficBound("Diagnostic", _ALL, _two, lambda n: n.heartbeat_us, "as in operation", _late),
 )
 
 
@@ -195,7 +209,7 @@ def reasons() -> Iterator[tuple[str, str]]:
     return ((row.message, row.why) for row in _OPERATION)
 
 
-def _streams(site: Site, rows: Iterable[Row]) -> Iterator[Stream]:
+def _streams(site: Site, rows: Iterable[TrafficBound]) -> Iterator[Stream]:
     layouts = {layout.name: layout for layout in fleet_layouts()}
     numbers = numbers_of(site)
     for row in rows:
@@ -204,7 +218,7 @@ def _streams(site: Site, rows: Iterable[Row]) -> Iterator[Stream]:
             yield _stream(row, node, layouts[row.message], numbers)
 
 
-def _stream(row: Row, node: int, layout: MessageLayout, numbers: Numbers) -> Stream:
+def _stream(row: TrafficBound, node: int, layout: MessageLayout, numbers: Numbers) -> Stream:
     # Whoever it is that sends, no node-ID makes the frame longer than the longest.
     ids = range(1, 256) if node == ANYBODY else (node,)
     bits = max(longest_frame_bits(layout.frame_id | one, layout.length) for one in ids)

@@ -60,7 +60,7 @@ class Carriage:
     #: Where the carrier stood by the last word of its sensors, on which track and after which order.
     _stood: tuple[DriveState | None, tuple[int, int], Segment | None] | None = None
     #: Slots behind the goal up to the next refuge, for a way without an agreed order; the robot knows its next legs.
-    way_on: Callable[[], list[Segment]] = list
+    route_ahead: Callable[[], list[Segment]] = list
     #: Whether nothing stands out of the carrier, by its sensors: it gets no order to move else (row P32).
     is_clear: Callable[[], bool] = lambda: True
     whole: AllOrNone = field(init=False)
@@ -339,7 +339,7 @@ class Carriage:
             way.append(self.axis.slot(index))
             if way[-1] in places and len(way) > 1:
                 return tuple(way)
-        return (*way, *self.way_on())
+        return (*way, *self.route_ahead())
 
     def _rest(self, now_us: int) -> list[Effect]:
         self.refresh_at_us = None

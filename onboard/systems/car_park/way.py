@@ -4,13 +4,13 @@ from collections.abc import Iterable
 
 from onboard.contract.codes import LegAction
 from onboard.core.site import Segment
-from onboard.systems.car_park.program import Step
+from onboard.systems.car_park.program import CarStep
 from onboard.ways.lifts import lift_at, platform
 from onboard.ways.refuges import refuges
 from onboard.ways.site import WaySite
 
 
-def way_to_refuge(site: WaySite, steps: Iterable[Step]) -> list[Segment]:
+def way_to_refuge(site: WaySite, steps: Iterable[CarStep]) -> list[Segment]:
     """Slots of ``steps`` in their order up to the first refuge, that included.
 
     A ride is the platform, then the sill beyond and the way onward: whoever boards can leave the platform again.
@@ -26,7 +26,7 @@ def way_to_refuge(site: WaySite, steps: Iterable[Step]) -> list[Segment]:
     return way
 
 
-def _slots(site: WaySite, step: Step) -> list[Segment]:
+def _slots(site: WaySite, step: CarStep) -> list[Segment]:
     if step.action is LegAction.RIDE:
         return [platform(step.track)]
     along = 1 if step.to_index >= step.from_index else -1

@@ -8,8 +8,8 @@ from onboard.contract.messages import Bid, CallForProposals, Reference
 from onboard.systems.cell.fields import from_halves, nodes_of
 from onboard.systems.cell.site import Area, Cell, Point
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Handlers, Rule
 
@@ -29,7 +29,7 @@ class InsideArea(Rule):
         """Robots' words on where they are."""
         return {ArmProgress: self._on_progress}
 
-    def _on_progress(self, event: Event[ArmProgress]) -> None:
+    def _on_progress(self, event: LogEvent[ArmProgress]) -> None:
         word, site = event.message, self.picture.site
         if not isinstance(site, Cell) or word.sender not in site.arms:
             return
@@ -50,7 +50,7 @@ class PassedOn(Rule):
     title = "no part is in two hands"
     source = "rows C04, C12"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._custodian: dict[Reference, int] = {}
         self._before: dict[Reference, set[int]] = {}
@@ -59,7 +59,7 @@ class PassedOn(Rule):
         """Reads what custodians say of parts."""
         return {PartAt: self._on_part}
 
-    def _on_part(self, event: Event[PartAt]) -> None:
+    def _on_part(self, event: LogEvent[PartAt]) -> None:
         word = event.message
         last = self._custodian.get(word.part)
         if last == word.sender:
@@ -80,7 +80,7 @@ class PredecessorsSilent(Rule):
     title = "no robot bids for a sub-goal of what it works on"
     source = "row C12"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._paths: dict[Reference, tuple[int, ...]] = {}
         self._tasks: dict[tuple[int, int], Reference] = {}
@@ -89,14 +89,14 @@ class PredecessorsSilent(Rule):
         """Goals, the calls for them, and bids."""
         return {GoalPath: self._on_path, CallForProposals: self._on_call, Bid: self._on_bid}
 
-    def _on_path(self, event: Event[GoalPath]) -> None:
+    def _on_path(self, event: LogEvent[GoalPath]) -> None:
         word = event.message
         self._paths[Reference(word.sender, word.goal)] = nodes_of(word)
 
-    def _on_call(self, event: Event[CallForProposals]) -> None:
+    def _on_call(self, event: LogEvent[CallForProposals]) -> None:
         self._tasks[event.message.sender, event.message.call] = event.message.task
 
-    def _on_bid(self, event: Event[Bid]) -> None:
+    def _on_bid(self, event: LogEvent[Bid]) -> None:
         bid = event.message
         task = self._tasks.get((bid.initiator, bid.call))
         if task is not None and bid.sender in self._paths.get(task, ()):
@@ -106,7 +106,7 @@ class PredecessorsSilent(Rule):
 class OffersGoDown(BidsGoDown):
     """As everywhere; a bid that is not what its offer costs does not count."""
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._high: dict[tuple[int, Reference], int] = {}
         self._costs: dict[tuple[int, Reference], float] = {}
@@ -115,11 +115,11 @@ class OffersGoDown(BidsGoDown):
         """Reads offers beside what bids need."""
         return {**super().handlers(), OfferHigh: self._on_high, OfferLow: self._on_low}
 
-    def _on_high(self, event: Event[OfferHigh]) -> None:
+    def _on_high(self, event: LogEvent[OfferHigh]) -> None:
         word = event.message
         self._high[word.sender, Reference(word.manager, word.goal)] = word.bits
 
-    def _on_low(self, event: Event[OfferLow]) -> None:
+    def _on_low(self, event: LogEvent[OfferLow]) -> None:
         word = event.message
         offer = word.sender, Reference(word.manager, word.goal)
         self._costs[offer] = from_halves(self._high.get(offer, 0), word.bits)

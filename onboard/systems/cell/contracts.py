@@ -95,7 +95,7 @@ def filtered(goal: Goal, arm: Arm) -> Filter | None:
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class ArmMove:
     """What one robot would do: come along ``approach`` to take the part, bring it along ``carry`` and put it down."""
 
     approach: tuple[Point, ...]
@@ -117,7 +117,7 @@ class Contract:
 
     goal: Goal
     node: int
-    move: Move
+    move: ArmMove
     own_cost: float
     cost: float
     nodes: tuple[int, ...]
@@ -125,7 +125,7 @@ class Contract:
 
 def moves(
     goal: Goal, arm: Arm, position: Point, obstacles: tuple[Area, ...], rules: tuple[OfferRule, ...] = OFFERS
-) -> tuple[Move, ...]:
+) -> tuple[ArmMove, ...]:
     """What a robot standing at ``position`` can do for a goal: all of it, else up to three parts of it (row C06).
 
     One move that ends at the goal where the robot reaches it; else one for each offer; empty where it can do nothing.
@@ -137,9 +137,9 @@ def moves(
         return ()
     whole = shortest_way(goal.start, goal.end, arm.area, obstacles)
     if whole is not None:
-        return (Move(approach, whole),)
+        return (ArmMove(approach, whole),)
     ways = (
         shortest_way(goal.start, via, arm.area, obstacles)
         for via in via_points(arm.area, goal.start, goal.end, obstacles, rules)
     )
-    return tuple(Move(approach, way) for way in ways if way is not None)
+    return tuple(ArmMove(approach, way) for way in ways if way is not None)

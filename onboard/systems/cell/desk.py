@@ -17,13 +17,13 @@ from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.effects import Effect, Send
 from onboard.core.journal_records import records_in
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import CallTerms, Estimator
+from onboard.core.negotiation import Estimator, RequestedTerms
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Site
 from onboard.systems.cell.contracts import Goal, part_token
 from onboard.systems.cell.generation import call_terms
 from onboard.systems.cell.geometry import Point
-from onboard.systems.cell.goal_frames import Hearsay
+from onboard.systems.cell.goal_frames import GoalsHeard
 from onboard.systems.cell.records import GoalOrderRecord, GoalStateRecord
 from onboard.work.order_desk import OrderDesk
 from onboard.work.order_life import OrderState, WorkOrder
@@ -31,7 +31,7 @@ from onboard.work.plain import NoEstimator
 
 
 @dataclass
-class Order(WorkOrder):
+class GoalOrder(WorkOrder):
     """An order and its goal; the winner is its main contractor."""
 
     goal: Goal
@@ -39,7 +39,7 @@ class Order(WorkOrder):
 
 
 @dataclass(frozen=True)
-class DeskFactory(BehaviourFactory):
+class GoalManagerFactory(BehaviourFactory):
     """Makes goal managers."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
@@ -52,7 +52,7 @@ class DeskFactory(BehaviourFactory):
 
 
 @dataclass
-class GoalManager(OrderDesk[Order]):
+class GoalManager(OrderDesk[GoalOrder]):
     """One desk of a cell."""
 
     #: A main contractor is asked how it stands this often, us: a lost last word costs this long and no more.
@@ -62,12 +62,12 @@ class GoalManager(OrderDesk[Order]):
     max_calls: ClassVar[int] = 3
     takers = KindCode.ARM
 
-    hearsay: Hearsay = field(default_factory=Hearsay)
+    goals_heard: GoalsHeard = field(default_factory=GoalsHeard)
     _half_told: dict[int, OrderFrom] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.fleet.negotiation.is_sound = self.hearsay.is_sound
+        self.fleet.negotiation.is_sound = self.goals_heard.is_sound
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """Orders at the counter; one that was heard before is only answered."""
@@ -80,7 +80,7 @@ class GoalManager(OrderDesk[Order]):
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Offers, and main contractors' reports."""
-        self.hearsay.hear(message)
+        self.goals_heard.hear(message)
         if isinstance(message, CallForProposals):
             # Who looks for somebody for the rest of a goal does all that it can.
             self.fleet.winners.works(message.sender, message.call, now_us)
@@ -117,38 +117,38 @@ class GoalManager(OrderDesk[Order]):
             return []
         limit_ms = to_bus_ms(now_us + wanted.within_ms * 1000) if wanted.within_ms else 0
         start, end = Point(begin.x_mm, begin.y_mm), Point(wanted.x_mm, wanted.y_mm)
-        order = Order(task, Goal(task, task, start, end, (), limit_ms))
+        order = GoalOrder(task, Goal(task, task, start, end, (), limit_ms))
         return [*self.come_in(order, now_us), Send(PartAt(self.fleet.node_id, task, *start, False))]
 
     # --- the OrderDesk -----------------------------------------------------------------------------------------
 
-    def terms(self, order: Order) -> CallTerms:
+    def terms(self, order: GoalOrder) -> RequestedTerms:
         """A call to robots."""
         return call_terms(order.goal)
 
-    def may_take_back(self, order: Order) -> bool:
+    def may_take_back(self, order: GoalOrder) -> bool:
         """While the part has never left my custody; one that has come back lies where it was wanted."""
         key = part_token(order.goal.part)
         return self.fleet.tokens.holds(key) and key not in self.fleet.tokens.given
 
-    def may_be_given_back(self, order: Order) -> bool:
+    def may_be_given_back(self, order: GoalOrder) -> bool:
         """As it may be taken back: what is between the main contractor and its sub-contractors is theirs (C18)."""
         return self.may_take_back(order)
 
-    def in_turn(self) -> Iterable[Order]:
+    def in_turn(self) -> Iterable[GoalOrder]:
         """In the order of their deadlines (row C15)."""
         return sorted(self.orders.values(), key=lambda one: one.goal.urgency)
 
-    def note_price(self, order: Order) -> None:
+    def note_price(self, order: GoalOrder) -> None:
         """As the main contractor offered."""
-        offer = self.hearsay.offer(order.winner, order.goal.task)
+        offer = self.goals_heard.offer(order.winner, order.goal.task)
         order.cost = offer.cost if offer is not None else 0.0
 
-    def state_record(self, order: Order) -> GoalStateRecord:
+    def state_record(self, order: GoalOrder) -> GoalStateRecord:
         """With the contract's cost."""
         return GoalStateRecord(order.task.number, order.state, order.winner, order.cost)
 
-    def order_record(self, order: Order) -> GoalOrderRecord:
+    def order_record(self, order: GoalOrder) -> GoalOrderRecord:
         """Where a part is wanted."""
         goal = order.goal
         return GoalOrderRecord(order.task.number, goal.time_limit_ms, *goal.start, *goal.end)
@@ -160,13 +160,13 @@ class GoalManager(OrderDesk[Order]):
                 case GoalOrderRecord():
                     task = Reference(self.fleet.node_id, record.number)
                     start, end = Point(record.from_x, record.from_y), Point(record.to_x, record.to_y)
-                    self.orders[task] = Order(task, Goal(task, task, start, end, (), record.limit))
+                    self.orders[task] = GoalOrder(task, Goal(task, task, start, end, (), record.limit))
                 case GoalStateRecord():
                     order = self.orders[Reference(self.fleet.node_id, record.number)]
                     order.winner, order.cost = record.winner, record.cost
                     self.take_up(order, record.state)
 
-    def answer(self, order: Order) -> Message:
+    def answer(self, order: GoalOrder) -> Message:
         """With the cost."""
-        number, result = order.task.number, OrderResult[order.told]
+        number, result = order.task.number, OrderResult[order.result_name]
         return OrderAnswer(self.fleet.node_id, number, result, round(1000 * order.cost))

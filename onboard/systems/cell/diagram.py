@@ -3,7 +3,7 @@
 from onboard.contract.cell import ArmPhase, ArmProgress, PartAt
 from onboard.contract.messages import Message, Reference
 from onboard.systems.cell.site import Cell
-from onboard.trace.chart.over_time import Bar, Line, Panel, Rows
+from onboard.trace.chart.over_time import Bar, Panel, PanelLine, Rows
 
 #: What is shown as a bar, and how dark.
 _OPACITY = {
@@ -61,7 +61,7 @@ class CellDiagram(Rows):
         """What goes on ends with the log."""
         for node in list(self._phases):
             self._on_phase(node, ArmPhase.IDLE, time_us)
-        self._panel.lines += [Line(0, points, width=1.2) for points in self._parts.values()]
+        self._panel.lines += [PanelLine(0, points, width=1.2) for points in self._parts.values()]
 
 
 DIAGRAM = CellDiagram

@@ -6,13 +6,13 @@ from itertools import chain
 from onboard.contract.codes import Criterion, KindCode, Operation
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import CallForProposals, Reference
-from onboard.core.negotiation import Answer, CallKey, CallTerms, Needs, Proposal
+from onboard.core.negotiation import CallKey, NeededAnswers, Proposal, RequestedTerms, SubCallAnswer
 from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Machine
-from onboard.systems.cell.contracts import Arm, Contract, Goal, Move, filtered, moves
+from onboard.systems.cell.contracts import Arm, ArmMove, Contract, Goal, filtered, moves
 from onboard.systems.cell.fields import MAX_PATH
 from onboard.systems.cell.geometry import Point, distance_m, shortest_way, way_length_m
-from onboard.systems.cell.goal_frames import Hearsay, cost_of_bid, goal_messages, offer_messages
+from onboard.systems.cell.goal_frames import GoalsHeard, cost_of_bid, goal_messages, offer_messages
 from onboard.systems.cell.site import Cell
 
 #: Sub-goals remembered, so that one and the same part of a goal keeps its name when it is looked at again.
@@ -31,7 +31,7 @@ class ArmGeneration:
     machine: Machine
     position: Point
     number: int = 0
-    hearsay: Hearsay = field(default_factory=Hearsay)
+    goals_heard: GoalsHeard = field(default_factory=GoalsHeard)
     engaged: dict[Reference, Contract] = field(default_factory=dict)
     promised: dict[CallKey, Contract] = field(default_factory=dict)
     #: Goals that it has in hand or has carried out: not to be bid for again.
@@ -50,7 +50,7 @@ class ArmGeneration:
 
     def floor(self, call: CallForProposals, now_us: int) -> int:
         """The way from start to end for the least unit cost of all; 0 where the goal's frames were lost."""
-        goal = self.hearsay.goal(call)
+        goal = self.goals_heard.goal(call)
         return 0 if goal is None else self._least(goal)
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
@@ -69,7 +69,7 @@ class ArmGeneration:
         own = 0.0 if self._others(goal) else self.arm.unit_cost * way_length_m(found[0].approach)
         return _mm(own) + self._least(goal)
 
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | Needs | None:
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
         """A bid where the robot reaches the goal, else the sub-goals of up to three offers; None to decline."""
         goal = self._goal(call)
         if goal is None:
@@ -91,7 +91,7 @@ class ArmGeneration:
         )
         least = min(_mm(self._own_cost(goal, move)) + self._least_from(move.via, goal.end) for move in found)
         by_task = dict(zip((terms.task for terms in parts), found, strict=True))
-        return Needs(least, parts, lambda answers, _: self._combine(goal, by_task, answers))
+        return NeededAnswers(least, parts, lambda answers, _: self._combine(goal, by_task, answers))
 
     # --- sub-goals ---------------------------------------------------------------------------------------------
 
@@ -104,12 +104,14 @@ class ArmGeneration:
             self.number = self._names[name] = successor(self.number, 16)
         return goal.part_of(self.machine.node_id, self._names[name], via)
 
-    def _combine(self, goal: Goal, by_task: dict[Reference, Move], answers: tuple[Answer, ...]) -> Proposal | None:
+    def _combine(
+        self, goal: Goal, by_task: dict[Reference, ArmMove], answers: tuple[SubCallAnswer, ...]
+    ) -> Proposal | None:
         """The offer whose part and sub-contract cost least together; None where no sub-goal found anybody (C06)."""
         best: tuple[Contract, int] | None = None
         for answer in answers:
             move = by_task.get(answer.terms.task)
-            offer = self.hearsay.offer(answer.winner, answer.terms.task) if answer.winner else None
+            offer = self.goals_heard.offer(answer.winner, answer.terms.task) if answer.winner else None
             if move is None or offer is None:
                 continue
             own = self._own_cost(goal, move)
@@ -121,7 +123,7 @@ class ArmGeneration:
 
     # --- costs -------------------------------------------------------------------------------------------------
 
-    def _own_cost(self, goal: Goal, move: Move) -> float:
+    def _own_cost(self, goal: Goal, move: ArmMove) -> float:
         """What a goal adds to the robot's way, with all else that it has won or offered done in the order of C15.
 
         For an idle robot it is the paper's C_j L_j. Offers for other sub-goals of one part exclude each other.
@@ -132,12 +134,12 @@ class ArmGeneration:
         with_it = sorted([*others, (goal, move)], key=lambda one: one[0].urgency)
         return self.arm.unit_cost * (self._tour_m(with_it) - self._tour_m(others))
 
-    def _others(self, goal: Goal) -> list[tuple[Goal, Move]]:
+    def _others(self, goal: Goal) -> list[tuple[Goal, ArmMove]]:
         every = chain(self.engaged.values(), self.promised.values())
         found = {one.goal.part: (one.goal, one.move) for one in every if one.goal.part != goal.part}
         return sorted(found.values(), key=lambda one: one[0].urgency)
 
-    def _tour_m(self, stops: list[tuple[Goal, Move]]) -> float:
+    def _tour_m(self, stops: list[tuple[Goal, ArmMove]]) -> float:
         here, length_m = self.position, 0.0
         for goal, move in stops:
             way = shortest_way(here, goal.start, self.arm.area, self.site.obstacles)
@@ -145,10 +147,10 @@ class ArmGeneration:
             here = move.via
         return length_m
 
-    def _moves(self, goal: Goal) -> tuple[Move, ...]:
+    def _moves(self, goal: Goal) -> tuple[ArmMove, ...]:
         return moves(goal, self.arm, self.position, self.site.obstacles)
 
-    def _put_down_us(self, call: CallForProposals, goal: Goal, move: Move, now_us: int) -> int:
+    def _put_down_us(self, call: CallForProposals, goal: Goal, move: ArmMove, now_us: int) -> int:
         """When the part would be put down (bus us), everything more urgent done before (rows C14, C15)."""
         begin_us = from_bus_ms(call.deadline_ms, now_us)
         before = [one for one in self._others(goal) if one[0].urgency < goal.urgency]
@@ -172,12 +174,12 @@ class ArmGeneration:
             return None
         if call.task in self.known:
             return None
-        return self.hearsay.goal(call)
+        return self.goals_heard.goal(call)
 
 
-def call_terms(goal: Goal) -> CallTerms:
+def call_terms(goal: Goal) -> RequestedTerms:
     """What a call for a goal asks for; its places and path go ahead in frames of their own."""
-    return CallTerms(
+    return RequestedTerms(
         goal.task,
         Operation.REACH,
         KindCode.ARM,

@@ -65,7 +65,7 @@ def contract_messages(contract: Contract) -> tuple[Message, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Offer:
+class ReceivedOffer:
     """An offer as its frames tell it."""
 
     cost: float
@@ -73,7 +73,7 @@ class Offer:
 
 
 @dataclass
-class Hearsay:
+class GoalsHeard:
     """What one machine has heard of others' goals (by task) and offers (by bidder and task). Whole sets only count."""
 
     _goals: dict[Reference, dict[type[Message], GoalMessage]] = field(default_factory=dict)
@@ -106,7 +106,7 @@ class Hearsay:
         places = Point(start.x_mm, start.y_mm), Point(end.x_mm, end.y_mm)
         return Goal(call.task, call.car, *places, nodes, terms.time_limit_ms)
 
-    def offer(self, bidder: int, task: Reference) -> Offer | None:
+    def offer(self, bidder: int, task: Reference) -> ReceivedOffer | None:
         """A bidder's offer for a goal; None where frames of it are missing, or it names no cost of 0 or more."""
         frames = self._offers.get((bidder, task), {})
         high, low, nodes = (frames.get(kind) for kind in (OfferHigh, OfferLow, OfferNodes))
@@ -114,7 +114,7 @@ class Hearsay:
             return None
         cost = from_halves(high.bits, low.bits)
         # Not a number, and infinite, are no costs either.
-        return Offer(cost, nodes_of(nodes)) if 0 <= cost < float("inf") else None
+        return ReceivedOffer(cost, nodes_of(nodes)) if 0 <= cost < float("inf") else None
 
     def is_sound(self, task: Reference, bid: Bid) -> bool:
         """Whether a bid is what its offer costs: one without its offer could not be a part of another's."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from onboard.contract.messages import Reference
 from onboard.core.effects import Record
 from onboard.core.journal_records import Entry, records_in
-from onboard.systems.cell.contracts import Contract, Goal, Move
+from onboard.systems.cell.contracts import ArmMove, Contract, Goal
 from onboard.systems.cell.geometry import Point
-from onboard.systems.cell.records import ContractLostRecord, ContractRecord, Stage, StageRecord
+from onboard.systems.cell.records import ContractLostRecord, ContractRecord, ContractStage, StageRecord
 
 
 @dataclass
@@ -21,7 +21,7 @@ class Undertaking:
     contract: Contract
     manager: int
     sub_goal: Goal | None
-    stage: Stage = Stage.WON
+    stage: ContractStage = ContractStage.WON
     successor: int = 0
     was_heard: bool = False
 
@@ -81,7 +81,7 @@ def undertakings(entries: Iterable[Entry]) -> dict[Reference, Undertaking]:
 def _undertaking(record: ContractRecord) -> Undertaking:
     (start,), (end,) = _points(record.start), _points(record.end)
     goal = Goal(record.task, record.part, start, end, record.path, record.limit)
-    move = Move(_points(record.approach), _points(record.carry))
+    move = ArmMove(_points(record.approach), _points(record.carry))
     contract = Contract(goal, record.node, move, record.own, record.cost, record.nodes)
     return Undertaking(
         contract,

@@ -27,7 +27,7 @@ def _shrunk(area: Area) -> Area:
 
 
 @dataclass
-class Driver:
+class ArmDriver:
     """One robot's drive. ``state`` is what its sensor said last; None before it has said anything."""
 
     motion: MotionAuthority

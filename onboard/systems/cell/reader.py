@@ -3,21 +3,21 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from onboard.config.fleet import Fleet
-from onboard.config.reader import Common, Table
+from onboard.config.fleet import FleetReader
+from onboard.config.reader import Common, TomlTable
 from onboard.config.timing import read_timing
 from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
-from onboard.systems.cell.site import MAX_COORDINATE_MM, Area, Arm, Cell, Point, Wish
+from onboard.systems.cell.site import MAX_COORDINATE_MM, Area, Arm, Cell, GoalDemand, Point
 
 _NOWHERE = Segment(0, 0)
 #: A call for a goal holds calls within calls, each half of what is left: four levels need this long.
 CALL_WINDOW_MS = 3_000
 
 
-def read(root: Table, common: Common) -> Cell:
+def read(root: TomlTable, common: Common) -> Cell:
     """Robots with their areas, goal managers, obstacles, and the goals that a run of the site brings."""
-    fleet = Fleet()
+    fleet = FleetReader()
     arms: dict[int, Arm] = {}
     obstacles = tuple(
         area
@@ -31,7 +31,7 @@ def read(root: Table, common: Common) -> Cell:
     for name, words in (("robots", "robot"), ("desks", "goal manager")):
         if not root.values.get(name):
             root.bad(name, None, f"no {words}", f"add at least one [[{name}]] table")
-    wishes = tuple(wish for table in root.tables("goals") if (wish := _wish(table, arms, obstacles)) is not None)
+    goals = tuple(goal for table in root.tables("goals") if (goal := _goal_demand(table, arms, obstacles)) is not None)
     timing_table = root.table("timing")
     timing_table.values.setdefault("call_window_ms", CALL_WINDOW_MS)
     timing = read_timing(timing_table, max(1, len(arms)), len(fleet.by_node), common.bitrate)
@@ -43,11 +43,11 @@ def read(root: Table, common: Common) -> Cell:
         timing=replace(timing, sub_call_percent=root.table("negotiation").integer("sub_call_percent", 20, 80, 50)),
         arms=arms,
         obstacles=obstacles,
-        wishes=wishes,
+        goals=goals,
     )
 
 
-def _read_robot(table: Table, fleet: Fleet, arms: dict[int, Arm], obstacles: Sequence[Area]) -> None:
+def _read_robot(table: TomlTable, fleet: FleetReader, arms: dict[int, Arm], obstacles: Sequence[Area]) -> None:
     area, home = _area(table, "area_mm"), _point(table, "home_mm")
     unit_cost = table.number("unit_cost", 0.001, 1_000, 1.0)
     speed_mm_s = table.integer("speed_mm_s", 10, 10_000, 1_000)
@@ -63,7 +63,7 @@ def _read_robot(table: Table, fleet: Fleet, arms: dict[int, Arm], obstacles: Seq
         arms[node] = Arm(node, table.values["name"], area, home, unit_cost, speed_mm_s)
 
 
-def _wish(table: Table, arms: dict[int, Arm], obstacles: Sequence[Area]) -> Wish | None:
+def _goal_demand(table: TomlTable, arms: dict[int, Arm], obstacles: Sequence[Area]) -> GoalDemand | None:
     start, end = _point(table, "from_mm"), _point(table, "to_mm")
     at_ms, within_s = table.integer("at_s", 0, 86_400, 0) * 1000, table.integer("within_s", 0, 2_550, 0)
     if within_s % 10:
@@ -77,15 +77,15 @@ def _wish(table: Table, arms: dict[int, Arm], obstacles: Sequence[Area]) -> Wish
             table.bad(name, list(place), "inside an obstacle", "write a place that a robot can reach")
         elif not any(arm.area.contains(place) for arm in arms.values()):
             table.bad(name, list(place), "in no robot's area", "write a place that a robot can reach")
-    return Wish(at_ms, start, end, within_s * 1000)
+    return GoalDemand(at_ms, start, end, within_s * 1000)
 
 
-def _point(table: Table, name: str) -> Point | None:
+def _point(table: TomlTable, name: str) -> Point | None:
     numbers = _numbers(table, name, 2, "[x, y]")
     return Point(*numbers) if numbers is not None else None
 
 
-def _area(table: Table, name: str) -> Area | None:
+def _area(table: TomlTable, name: str) -> Area | None:
     numbers = _numbers(table, name, 4, "[x0, y0, x1, y1]")
     if numbers is None:
         return None
@@ -96,7 +96,7 @@ def _area(table: Table, name: str) -> Area | None:
     return area
 
 
-def _numbers(table: Table, name: str, count: int, form: str) -> list[int] | None:
+def _numbers(table: TomlTable, name: str, count: int, form: str) -> list[int] | None:
     """``count`` whole numbers of mm, each within the largest coordinate; None where there is a mistake."""
     values = table.items(name, form)
     words = f"write {form}, {count} whole numbers of mm from {-MAX_COORDINATE_MM} to {MAX_COORDINATE_MM}"

@@ -4,11 +4,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from onboard.contract.messages import Reference
-from onboard.core.journal_records import MOST_OVER, End, JournalRecord, Keep, RecordTypes, Which, stored_as
+from onboard.core.journal_records import MOST_OVER, JournalRecord, Keep, RecordEnd, RecordTypes, Which, stored_as
 from onboard.work.order_records import OrderRecord, OrderStateRecord
 
 
-class Stage(Enum):
+class ContractStage(Enum):
     """How far a contract is, each a point from which a robot that starts again can go on."""
 
     WON = "the part is not taken"
@@ -46,11 +46,11 @@ class StageRecord(JournalRecord):
     NAME = "stage"
     RULES = (
         Keep("stage", ("task",)),
-        End(("contract", "stage"), ("task",), ("stage", (Stage.OVER,)), MOST_OVER),
+        RecordEnd(("contract", "stage"), ("task",), ("stage", (ContractStage.OVER,)), MOST_OVER),
     )
 
     task: Reference = field(metadata=stored_as("origin", "number"))
-    stage: Stage
+    stage: ContractStage
     next: int
 
 
@@ -59,7 +59,7 @@ class ContractLostRecord(JournalRecord):
     """Another has the contract now, and this robot forgets it."""
 
     NAME = "contract_lost"
-    RULES = (End(("contract", "stage"), ("task",)),)
+    RULES = (RecordEnd(("contract", "stage"), ("task",)),)
 
     task: Reference = field(metadata=stored_as("origin", "number"))
 

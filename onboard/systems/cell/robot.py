@@ -25,8 +25,8 @@ from onboard.systems.cell.generation import ArmGeneration, call_terms
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.goal_frames import contract_messages
 from onboard.systems.cell.memory import Undertaking, lost_record, stage_record, undertakings, won_record
-from onboard.systems.cell.motion import Driver
-from onboard.systems.cell.records import Stage
+from onboard.systems.cell.motion import ArmDriver
+from onboard.systems.cell.records import ContractStage
 from onboard.systems.cell.site import Cell
 from onboard.work.device_link import DeviceLink
 from onboard.work.undertaking import TaskEvent, Undertakings
@@ -69,7 +69,7 @@ class ArmRobot:
     active: Reference | None = None
     phase: ArmPhase = ArmPhase.IDLE
     grip: GripState | None = None
-    driver: Driver = field(init=False)
+    driver: ArmDriver = field(init=False)
     gripper: DeviceLink[tuple[GripAction, Reference]] = field(init=False)
     _call_at_us: dict[Reference, int] = field(default_factory=dict)
     _ask_at_us: dict[Reference, int] = field(default_factory=dict)
@@ -81,21 +81,21 @@ class ArmRobot:
 
     def __post_init__(self) -> None:
         site = self.generation.site
-        self.driver = Driver(self.fleet.motion, self.generation.arm, site.obstacles, site.timing.drive_refresh_us)
-        self.fleet.negotiation.is_sound = self.generation.hearsay.is_sound
+        self.driver = ArmDriver(self.fleet.motion, self.generation.arm, site.obstacles, site.timing.drive_refresh_us)
+        self.fleet.negotiation.is_sound = self.generation.goals_heard.is_sound
         # Names of goals of an earlier life may still be about.
         self.generation.number = last_boot(self.fleet.entries) << 8
         me = self.fleet.node_id
         self.gripper = DeviceLink(lambda sequence, order: GripOrder(me, sequence, *order), GRIP_AGAIN_US)
         self.tasks = Undertakings(
             self.fleet,
-            is_begun=lambda one: one.stage is not Stage.WON or self.fleet.tokens.holds(_part_token(one)),
+            is_begun=lambda one: one.stage is not ContractStage.WON or self.fleet.tokens.holds(_part_token(one)),
             may_give=lambda one, node: node == one.manager,
             lose=self._lose,
             changed=self._engage,
         )
         for one in undertakings(self.fleet.entries).values():
-            if one.stage is Stage.OVER:
+            if one.stage is ContractStage.OVER:
                 self.tasks.remember(one.task)
             else:
                 self.tasks.in_hand[one.task] = one
@@ -146,7 +146,7 @@ class ArmRobot:
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Goals and offers; sub-contractors' reports; calls and awards for what is in hand already."""
-        self.generation.hearsay.hear(message)
+        self.generation.goals_heard.hear(message)
         match message:
             case TaskReport():
                 return self._on_report(message, now_us)
@@ -173,7 +173,7 @@ class ArmRobot:
         if key.kind is not TokenKind.CAR:
             return Reason.NOT_AUTHORISED
         one = self._undertaking_of(Reference(key.number >> 16, key.number & 0xFFFF))
-        if one is None or one.stage is not Stage.PUT or one.successor != requester:
+        if one is None or one.stage is not ContractStage.PUT or one.successor != requester:
             return Reason.TOKEN_NOT_GRANTABLE_YET
         return Reason.NONE
 
@@ -219,7 +219,7 @@ class ArmRobot:
         return [won_record(one), self.tasks.report(one.task), *said]
 
     def _engage(self) -> None:
-        waiting = (one for one in self.tasks.in_hand.values() if one.stage in (Stage.WON, Stage.TAKEN))
+        waiting = (one for one in self.tasks.in_hand.values() if one.stage in (ContractStage.WON, ContractStage.TAKEN))
         self.generation.engaged = {one.task: one.contract for one in waiting}
         self.generation.known = {*self.tasks.in_hand, *self.tasks.over}
 
@@ -259,7 +259,7 @@ class ArmRobot:
             is_claim = report.phase is TaskPhase.AWARDED
             return self.fleet.winners.remind(report.task, report.sender) if is_claim else []
         self._ask_at_us.pop(one.task, None)
-        if report.phase is TaskPhase.DONE and report.sender == one.successor and one.stage is Stage.PUT:
+        if report.phase is TaskPhase.DONE and report.sender == one.successor and one.stage is ContractStage.PUT:
             return [*effects, *self._achieve(one)]
         return effects
 
@@ -281,7 +281,7 @@ class ArmRobot:
         """A call of mine is over: for an option that rests on no contract nothing follows."""
         task = event.call.task
         one = self._of_rest(task)
-        if one is None or one.stage is Stage.OVER:
+        if one is None or one.stage is ContractStage.OVER:
             return []
         if event.winner:
             one.successor, one.was_heard = event.winner, True
@@ -295,7 +295,7 @@ class ArmRobot:
         return [stage_record(one)]
 
     def _achieve(self, one: Undertaking) -> list[Effect]:
-        one.stage = Stage.OVER
+        one.stage = ContractStage.OVER
         self.tasks.meet(one.task, TaskEvent.END)
         self._forget_rest(one)
         # The manager is told of completion and of nothing before (row C18).
@@ -315,10 +315,10 @@ class ArmRobot:
                 effects += self.fleet.negotiation.open(call_terms(one.sub_goal), now_us)
         for task, one in list(self.tasks.in_hand.items()):
             effects += self._take_back(one, now_us)
-            if one.stage is Stage.PUT and one.sub_goal is None:
+            if one.stage is ContractStage.PUT and one.sub_goal is None:
                 # The controller stopped between putting the part down and saying so.
                 effects += self._achieve(one)
-            if one.stage is not Stage.PUT or not one.successor:
+            if one.stage is not ContractStage.PUT or not one.successor:
                 self._ask_at_us.pop(task, None)
                 continue
             due_us = self._ask_at_us.setdefault(task, now_us + ASK_AGAIN_US)
@@ -333,11 +333,11 @@ class ArmRobot:
             return []
         reason = self.fleet.winners.lost(one.sub_goal.task, now_us)
         # Before the part lies where it is to be taken it has nothing to do but to wait.
-        if reason is Reason.NONE or (reason is Reason.FALSE_STATEMENT and one.stage is not Stage.PUT):
+        if reason is Reason.NONE or (reason is Reason.FALSE_STATEMENT and one.stage is not ContractStage.PUT):
             return []
         one.successor, one.was_heard = 0, False
         self._call_at_us[one.task] = now_us + CALL_AGAIN_US
-        if one.stage is not Stage.WON:
+        if one.stage is not ContractStage.WON:
             self.fleet.winners.blame(one.sub_goal.task, now_us)
         return [*self.fleet.winners.take_back(one.sub_goal.task, reason, now_us), stage_record(one)]
 
@@ -346,7 +346,7 @@ class ArmRobot:
     def _want_parts(self, now_us: int) -> list[Effect]:
         effects: list[Effect] = []
         for one in self.tasks.in_hand.values():
-            if one.stage is Stage.WON:
+            if one.stage is ContractStage.WON:
                 effects += self.fleet.tokens.want(_part_token(one), now_us)
         return effects
 
@@ -367,10 +367,10 @@ class ArmRobot:
         """Where the parts in my custody are."""
         tokens = self.fleet.tokens
         mine = (one for one in self.tasks.in_hand.values() if tokens.holds(_part_token(one)))
-        return [self._part_at(one) for one in mine if one.stage in (Stage.TAKEN, Stage.PUT)]
+        return [self._part_at(one) for one in mine if one.stage in (ContractStage.TAKEN, ContractStage.PUT)]
 
     def _part_at(self, one: Undertaking) -> Send:
-        aboard = one.stage is Stage.TAKEN
+        aboard = one.stage is ContractStage.TAKEN
         place = one.contract.goal.start if aboard else one.contract.move.via
         return Send(PartAt(self.fleet.node_id, one.contract.goal.part, place.x_mm, place.y_mm, aboard))
 
@@ -381,18 +381,18 @@ class ArmRobot:
         ready = [
             one
             for one in self.tasks.in_hand.values()
-            if one.stage in (Stage.WON, Stage.TAKEN) and self.fleet.tokens.holds(_part_token(one))
+            if one.stage in (ContractStage.WON, ContractStage.TAKEN) and self.fleet.tokens.holds(_part_token(one))
         ]
         if not ready:
             return self._to(ArmPhase.WAITING if self.tasks.in_hand else ArmPhase.IDLE, now_us)
-        one = min(ready, key=lambda one: (one.stage is not Stage.TAKEN, one.contract.goal.urgency))
+        one = min(ready, key=lambda one: (one.stage is not ContractStage.TAKEN, one.contract.goal.urgency))
         self.active = one.task
-        return self._to(ArmPhase.TO_PART if one.stage is Stage.WON else ArmPhase.TAKING, now_us)
+        return self._to(ArmPhase.TO_PART if one.stage is ContractStage.WON else ArmPhase.TAKING, now_us)
 
     def _when_going_there(self, one: Undertaking, now_us: int) -> list[Effect]:
         if not self.driver.stands_at(one.contract.goal.start):
             return self.driver.go(one.contract.goal.start, part_token(one.contract.goal.part), now_us)
-        one.stage = Stage.TAKEN
+        one.stage = ContractStage.TAKEN
         self._engage()
         return [*self.driver.rest(), stage_record(one), *self._to(ArmPhase.TAKING, now_us)]
 
@@ -428,7 +428,7 @@ class ArmRobot:
         return self.grip is not None and self.grip.grip_mode is GripMode.OPEN and self.gripper.wanted is None
 
     def _put(self, one: Undertaking, now_us: int) -> list[Effect]:
-        one.stage = Stage.PUT
+        one.stage = ContractStage.PUT
         self.active = None
         if one.sub_goal is not None and one.successor and one.was_heard:
             self.fleet.winners.takes(one.sub_goal.task, one.successor, now_us)

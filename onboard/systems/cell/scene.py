@@ -21,7 +21,7 @@ _MOVING = (ArmPhase.TO_PART, ArmPhase.CARRYING)
 
 
 @dataclass
-class _Robot:
+class _SeenArm:
     """One robot's last two words on where it is, in mm and us."""
 
     at: Spot
@@ -43,7 +43,7 @@ class CellScene:
         span_mm = max(one.x1_mm for one in areas) - self._x0
         self._scale = (WIDTH - 2 * MARGIN) / max(1, span_mm)
         self._height = 2 * MARGIN + (self._y1 - min(one.y0_mm for one in areas)) * self._scale
-        self._robots = {node: _Robot((float(arm.home.x_mm), float(arm.home.y_mm))) for node, arm in site.arms.items()}
+        self._robots = {node: _SeenArm((float(arm.home.x_mm), float(arm.home.y_mm))) for node, arm in site.arms.items()}
         self._starts: OrderedDict[tuple[int, int], Spot] = OrderedDict()
         self._ends: OrderedDict[tuple[int, int], Spot] = OrderedDict()
         #: What each robot has undertaken: from where, and to where it brings the part, by goal.

@@ -6,19 +6,19 @@ from functools import cached_property
 from typing import ClassVar
 
 from onboard.contract.codes import KindCode
-from onboard.core.site import Needs, Site
+from onboard.core.site import MotionNeeds, Site
 from onboard.systems.cell.contracts import Arm
 from onboard.systems.cell.geometry import Area, Point
 from onboard.work.timing import DeviceTiming
 
-__all__ = ["Area", "Arm", "Cell", "Point", "Wish"]
+__all__ = ["Area", "Arm", "Cell", "GoalDemand", "Point"]
 
 #: Farthest from the origin that a coordinate may be, mm: PartAt has 19 bits for it.
 MAX_COORDINATE_MM = 250_000
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class GoalDemand:
     """A goal that the site's own demand brings: after ``at_ms``, carry a part, within ``within_ms`` (0: no limit)."""
 
     at_ms: int
@@ -29,16 +29,16 @@ class Wish:
 
 @dataclass(frozen=True, kw_only=True)
 class Cell(Site):
-    """A cell: its robots' areas and the known obstacles (row C01). ``wishes`` are what a run of it asks for."""
+    """A cell: its robots' areas and the known obstacles (row C01). ``goals`` are what a run of it asks for."""
 
     system: ClassVar[str] = "cell"
-    demand: ClassVar[frozenset[str]] = frozenset({"wishes"})
-    moved_by: ClassVar[Mapping[str, Needs]] = {"ArmOrder": Needs.RIGHT, "GripOrder": Needs.RIGHT}
+    demand: ClassVar[frozenset[str]] = frozenset({"goals"})
+    moved_by: ClassVar[Mapping[str, MotionNeeds]] = {"ArmOrder": MotionNeeds.RIGHT, "GripOrder": MotionNeeds.RIGHT}
 
     timing: DeviceTiming
     arms: dict[int, Arm]
     obstacles: tuple[Area, ...] = ()
-    wishes: tuple[Wish, ...] = ()
+    goals: tuple[GoalDemand, ...] = ()
 
     @cached_property
     def least_unit_cost(self) -> float:

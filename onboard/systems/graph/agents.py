@@ -50,7 +50,7 @@ class _Waiting:
 
     heading: Heading
     heard_us: int
-    told: NodeVerdict | None = None
+    answered: NodeVerdict | None = None
 
 
 @dataclass
@@ -129,7 +129,7 @@ class NodeAgents:
         for robot, one in list(self.waiting.items()):
             if now_us > one.heard_us + WAITING_US:
                 del self.waiting[robot]
-            elif one.told is NodeVerdict.STOP and self._is_mine(one.heading.end):
+            elif one.answered is NodeVerdict.STOP and self._is_mine(one.heading.end):
                 effects += self._decide(robot, now_us, again=False)
         return effects
 
@@ -193,9 +193,9 @@ class NodeAgents:
             chosen = self._sent_elsewhere(robot, node, taken, now_us)
             if chosen is not None:
                 return self._promise(robot, node, *chosen, NodeVerdict.ANOTHER, now_us)
-        if one.told is NodeVerdict.STOP and not again:
+        if one.answered is NodeVerdict.STOP and not again:
             return []
-        one.told = NodeVerdict.STOP
+        one.answered = NodeVerdict.STOP
         return [Send(NodeAnswer(self.fleet.node_id, robot, node, NodeVerdict.STOP, wants, 0))]
 
     def _grants(self, taken: set[Edge], node: int, after: int) -> bool:
@@ -204,7 +204,7 @@ class NodeAgents:
 
     def _promise(self, robot: int, node: int, after: int, slot: int, verdict: NodeVerdict, now_us: int) -> list[Effect]:
         """Reserve, tell the robot, and tell the agent at the other end (row G20)."""
-        self.waiting[robot].told = verdict
+        self.waiting[robot].answered = verdict
         until_us = now_us + PROMISE_US
         self.promised[edge_token(node, after)] = (robot, until_us)
         if slot:
@@ -221,7 +221,7 @@ class NodeAgents:
         assert mine.wants is not None
         # Who was let go is no rival any more, though it still has to move.
         let_go = (NodeVerdict.GO, NodeVerdict.ANOTHER)
-        others = [one.heading for other, one in self.waiting.items() if other != robot and one.told not in let_go]
+        others = [one.heading for other, one in self.waiting.items() if other != robot and one.answered not in let_go]
         if self.site.rules is Rules.EDGE_AND_NODE:
             return slot is None and any(one.end == mine.wants and one.wants == mine.end for one in others)
         return edge(mine.end, mine.wants) in taken and any(are_head_on(mine, one) for one in others)

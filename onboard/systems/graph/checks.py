@@ -6,9 +6,9 @@ from onboard.contract.graph import EdgeNotice, EdgeState, NodeAnswer, NodeVerdic
 from onboard.systems.graph.fields import NO_NODE
 from onboard.systems.graph.site import FactoryGraph
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
-from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.holds import LetGoAgain
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Handlers, Rule
 
@@ -21,7 +21,7 @@ class OneAnEdge(Rule):
     source = "rows G03, G08"
     needs_site = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._on: dict[int, frozenset[int]] = {}
 
@@ -29,7 +29,7 @@ class OneAnEdge(Rule):
         """Robots' words on where they are."""
         return {RobotAt: self._on_robot}
 
-    def _on_robot(self, event: Event[RobotAt]) -> None:
+    def _on_robot(self, event: LogEvent[RobotAt]) -> None:
         at, site = event.message, self.picture.site
         if not isinstance(site, FactoryGraph):
             return
@@ -52,7 +52,7 @@ class NoTurningBack(Rule):
     title = "no robot reverses on an edge"
     source = "row G09"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._way: dict[int, tuple[int, int]] = {}
 
@@ -60,7 +60,7 @@ class NoTurningBack(Rule):
         """Robots' words on where they are."""
         return {RobotAt: self._on_robot}
 
-    def _on_robot(self, event: Event[RobotAt]) -> None:
+    def _on_robot(self, event: LogEvent[RobotAt]) -> None:
         at = event.message
         before = self._way.pop(at.sender, None)
         if not at.on_edge:
@@ -82,7 +82,7 @@ class AgentsOfNodes(Rule):
         """Reads answers and notices of node agents."""
         return {NodeAnswer: self._on_word, EdgeNotice: self._on_word}
 
-    def _on_word(self, event: Event[NodeAnswer | EdgeNotice]) -> None:
+    def _on_word(self, event: LogEvent[NodeAnswer | EdgeNotice]) -> None:
         word, site = event.message, self.picture.site
         if not isinstance(site, FactoryGraph):
             return
@@ -100,7 +100,7 @@ class GrantsAreTold(Rule):
     source = "rows G14, G20"
     undisturbed = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._signals: dict[int, TurnSignal] = {}
         self._untold: dict[tuple[int, int, int], int] = {}
@@ -116,10 +116,10 @@ class GrantsAreTold(Rule):
                 del self._untold[node, after, robot]
                 self.miss(time_us, (robot,), f"node {after} was not told of a grant by node {node}")
 
-    def _on_signal(self, event: Event[TurnSignal]) -> None:
+    def _on_signal(self, event: LogEvent[TurnSignal]) -> None:
         self._signals[event.message.sender] = event.message
 
-    def _on_answer(self, event: Event[NodeAnswer]) -> None:
+    def _on_answer(self, event: LogEvent[NodeAnswer]) -> None:
         word = event.message
         signal = self._signals.get(word.robot)
         if signal is None or signal.node != word.node:
@@ -129,7 +129,7 @@ class GrantsAreTold(Rule):
         elif word.after == NO_NODE:
             self.find(event, (word.sender,), "a stop for no edge")
 
-    def _on_notice(self, event: Event[EdgeNotice]) -> None:
+    def _on_notice(self, event: LogEvent[EdgeNotice]) -> None:
         word = event.message
         if word.edge_state is EdgeState.RESERVED:
             self._untold.pop((word.node, word.other, word.robot), None)

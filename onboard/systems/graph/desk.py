@@ -13,7 +13,7 @@ from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.effects import Effect, Send
 from onboard.core.journal_records import records_in
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import CallTerms, Estimator
+from onboard.core.negotiation import Estimator, RequestedTerms
 from onboard.core.site import Machine, Site
 from onboard.systems.graph.errands import TRANSPORT_STOPS
 from onboard.systems.graph.fields import five, stops_of
@@ -47,7 +47,7 @@ class Visits(WorkOrder):
 
 
 @dataclass(frozen=True)
-class DeskFactory(BehaviourFactory):
+class VisitDeskFactory(BehaviourFactory):
     """Makes order desks."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
@@ -116,7 +116,7 @@ class VisitDesk(OrderDesk[Visits]):
 
     # --- the OrderDesk -----------------------------------------------------------------------------------------
 
-    def terms(self, order: Visits) -> CallTerms:
+    def terms(self, order: Visits) -> RequestedTerms:
         """A call to robots; none can be there sooner than who stands in the first node."""
         site = self.fleet.site
         assert isinstance(site, FactoryGraph)
@@ -155,4 +155,4 @@ class VisitDesk(OrderDesk[Visits]):
         """How it stands, and who has it; nothing at the counter for one that came from outside."""
         if order.task.origin != self.fleet.node_id:
             return None
-        return VisitAnswer(self.fleet.node_id, order.task.number, OrderResult[order.told], order.winner)
+        return VisitAnswer(self.fleet.node_id, order.task.number, OrderResult[order.result_name], order.winner)

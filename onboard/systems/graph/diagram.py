@@ -4,7 +4,7 @@ from onboard.contract.graph import RobotAt, RobotMode
 from onboard.contract.messages import Message
 from onboard.systems.graph.site import FactoryGraph
 from onboard.systems.graph.words import node_name
-from onboard.trace.chart.over_time import Bar, Line, Panel, Rows, by_distance
+from onboard.trace.chart.over_time import Bar, Panel, PanelLine, Rows, by_distance
 
 
 class GraphDiagram(Rows):
@@ -20,7 +20,7 @@ class GraphDiagram(Rows):
         self._rows = {node: float(row) for row, node in enumerate(order)}
         self._panel = Panel("nodes", [node_name(node) for node in order])
         self.panels = [self._panel]
-        self._lines = {node: Line(node, []) for node in site.robots}
+        self._lines = {node: PanelLine(node, []) for node in site.robots}
         self._leaving: dict[int, tuple[int, RobotAt]] = {}
         self._loading: dict[int, tuple[int, int]] = {}
 

@@ -6,10 +6,10 @@ from typing import Any
 from onboard.contract.codes import KindCode
 from onboard.contract.graph import RobotAt, VisitList
 from onboard.contract.messages import Message
-from onboard.gateway.edge import Body, Edge
-from onboard.gateway.order import Order, Wish
-from onboard.gateway.whereabouts import Tracker, Whereabouts
-from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes, refuse_load
+from onboard.gateway.bus_orders import BusOrders, NoBusOrders, OrderMessages, RefusedError, refuse_load
+from onboard.gateway.edge import PhysicalLimits, SystemEdge
+from onboard.gateway.order import GatewayOrder, OrderRequest
+from onboard.gateway.positions import MachinePosition, Tracker
 from onboard.systems.graph.fields import NO_NODE, five
 from onboard.systems.graph.site import MAX_STOPS, FactoryGraph
 from onboard.trace.view import SiteView
@@ -18,33 +18,33 @@ from onboard.trace.view import SiteView
 VISIT_AGAIN_US = 1_000_000
 
 
-class GraphWishes(NoWishes):
+class GraphOrders(NoBusOrders):
     """What orders from outside become on a factory graph: visits by a robot of that name, or by any."""
 
     def __init__(self, site: FactoryGraph) -> None:
         super().__init__(site)
         self._graph = site
 
-    def transport(self, told: dict[str, Any]) -> Wish:
+    def transport(self, body: dict[str, Any]) -> OrderRequest:
         """``from`` one node ``to`` another: a desk calls for it, and the robot that does it best has it (row G28)."""
         desks = sorted(node for node, one in self._graph.machines.items() if one.kind is KindCode.DESK)
         if not desks:
             raise RefusedError("UNSUPPORTED", "this site has no desk that calls for a transport")
-        refuse_load(told)
-        if "car" in told:
+        refuse_load(body)
+        if "car" in body:
             raise RefusedError("UNSUPPORTED", "loads have no names here; say from where to where", "$.car")
         for key in ("from", "to"):
-            if key not in told:
+            if key not in body:
                 raise RefusedError("INCOMPLETE", "say from where to where", f"$.{key}")
-            self._node(told[key], f"$.{key}")
-        return Wish("send", desks[0], stops=(int(told["from"]), int(told["to"])))
+            self._node(body[key], f"$.{key}")
+        return OrderRequest("send", desks[0], stops=(int(body["from"]), int(body["to"])))
 
-    def visit(self, node: int, told: dict[str, Any], since: tuple[str, int] | None = None) -> Wish:
+    def visit(self, node: int, body: dict[str, Any], since: tuple[str, int] | None = None) -> OrderRequest:
         """The nodes with an action and the last one are stops; between them the robot goes its own way.
 
         Nodes that are not released yet are its horizon: nothing is done for them before an update releases them.
         """
-        nodes = told["nodes"]
+        nodes = body["nodes"]
         for place, one in enumerate(nodes):
             self._check(one, f"$.nodes[{place}]")
         numbers = [step["sequenceId"] for step in nodes]
@@ -61,7 +61,7 @@ class GraphWishes(NoWishes):
         if len(stops) > MAX_STOPS:
             raise RefusedError("TOO_LONG", f"at most {MAX_STOPS} stops fit into one order", "$.nodes")
         end = (base[-1]["nodeId"], base[-1]["sequenceId"])
-        return Wish("visit", node, stops=stops, base=end, is_open=len(base) < len(nodes))
+        return OrderRequest("visit", node, stops=stops, base=end, is_open=len(base) < len(nodes))
 
     def _check(self, node: dict[str, Any], path: str) -> None:
         self._node(node["nodeId"], f"{path}.nodeId")
@@ -74,19 +74,19 @@ class GraphWishes(NoWishes):
         if not name.isdecimal() or int(name) not in self._graph.graph.neighbours:
             raise RefusedError("UNKNOWN_PLACE", "no node of this graph", path)
 
-    def say(self, order: Order, sender: int, wall_us: int) -> Said:
+    def say(self, order: GatewayOrder, sender: int, wall_us: int) -> OrderMessages:
         """The list of nodes until the robot answers; without any node, that the order is taken back."""
-        wish = order.wish
-        stops = () if order.is_cancelled else wish.stops
+        request = order.request
+        stops = () if order.is_cancelled else request.stops
         assert stops or order.is_cancelled, "an empty list takes an order back"
-        return Said((VisitList(sender, wish.number, wish.node, *five(stops)),), VISIT_AGAIN_US)
+        return OrderMessages((VisitList(sender, request.number, request.node, *five(stops)),), VISIT_AGAIN_US)
 
 
 class GraphTracker:
     """Robots of a factory graph: nodes by number, no coordinates."""
 
     def __init__(self, site: FactoryGraph) -> None:
-        self._at = {node: Whereabouts(str(machine.home.track)) for node, machine in site.robots.items()}
+        self._at = {node: MachinePosition(str(machine.home.track)) for node, machine in site.robots.items()}
 
     def feed(self, message: Message) -> bool:
         """Robots say where they are and where they go."""
@@ -100,15 +100,15 @@ class GraphTracker:
         for one in coming:
             if one != NO_NODE and str(one) != (ahead[-1] if ahead else node):
                 ahead.append(str(one))
-        self._at[message.sender] = Whereabouts(node, tuple(ahead), old.passed + (node != old.node), message.on_edge)
+        self._at[message.sender] = MachinePosition(node, tuple(ahead), old.passed + (node != old.node), message.on_edge)
         return True
 
-    def where(self, node_id: int) -> Whereabouts:
+    def where(self, node_id: int) -> MachinePosition:
         """The node where the robot is, or that it left last."""
         return self._at[node_id]
 
 
-class GraphEdge(Edge):
+class GraphEdge(SystemEdge):
     """A factory graph: nodes by number."""
 
     takes_visits = True
@@ -117,9 +117,9 @@ class GraphEdge(Edge):
         super().__init__(site)
         self._graph = site
 
-    def wishes(self, view: SiteView, place: Callable[[int], str | None]) -> Wishes:
+    def bus_orders(self, view: SiteView, place: Callable[[int], str | None]) -> BusOrders:
         """Orders from outside become lists of visits."""
-        return GraphWishes(self._graph)
+        return GraphOrders(self._graph)
 
     def tracker(self) -> Tracker:
         """By what robots say of their place."""
@@ -129,9 +129,9 @@ class GraphEdge(Edge):
         """A node, which orders name by its number alone."""
         return str(number)
 
-    def body(self) -> Body:
+    def body(self) -> PhysicalLimits:
         """Of a robot only its speed is known."""
-        return Body(speed=self._graph.speed_mm_s / 1000)
+        return PhysicalLimits(speed=self._graph.speed_mm_s / 1000)
 
 
 EDGE = GraphEdge

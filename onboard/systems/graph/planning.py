@@ -11,7 +11,7 @@ from itertools import pairwise
 from onboard.contract.codes import Criterion, KindCode, Operation
 from onboard.contract.graph import RobotAt
 from onboard.contract.messages import CallForProposals, Reference
-from onboard.core.negotiation import CallKey, CallTerms, Proposal
+from onboard.core.negotiation import CallKey, Proposal, RequestedTerms
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine
 from onboard.systems.graph.errands import Errand
@@ -142,9 +142,9 @@ def _finish_ms(site: FactoryGraph, call: CallForProposals, now_us: int, length_m
     return to_bus_ms(begin_us + length_mm * 1_000_000 // site.speed_mm_s + stops * site.load_ms * 1000)
 
 
-def call_terms(task: Reference, start: int, end: int) -> CallTerms:
+def call_terms(task: Reference, start: int, end: int) -> RequestedTerms:
     """What a call for a transport asks for (row G28)."""
-    return CallTerms(task, Operation.TRANSPORT, KindCode.VEHICLE, Criterion.FINISH_TIME, start, end, task, 0)
+    return RequestedTerms(task, Operation.TRANSPORT, KindCode.VEHICLE, Criterion.FINISH_TIME, start, end, task, 0)
 
 
 def told_way(way: tuple[int, ...]) -> tuple[int, int, int]:

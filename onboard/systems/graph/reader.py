@@ -4,19 +4,19 @@ from dataclasses import replace
 from itertools import count, pairwise
 from typing import Any
 
-from onboard.config.fleet import Fleet
-from onboard.config.reader import Common, Table
+from onboard.config.fleet import FleetReader
+from onboard.config.reader import Common, TomlTable
 from onboard.config.timing import read_timing
 from onboard.contract.codes import KindCode, Side
 from onboard.core.site import Segment, Station
-from onboard.systems.graph.site import MAX_CAPACITY, MAX_NODE, MAX_STOPS, FactoryGraph, Graph, Order, Rules, edge
+from onboard.systems.graph.site import MAX_CAPACITY, MAX_NODE, MAX_STOPS, FactoryGraph, Graph, Rules, VisitOrder, edge
 
 _NOWHERE = Segment(0, 0)
 #: Longest edge, mm.
 MAX_LENGTH_MM = 60_000
 
 
-def read(root: Table, common: Common) -> FactoryGraph:
+def read(root: TomlTable, common: Common) -> FactoryGraph:
     """Edges, rules, hosts of node agents, robots, desks, and the orders that a run of the site brings."""
     table = root.table("graph", required=True)
     edges = _edges(table)
@@ -27,7 +27,7 @@ def read(root: Table, common: Common) -> FactoryGraph:
     approach_mm = table.integer("approach_mm", 100, 20_000, 1_500)
     if edges and approach_mm >= min(length for _, _, length in edges):
         table.bad("approach_mm", approach_mm, "not shorter than every edge", "put the sensor nearer to the node")
-    fleet = Fleet()
+    fleet = FleetReader()
     hosts = _read_hosts(root, fleet, graph)
     for one in root.tables("desks"):
         fleet.add(one, KindCode.DESK, _NOWHERE)
@@ -56,7 +56,7 @@ def read(root: Table, common: Common) -> FactoryGraph:
     )
 
 
-def _edges(table: Table) -> tuple[tuple[int, int, int], ...]:
+def _edges(table: TomlTable) -> tuple[tuple[int, int, int], ...]:
     form = f"[node, node, length in mm], nodes 0 to {MAX_NODE}, lengths 200 to {MAX_LENGTH_MM}"
     found: dict[tuple[int, int], int] = {}
     for number, value in enumerate(table.items("edges", f"a list of {form}") or ()):
@@ -75,7 +75,7 @@ def _edges(table: Table) -> tuple[tuple[int, int, int], ...]:
     return tuple((*ends, length) for ends, length in sorted(found.items()))
 
 
-def _check_edges(table: Table, graph: Graph) -> None:
+def _check_edges(table: TomlTable, graph: Graph) -> None:
     """That no node is a dead end (row G02), and that every node can be reached from every other."""
     if not graph.lengths_mm or "edges" in table.wrong:
         return
@@ -90,7 +90,7 @@ def _check_edges(table: Table, graph: Graph) -> None:
         table.bad("edges", lost[0], f"cannot be reached from node {graph.nodes[0]}", "join them by an edge")
 
 
-def _read_hosts(root: Table, fleet: Fleet, graph: Graph) -> dict[int, int]:
+def _read_hosts(root: TomlTable, fleet: FleetReader, graph: Graph) -> dict[int, int]:
     """Which machine hosts the agent of which node; one may host many, and each node has one."""
     hosts: dict[int, int] = {}
     for table in root.tables("hosts"):
@@ -110,7 +110,7 @@ def _read_hosts(root: Table, fleet: Fleet, graph: Graph) -> dict[int, int]:
     return hosts
 
 
-def _read_robots(root: Table, fleet: Fleet, graph: Graph, capacity: int) -> None:
+def _read_robots(root: TomlTable, fleet: FleetReader, graph: Graph, capacity: int) -> None:
     slots = {node: count(1) for node in graph.nodes}
     for table in root.tables("robots"):
         at = table.integer("at", 0, MAX_NODE)
@@ -122,7 +122,7 @@ def _read_robots(root: Table, fleet: Fleet, graph: Graph, capacity: int) -> None
         fleet.add(table, KindCode.VEHICLE, Segment(at, slot), Station(at, slot, Side.NEAR))
 
 
-def _order(table: Table, fleet: Fleet, graph: Graph) -> Order | None:
+def _order(table: TomlTable, fleet: FleetReader, graph: Graph) -> VisitOrder | None:
     at_ms = table.integer("at_s", 0, 86_400, 0) * 1000
     stops = table.items("visit", "a list of nodes of the graph")
     name = table.text("robot", "any")
@@ -140,7 +140,7 @@ def _order(table: Table, fleet: Fleet, graph: Graph) -> Order | None:
         table.bad("visit", stops, "a stop twice in a row", words)
     if name == "any" and len(stops) != 2:
         table.bad("visit", stops, "not from where and to where", "an order for any robot has two stops")
-    return Order(at_ms, 0 if robot is None else robot.node_id, tuple(stops))
+    return VisitOrder(at_ms, 0 if robot is None else robot.node_id, tuple(stops))
 
 
 def _is_node(value: Any, graph: Graph) -> bool:

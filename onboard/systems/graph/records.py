@@ -9,9 +9,9 @@ from onboard.contract.messages import Reference
 from onboard.core.journal_records import (
     MOST_OVER,
     UNSAID,
-    End,
     JournalRecord,
     Keep,
+    RecordEnd,
     RecordTypes,
     Which,
     stored_as,
@@ -28,7 +28,7 @@ class ErrandRecord(JournalRecord):
     NAME = "errand"
     RULES = (
         Keep("errand", _TASK, Which.FIRST_AND_NEWEST),
-        End(("errand",), _TASK, ("stops", ((),)), MOST_OVER),
+        RecordEnd(("errand",), _TASK, ("stops", ((),)), MOST_OVER),
     )
 
     task: Reference = field(metadata=stored_as("origin", "number"))
@@ -41,7 +41,7 @@ class ErrandLostRecord(JournalRecord):
     """Another has the order now, and this robot forgets it."""
 
     NAME = "errand_lost"
-    RULES = (End(("errand",), _TASK),)
+    RULES = (RecordEnd(("errand",), _TASK),)
 
     task: Reference = field(metadata=stored_as("origin", "number"))
 
@@ -53,7 +53,7 @@ class VisitRecord(JournalRecord):
     NAME = "visit"
     RULES = (
         Keep("visit", ("origin", "number"), Which.FIRST_AND_NEWEST),
-        End(("visit",), ("origin", "number"), ("stage", OVER), MOST_OVER),
+        RecordEnd(("visit",), ("origin", "number"), ("stage", OVER), MOST_OVER),
     )
 
     number: int

@@ -48,7 +48,7 @@ TOLD_US = 2_000_000
 
 
 @dataclass(frozen=True)
-class RobotFactory(BehaviourFactory):
+class GraphRobotFactory(BehaviourFactory):
     """Makes robots of a factory graph."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> RobotPlanning:

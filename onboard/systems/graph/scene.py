@@ -18,7 +18,7 @@ BESIDE = 20.0
 
 
 @dataclass
-class _Robot:
+class _SeenRobot:
     """Where one robot is by its last word, and how it moves meanwhile."""
 
     node: int
@@ -41,7 +41,7 @@ class GraphScene:
         nodes = arrange(lengths, sorted({node for ends in lengths for node in ends}), APART)
         self._spots = {node: (x + MARGIN, y + MARGIN) for node, (x, y) in nodes.items()}
         self._lengths = {frozenset(ends): length for ends, length in lengths.items()}
-        self._robots = {node: _Robot(machine.home.track) for node, machine in site.robots.items()}
+        self._robots = {node: _SeenRobot(machine.home.track) for node, machine in site.robots.items()}
         self._edges: dict[frozenset[int], tuple[EdgeState, int]] = {}
 
     def layout(self) -> Json:
@@ -114,11 +114,11 @@ class GraphScene:
             "told": [[None, line] for line in told],
         }
 
-    def _ahead(self, robot: _Robot) -> list[Spot]:
+    def _ahead(self, robot: _SeenRobot) -> list[Spot]:
         nodes = [robot.node, *robot.ahead]
         return [self._spots[node] for node in nodes] if robot.ahead or robot.is_on_edge else []
 
-    def _beside(self, node: int, robot: _Robot) -> Spot:
+    def _beside(self, node: int, robot: _SeenRobot) -> Spot:
         """Robots in one node stand side by side, the lowest node-ID first."""
         x, y = self._spots[robot.node]
         there = [one for one, other in self._robots.items() if other.node == robot.node and not other.is_on_edge]

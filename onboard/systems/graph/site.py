@@ -6,11 +6,11 @@ from functools import cached_property
 from typing import ClassVar
 
 from onboard.contract.codes import KindCode
-from onboard.core.site import Machine, Needs, Site
+from onboard.core.site import Machine, MotionNeeds, Site
 from onboard.systems.graph.network import Edge, Graph, edge
 from onboard.systems.graph.rules import Rules
 
-__all__ = ["Edge", "FactoryGraph", "Graph", "Order", "Rules", "edge"]
+__all__ = ["Edge", "FactoryGraph", "Graph", "Rules", "VisitOrder", "edge"]
 
 #: Highest node number: a node is one byte on the wire, and 255 is none.
 MAX_NODE = 254
@@ -21,7 +21,7 @@ MAX_STOPS = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class VisitOrder:
     """An order that the demand brings after ``at_ms``: visit ``stops``; ``robot`` 0 is the nearest free one."""
 
     at_ms: int
@@ -39,7 +39,7 @@ class FactoryGraph(Site):
 
     system: ClassVar[str] = "graph"
     demand: ClassVar[frozenset[str]] = frozenset({"orders"})
-    moved_by: ClassVar[Mapping[str, Needs]] = {"RouteOrder": Needs.RIGHT}
+    moved_by: ClassVar[Mapping[str, MotionNeeds]] = {"RouteOrder": MotionNeeds.RIGHT}
 
     edges: tuple[tuple[int, int, int], ...]
     rules: Rules
@@ -48,7 +48,7 @@ class FactoryGraph(Site):
     speed_mm_s: int
     approach_mm: int
     load_ms: int
-    orders: tuple[Order, ...] = ()
+    orders: tuple[VisitOrder, ...] = ()
 
     @cached_property
     def graph(self) -> Graph:

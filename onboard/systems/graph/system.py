@@ -2,14 +2,14 @@
 
 from onboard.contract.codes import KindCode
 from onboard.systems.graph.agents import HostFactory
-from onboard.systems.graph.desk import DeskFactory
+from onboard.systems.graph.desk import VisitDeskFactory
 from onboard.systems.graph.records import RECORDS
-from onboard.systems.graph.robot import RobotFactory
+from onboard.systems.graph.robot import GraphRobotFactory
 from onboard.systems.graph.site import FactoryGraph
 from onboard.systems.system import System
 
 SYSTEM = System(
     FactoryGraph.system,
-    {KindCode.VEHICLE: RobotFactory(), KindCode.NODE: HostFactory(), KindCode.DESK: DeskFactory()},
+    {KindCode.VEHICLE: GraphRobotFactory(), KindCode.NODE: HostFactory(), KindCode.DESK: VisitDeskFactory()},
     records=RECORDS,
 )

@@ -12,7 +12,7 @@ from onboard.systems.mapd.floor import FAR, Floor
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class TransportTask:
     """Take what is in cell ``pickup`` to cell ``delivery``; known from step ``release`` on."""
 
     number: int
@@ -22,7 +22,7 @@ class Task:
 
 
 @dataclass(frozen=True, slots=True)
-class Offer:
+class Availability:
     """Where a robot will be free, and in how many steps from now."""
 
     robot: int
@@ -31,7 +31,7 @@ class Offer:
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class BidWeights:
     """Weights of a bid, in hundredths of a step for each step; the bid is an integer and ties go to lower numbers."""
 
     wait: int = 100
@@ -39,7 +39,7 @@ class Rule:
     loaded: int = 50
 
 
-def cost(floor: Floor, rule: Rule, offer: Offer, task: Task) -> int | None:
+def cost(floor: Floor, rule: BidWeights, offer: Availability, task: TransportTask) -> int | None:
     """The bid for one task; None where no way leads.
 
     Steps until the robot is free, steps to the pick-up and steps with the load: by the added service time of all who
@@ -52,10 +52,12 @@ def cost(floor: Floor, rule: Rule, offer: Offer, task: Task) -> int | None:
     return rule.wait * offer.steps + rule.empty * empty + rule.loaded * loaded
 
 
-def winners(floor: Floor, rule: Rule, offers: Sequence[Offer], tasks: Sequence[Task]) -> dict[int, tuple[Task, int]]:
+def winners(
+    floor: Floor, rule: BidWeights, offers: Sequence[Availability], tasks: Sequence[TransportTask]
+) -> dict[int, tuple[TransportTask, int]]:
     """Task and bid that each robot wins, by robot: lowest bid first, then lower robot, then lower task."""
     bids: dict[int, list[tuple[int, int, int]]] = {}
-    by_number: Mapping[int, Task] = {task.number: task for task in tasks}
+    by_number: Mapping[int, TransportTask] = {task.number: task for task in tasks}
     for offer in offers:
         own = []
         for task in tasks:
@@ -64,7 +66,7 @@ def winners(floor: Floor, rule: Rule, offers: Sequence[Offer], tasks: Sequence[T
                 own.append((bid, task.number))
         own.sort(reverse=True)
         bids[offer.robot] = [(bid, offer.robot, number) for bid, number in own]
-    won: dict[int, tuple[Task, int]] = {}
+    won: dict[int, tuple[TransportTask, int]] = {}
     gone: set[int] = set()
     while bids:
         for robot in list(bids):

@@ -45,11 +45,11 @@ class UnitGeneration(NoEstimator):
 
 @dataclass
 class Round:
-    """A round that is open: ``wishes`` are (cost, task), cheapest first; ``begun_us`` when it was heard."""
+    """A round that is open: ``preferences`` are (cost, task), cheapest first; ``begun_us`` when it was heard."""
 
     node_id: int
     begun_us: int
-    wishes: Sequence[tuple[int, int]]
+    preferences: Sequence[tuple[int, int]]
     #: The task whose call it takes part in.
     looked_at: int | None = None
     bids: dict[int, list[Bid]] = field(default_factory=dict)
@@ -63,10 +63,10 @@ class Round:
         self._best[task] = min(offered, self._best.get(task, offered))
 
     @property
-    def wish(self) -> int | None:
+    def preferred(self) -> int | None:
         """The cheapest task for which nobody is better as far as is known; None where there is none."""
-        while self._next < len(self.wishes):
-            cost, task = self.wishes[self._next]
+        while self._next < len(self.preferences):
+            cost, task = self.preferences[self._next]
             if (cost, self.node_id) <= self._best.get(task, (cost, self.node_id)):
                 return task
             self._next += 1

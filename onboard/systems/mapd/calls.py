@@ -3,9 +3,9 @@
 from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, Reason
 from onboard.contract.mapd import StepRound
 from onboard.contract.messages import Award, Bid, CallForProposals, Reference
-from onboard.core.negotiation import CallTerms
+from onboard.core.negotiation import RequestedTerms
 from onboard.core.serial import to_bus_ms
-from onboard.systems.mapd.auction import Task
+from onboard.systems.mapd.auction import TransportTask
 
 #: Bits of a round in a bid, and of a step in an award (dbc/fleet.dbc: itinerary_version, task_version).
 _ROUND, _STEP = 0xFF, 0x7F
@@ -13,15 +13,15 @@ _ROUND, _STEP = 0xFF, 0x7F
 _ATTEMPT = 61
 
 
-def terms_of(desk: int, task: Task, step: int) -> CallTerms:
+def terms_of(desk: int, task: TransportTask, step: int) -> RequestedTerms:
     """What the desk asks for in a round; stations are cells, and the award names the step."""
     name = Reference(desk, task.number)
-    return CallTerms(
+    return RequestedTerms(
         name, Operation.TRANSPORT, KindCode.VEHICLE, Criterion.LENGTH, task.pickup, task.delivery, name, 0, step & _STEP
     )
 
 
-def call_of(desk: int, task: Task, until_us: int) -> CallForProposals:
+def call_of(desk: int, task: TransportTask, until_us: int) -> CallForProposals:
     """The call that stands; its deadline is that of the round in which it is said."""
     terms = terms_of(desk, task, 0)
     return CallForProposals(

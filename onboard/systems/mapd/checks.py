@@ -9,8 +9,8 @@ from onboard.systems.mapd.calls import is_of_step, mark_of, task_of
 from onboard.systems.mapd.fields import MOVE_BITS, MOVES_A_FRAME
 from onboard.systems.mapd.site import Mapd
 from onboard.trace.check.calls import CROSSING_US
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Handlers, Rule
 
@@ -46,7 +46,7 @@ class OneACell(_OnFloor):
     title = "in every step one robot a cell, no swaps, and nobody two steps ahead"
     source = "Ma, Li, Kumar and Koenig (AAMAS 2017)"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._at: dict[int, dict[int, int]] = {}
         self._step: dict[int, int] = {}
@@ -55,7 +55,7 @@ class OneACell(_OnFloor):
         """Robots' words on their steps."""
         return {StepState: self._on_state}
 
-    def _on_state(self, event: Event[StepState]) -> None:
+    def _on_state(self, event: LogEvent[StepState]) -> None:
         state = event.message
         here, step, robot = self._at.setdefault(state.step, {}), state.step, state.sender
         known = here.get(robot)
@@ -78,7 +78,7 @@ class OneACell(_OnFloor):
         for old in [one for one in self._at if one < step - 3]:
             del self._at[old]
 
-    def _judge_move(self, event: Event[StepState], here: dict[int, int]) -> None:
+    def _judge_move(self, event: LogEvent[StepState], here: dict[int, int]) -> None:
         state = event.message
         before = self._at.get(state.step - 1, {})
         came = before.get(state.sender)
@@ -98,7 +98,7 @@ class TaskOnce(Rule):
     title = "every task is carried by one robot, from its pick-up to its delivery"
     source = "row P59; issue: two owners of a task never happen"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._calls: dict[int, CallForProposals] = {}
         self._carrier: dict[int, int] = {}
@@ -110,10 +110,10 @@ class TaskOnce(Rule):
         """Reads calls, and robots' words of their tasks."""
         return {CallForProposals: self._on_call, StepState: self._on_state}
 
-    def _on_call(self, event: Event[CallForProposals]) -> None:
+    def _on_call(self, event: LogEvent[CallForProposals]) -> None:
         self._calls[event.message.task.number] = event.message
 
-    def _on_state(self, event: Event[StepState]) -> None:
+    def _on_state(self, event: LogEvent[StepState]) -> None:
         state, robot = event.message, event.message.sender
         # A log that begins in the middle, or whose clock began anew, takes what is aboard for granted.
         is_midway = robot not in self._cells and state.step > 0
@@ -158,7 +158,7 @@ class RoundsGoDown(Rule):
     source = "rows P07, P08, P11; design 4"
     undisturbed = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._round: _RoundSeen | None = None
 
@@ -166,13 +166,13 @@ class RoundsGoDown(Rule):
         """Reads rounds, bids and awards of each step."""
         return {StepRound: self._on_round, Bid: self._on_bid, StepTurn: self._on_turn, Award: self._on_award}
 
-    def _on_round(self, event: Event[StepRound]) -> None:
+    def _on_round(self, event: LogEvent[StepRound]) -> None:
         word = event.message
         known = None if self._round is None else self._round.opened
         if known is None or (word.step, word.attempt) != (known.step, known.attempt):
             self._round = _RoundSeen(word)
 
-    def _on_bid(self, event: Event[Bid]) -> None:
+    def _on_bid(self, event: LogEvent[Bid]) -> None:
         bid, seen, task = event.message, self._round, task_of(event.message)
         if seen is None:
             return
@@ -187,11 +187,11 @@ class RoundsGoDown(Rule):
         before.append((event.time_us, bid.cost, bid.sender))
         seen.last[bid.sender] = (bid.cost, task)
 
-    def _on_turn(self, event: Event[StepTurn]) -> None:
+    def _on_turn(self, event: LogEvent[StepTurn]) -> None:
         if self._round is not None and event.message.step == self._round.opened.step:
             self._round.is_closed = True
 
-    def _on_award(self, event: Event[Award]) -> None:
+    def _on_award(self, event: LogEvent[Award]) -> None:
         award, seen = event.message, self._round
         if seen is None or not is_of_step(award, seen.opened.step):
             return
@@ -203,7 +203,7 @@ class RoundsGoDown(Rule):
 
 
 @dataclass
-class _Told:
+class _PathHeard:
     """A path that is being told, or was."""
 
     head: PathHead
@@ -224,56 +224,61 @@ class PathsApart(_OnFloor):
     title = "no two paths meet or change places"
     source = "Ma, Li, Kumar and Koenig (AAMAS 2017); design 5: every itinerary ends in a refuge"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
-        self._coming: dict[int, _Told] = {}
-        self._paths: dict[int, _Told] = {}
+        self._coming: dict[int, _PathHeard] = {}
+        self._paths: dict[int, _PathHeard] = {}
 
     def handlers(self) -> Handlers:
         """Reads the paths that robots publish."""
         return {PathHead: self._on_head, PathMoves: self._on_moves}
 
-    def _on_head(self, event: Event[PathHead]) -> None:
+    def _on_head(self, event: LogEvent[PathHead]) -> None:
         known = self._paths.get(event.message.sender)
         if known is not None and (known.head == event.message or event.message.step < known.head.step):
             return
-        self._coming[event.message.sender] = _Told(event.message)
+        self._coming[event.message.sender] = _PathHeard(event.message)
         self._complete(event, event.message.sender)
 
-    def _on_moves(self, event: Event[PathMoves]) -> None:
-        told = self._coming.get(event.message.sender)
-        if told is not None and event.message.version == told.head.version:
-            told.parts[event.message.part] = event.message.codes
+    def _on_moves(self, event: LogEvent[PathMoves]) -> None:
+        path_heard = self._coming.get(event.message.sender)
+        if path_heard is not None and event.message.version == path_heard.head.version:
+            path_heard.parts[event.message.part] = event.message.codes
             self._complete(event, event.message.sender)
 
-    def _complete(self, event: Event[PathHead] | Event[PathMoves], robot: int) -> None:
-        told, site = self._coming[robot], self.picture.site
-        if len(told.parts) * MOVES_A_FRAME < told.head.moves or not isinstance(site, Mapd):
+    def _complete(self, event: LogEvent[PathHead] | LogEvent[PathMoves], robot: int) -> None:
+        path_heard, site = self._coming[robot], self.picture.site
+        if len(path_heard.parts) * MOVES_A_FRAME < path_heard.head.moves or not isinstance(site, Mapd):
             return
-        cells = [told.head.cell]
-        for number in range(told.head.moves):
+        cells = [path_heard.head.cell]
+        for number in range(path_heard.head.moves):
             part, place = divmod(number, MOVES_A_FRAME)
-            code = told.parts.get(part, 0) >> MOVE_BITS * place & _MASK
+            code = path_heard.parts.get(part, 0) >> MOVE_BITS * place & _MASK
             ways = site.floor.ways[cells[-1]] if cells[-1] < site.floor.size else ()
             if code > len(ways):
                 self.find(event, (robot,), f"its path leaves the ways after cell {cells[-1]}")
                 return
             cells.append(ways[code - 1] if code else cells[-1])
-        told.cells = cells
+        path_heard.cells = cells
         del self._coming[robot]
-        self._paths[robot] = told
+        self._paths[robot] = path_heard
         for other, path in self._paths.items():
             if other != robot:
-                self._judge_pair(event, robot, told, other, path)
+                self._judge_pair(event, robot, path_heard, other, path)
 
     def _judge_pair(
-        self, event: Event[PathHead] | Event[PathMoves], robot: int, told: _Told, other: int, path: _Told
+        self,
+        event: LogEvent[PathHead] | LogEvent[PathMoves],
+        robot: int,
+        path_heard: _PathHeard,
+        other: int,
+        path: _PathHeard,
     ) -> None:
-        first = max(told.head.step, path.head.step)
-        last = max(one.head.step + one.head.moves for one in (told, path)) + 1
+        first = max(path_heard.head.step, path.head.step)
+        last = max(one.head.step + one.head.moves for one in (path_heard, path)) + 1
         before: tuple[int | None, int | None] = (None, None)
         for step in range(first, last + 1):
-            mine, theirs = told.at(step), path.at(step)
+            mine, theirs = path_heard.at(step), path.at(step)
             assert mine is not None and theirs is not None
             swap = mine != theirs and before == (theirs, mine)
             if self.place(mine) == self.place(theirs) or swap:

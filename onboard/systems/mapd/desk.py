@@ -16,7 +16,7 @@ from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import Entry, records_in
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.core.records import BootRecord
-from onboard.systems.mapd.auction import Task
+from onboard.systems.mapd.auction import TransportTask
 from onboard.systems.mapd.calls import award_of, call_of, mark_of, number_of, terms_of
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.knowledge import Knowledge
@@ -35,7 +35,7 @@ _LOW = 1 << 16
 
 
 @dataclass
-class OrderDesk(Plain):
+class TransportDesk(Plain):
     """One desk. ``step`` is the next to be opened, or the one whose round is open (``is_open``)."""
 
     kind: KindCode = KindCode.DESK
@@ -47,7 +47,7 @@ class OrderDesk(Plain):
     #: Robots without a task that asked for a turn in this round.
     yielding: set[int] = field(default_factory=set)
     #: Tasks that were ordered and not served, by number, with the step from which on they are to be called for.
-    orders: dict[int, Task] = field(default_factory=dict)
+    orders: dict[int, TransportTask] = field(default_factory=dict)
     served: set[int] = field(default_factory=set)
     _attempt: int = 0
     _due_us: int = 0
@@ -149,7 +149,7 @@ class OrderDesk(Plain):
         if max(key.pickup, key.delivery) >= floor.size:
             return [Tell(TransportAnswer(self.fleet.node_id, key.task, OrderResult.REFUSED))]
         release = self.step + (key.release - self.step + _LOW // 2) % _LOW - _LOW // 2
-        task = Task(key.task, release, key.pickup, key.delivery)
+        task = TransportTask(key.task, release, key.pickup, key.delivery)
         self.orders[key.task] = task
         return [Record(TransportRecord(key.task, task.pickup, task.delivery, task.release)), answer]
 
@@ -167,7 +167,7 @@ class OrderDesk(Plain):
         answer = Tell(TransportAnswer(self.fleet.node_id, task, OrderResult.DONE))
         return [Record(ServedRecord(task)), answer]
 
-    def _call(self, task: Task, now_us: int) -> Effect:
+    def _call(self, task: TransportTask, now_us: int) -> Effect:
         """The call for a task: said again, it is the same."""
         calls = self.knowledge.calls
         if task.number not in calls:
@@ -230,8 +230,8 @@ class OrderDesk(Plain):
         self.turns, self.awards = _told(me, step, order)
         self.is_open, self._close_us = False, None
         self.step += 1
-        told = " ".join(f"{robot}:{task}" for robot, task in order)
-        effects: list[Effect] = [Record(AwardsRecord(step, told))]
+        awarded = " ".join(f"{robot}:{task}" for robot, task in order)
+        effects: list[Effect] = [Record(AwardsRecord(step, awarded))]
         for _, task in order:
             effects += self.fleet.negotiation.award_in_round(number_of(task), now_us) if task != NO_TASK else []
         return effects + [Send(turn) for turn in self.turns]
@@ -240,24 +240,24 @@ class OrderDesk(Plain):
 
     def _replay(self, entries: Iterable[Entry]) -> None:
         """What was ordered, served and told, oldest entry first."""
-        me, told = self.fleet.node_id, None
+        me, awarded = self.fleet.node_id, None
         for record in records_in(entries, BootRecord, TransportRecord, ServedRecord, RoundRecord, AwardsRecord):
             match record:
                 case BootRecord():
                     self._attempt = record.boot
                 case TransportRecord():
-                    task = Task(record.task, record.release, record.pickup, record.delivery)
+                    task = TransportTask(record.task, record.release, record.pickup, record.delivery)
                     self.orders[record.task] = task
                 case ServedRecord():
                     self.orders.pop(record.task, None)
                     self.served.add(record.task)
                 case RoundRecord():
                     self.round = StepRound(me, record.step, record.open, self._attempt, record.bidding)
-                    told, self.step = None, record.step + (not record.bidding)
+                    awarded, self.step = None, record.step + (not record.bidding)
                 case AwardsRecord():
-                    told, self.step = record, record.step + 1
-        if self.round is not None and self.step > self.round.step and told is not None:
-            pairs = [tuple(map(int, one.split(":"))) for one in told.changes.split()]
+                    awarded, self.step = record, record.step + 1
+        if self.round is not None and self.step > self.round.step and awarded is not None:
+            pairs = [tuple(map(int, one.split(":"))) for one in awarded.changes.split()]
             self.turns, self.awards = _told(me, self.round.step, [(robot, task) for robot, task in pairs])
         # Tasks that were called for before are known from their release; the next round brings those of its own step.
         for number, task in self.orders.items():

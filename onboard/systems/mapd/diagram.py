@@ -3,7 +3,7 @@
 from onboard.contract.mapd import StepState
 from onboard.contract.messages import Message
 from onboard.systems.mapd.site import Mapd
-from onboard.trace.chart.over_time import Line, Panel, Rows, by_distance
+from onboard.trace.chart.over_time import Panel, PanelLine, Rows, by_distance
 
 #: Widths of lines: without a load, and with one.
 _EMPTY, _LOADED = 1.2, 3.2
@@ -33,7 +33,7 @@ class MapdDiagram(Rows):
             named = {*site.endpoints, *site.homes.values()}
             self.panels = [Panel("cells", [floor.names[cell] if cell in named else "" for cell in order])]
             self._rows.append([float(order.index(cell)) for cell in range(floor.size)])
-        self._lines: dict[int, list[Line]] = {}
+        self._lines: dict[int, list[PanelLine]] = {}
 
     def take(self, message: Message, time_us: int) -> None:
         """A robot has come to its next cell."""
@@ -48,7 +48,7 @@ class MapdDiagram(Rows):
             line.points.append((time_us, spot))
         if lines and lines[0].width == width:
             return
-        lines = self._lines[message.sender] = [Line(message.sender, [(time_us, spot)], width) for spot in spots]
+        lines = self._lines[message.sender] = [PanelLine(message.sender, [(time_us, spot)], width) for spot in spots]
         for panel, line in zip(self.panels, lines, strict=True):
             panel.lines.append(line)
 

@@ -7,7 +7,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.site import Machine, Site
 from onboard.systems.mapd.bidding import UnitGeneration
-from onboard.systems.mapd.desk import OrderDesk
+from onboard.systems.mapd.desk import TransportDesk
 from onboard.systems.mapd.robot import UnitRobot
 from onboard.systems.mapd.site import Mapd
 from onboard.work.plain import NoEstimator
@@ -40,6 +40,6 @@ class OrderDeskFactory(BehaviourFactory):
             raise TypeError("a machine of a pick-up and delivery site needs one")
         return NoEstimator()
 
-    def behaviour(self, fleet: Fleet, estimator: Estimator) -> OrderDesk:
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> TransportDesk:
         """A desk that begins with the tasks of its journal."""
-        return OrderDesk(fleet)
+        return TransportDesk(fleet)

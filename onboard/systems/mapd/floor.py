@@ -95,7 +95,7 @@ def grid_floor(rows: Sequence[str]) -> Floor:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class NetworkLine:
     """A line of a network: from one named point to another in so many steps; both ways, or one."""
 
     start: str
@@ -104,7 +104,7 @@ class Line:
     one_way: bool = False
 
 
-def network_floor(points: Sequence[str], lines: Sequence[Line], zones: Sequence[Sequence[str]]) -> Floor:
+def network_floor(points: Sequence[str], lines: Sequence[NetworkLine], zones: Sequence[Sequence[str]]) -> Floor:
     """A floor from points and lines: a line of n steps has n - 1 cells of its own, named ``start>end/1`` and so on.
 
     A zone names points and lines (as ``start>end``); all of their cells are taken by whoever is on one of them.

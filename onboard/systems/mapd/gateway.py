@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from onboard.contract.mapd import StepState
 from onboard.contract.messages import Message
-from onboard.gateway.edge import Edge
-from onboard.gateway.whereabouts import Tracker, Whereabouts
+from onboard.gateway.edge import SystemEdge
+from onboard.gateway.positions import MachinePosition, Tracker
 from onboard.systems.mapd.site import Mapd
 
 
@@ -14,7 +14,7 @@ class CellTracker:
 
     def __init__(self, site: Mapd) -> None:
         self._names = site.floor.names
-        self._at = {node: Whereabouts(self._names[cell]) for node, cell in site.homes.items()}
+        self._at = {node: MachinePosition(self._names[cell]) for node, cell in site.homes.items()}
 
     def feed(self, message: Message) -> bool:
         """Robots say in which cell they are at each step."""
@@ -24,12 +24,12 @@ class CellTracker:
         self._at[message.sender] = replace(old, node=node, passed=old.passed + (node != old.node))
         return True
 
-    def where(self, node_id: int) -> Whereabouts:
+    def where(self, node_id: int) -> MachinePosition:
         """The cell where the robot said that it is."""
         return self._at[node_id]
 
 
-class MapdEdge(Edge):
+class MapdEdge(SystemEdge):
     """What the gateway tells of a floor of cells; it takes no orders."""
 
     def __init__(self, site: Mapd) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from onboard.contract.mapd import PathHead, PathMoves, StepState
 from onboard.contract.messages import Bid, CallForProposals
 from onboard.core.serial import is_newer
-from onboard.systems.mapd.auction import Rule, Task
+from onboard.systems.mapd.auction import BidWeights, TransportTask
 from onboard.systems.mapd.calls import task_of
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.floor import Floor
@@ -16,7 +16,7 @@ from onboard.systems.mapd.moves import Assembly
 from onboard.systems.mapd.paths import Path, Paths
 
 #: The weights that all robots bid by, unless they are told others.
-PLAIN = Rule()
+PLAIN = BidWeights()
 
 
 @dataclass
@@ -30,7 +30,7 @@ class Knowledge:
     robots: tuple[int, ...]
     me: int
     states: dict[int, StepState] = field(default_factory=dict)
-    tasks: dict[int, Task] = field(default_factory=dict)
+    tasks: dict[int, TransportTask] = field(default_factory=dict)
     calls: dict[int, CallForProposals] = field(default_factory=dict)
     loads: dict[int, int] = field(default_factory=dict)
     #: Tasks that their robots stand beside with their new paths: theirs before they have come to another step.
@@ -51,7 +51,7 @@ class Knowledge:
         """A task is called for, or told again."""
         number, cells = call.task.number, (call.from_station, call.to_station)
         if max(cells) < self.floor.size:
-            self.tasks.setdefault(number, Task(number, 0, *cells))
+            self.tasks.setdefault(number, TransportTask(number, 0, *cells))
             self.calls[number] = call
 
     def on_state(self, state: StepState) -> bool:
@@ -70,7 +70,7 @@ class Knowledge:
             self.loads[state.sender] = state.task
         return True
 
-    def is_possible(self, bid: Bid, rule: Rule = PLAIN) -> bool:
+    def is_possible(self, bid: Bid, rule: BidWeights = PLAIN) -> bool:
         """Whether a bid is no lower than the way from where its robot is; of what is not known yet any is."""
         state, task = self.states.get(bid.sender), self.tasks.get(task_of(bid))
         if state is None or task is None:
@@ -86,7 +86,7 @@ class Knowledge:
         return NO_TASK if state is None or state.served else state.task
 
     @property
-    def open_tasks(self) -> list[Task]:
+    def open_tasks(self) -> list[TransportTask]:
         """Tasks that nobody has picked up, lowest number first."""
         gone = {*self.loads.values(), *self.taken.values()}
         return [task for number, task in sorted(self.tasks.items()) if number not in gone]

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from onboard.config.fleet import Fleet
+from onboard.config.fleet import FleetReader
 from onboard.config.problems import nearest
-from onboard.config.reader import Common, Table
+from onboard.config.reader import Common, TomlTable
 from onboard.config.timing import read_timing
 from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
@@ -13,9 +13,9 @@ from onboard.systems.mapd.site import (
     FAR,
     FREE,
     Floor,
-    Line,
     Mapd,
-    Task,
+    NetworkLine,
+    TransportTask,
     cell_station,
     grid_floor,
     lasting_rests,
@@ -32,7 +32,7 @@ MAX_RELEASE = 100_000
 BLOCKED = "@TO#W"
 
 
-def read(root: Table, common: Common) -> Mapd:
+def read(root: TomlTable, common: Common) -> Mapd:
     """Floor, robots with their homes, desk, endpoints and the tasks that a run of the site brings."""
     step_ms = root.table("steps").integer("step_ms", 100, 60_000, 1_000)
     rows, (points, lines, zones) = _read_floor(root)
@@ -72,7 +72,7 @@ def read(root: Table, common: Common) -> Mapd:
     )
 
 
-def _stewards(fleet: Fleet, floor: Floor | None) -> dict[int, int]:
+def _stewards(fleet: FleetReader, floor: Floor | None) -> dict[int, int]:
     """The desk has the rights to all cells but the robots' first ones, until somebody asks for them."""
     desks = [node for node, one in fleet.by_node.items() if one.kind is KindCode.DESK]
     if floor is None or not desks:
@@ -84,10 +84,10 @@ def _open(floor: Floor, cell: int) -> bool:
     return bool(floor.ways[cell] or floor.back[cell])
 
 
-_Network = tuple[tuple[str, ...], tuple[Line, ...], tuple[tuple[str, ...], ...]]
+_Network = tuple[tuple[str, ...], tuple[NetworkLine, ...], tuple[tuple[str, ...], ...]]
 
 
-def _read_floor(root: Table) -> tuple[tuple[str, ...], _Network]:
+def _read_floor(root: TomlTable) -> tuple[tuple[str, ...], _Network]:
     if root.has("map") == root.has("network"):
         root.bad("map", None, "neither or both of [map] and [network]", "give the floor as one of them")
         return (), ((), (), ())
@@ -96,7 +96,7 @@ def _read_floor(root: Table) -> tuple[tuple[str, ...], _Network]:
     return (), _read_network(root.table("network"))
 
 
-def _read_rows(table: Table) -> tuple[str, ...]:
+def _read_rows(table: TomlTable) -> tuple[str, ...]:
     rows = table.items("rows", "a list of texts, one a row")
     if not rows:
         table.bad("rows", rows, "no rows", "write the map, one text a row")
@@ -112,7 +112,7 @@ def _read_rows(table: Table) -> tuple[str, ...]:
     return tuple(rows)
 
 
-def _read_network(table: Table) -> _Network:
+def _read_network(table: TomlTable) -> _Network:
     points = _names(table, "points", [])
     if not points:
         table.bad("points", None, "no points", "name at least two")
@@ -127,7 +127,7 @@ def _read_network(table: Table) -> _Network:
     return tuple(points), tuple(lines), tuple(zones)
 
 
-def _line(table: Table, number: int, value: Any, points: list[str]) -> Line | None:
+def _line(table: TomlTable, number: int, value: Any, points: list[str]) -> NetworkLine | None:
     form = f'write ["start", "end", steps] or ["start", "end", steps, "one-way"], steps 1 to {MAX_STEPS}'
     if not isinstance(value, list) or len(value) not in (3, 4) or type(value[2]) is not int:
         table.bad("lines", value, "not a line", form, item=number)
@@ -139,14 +139,14 @@ def _line(table: Table, number: int, value: Any, points: list[str]) -> Line | No
     if not 1 <= value[2] <= MAX_STEPS or value[3:] not in ([], ["one-way"]) or value[0] == value[1]:
         table.bad("lines", value, "not a line", form, item=number)
         return None
-    return Line(value[0], value[1], value[2], one_way=len(value) == 4)
+    return NetworkLine(value[0], value[1], value[2], one_way=len(value) == 4)
 
 
-def _items(table: Table, name: str) -> list[Any]:
+def _items(table: TomlTable, name: str) -> list[Any]:
     return table.items(name, "a list") or []
 
 
-def _names(table: Table, key: str, found: list[str]) -> list[str]:
+def _names(table: TomlTable, key: str, found: list[str]) -> list[str]:
     for number, name in enumerate(_items(table, key)):
         if not isinstance(name, str) or not name or ">" in name:
             table.bad(key, name, "not a name", "write a text without >", item=number)
@@ -157,8 +157,10 @@ def _names(table: Table, key: str, found: list[str]) -> list[str]:
     return found
 
 
-def _read_machines(root: Table, cells: dict[str, int] | None, floor: Floor | None) -> tuple[Fleet, dict[int, int]]:
-    fleet = Fleet()
+def _read_machines(
+    root: TomlTable, cells: dict[str, int] | None, floor: Floor | None
+) -> tuple[FleetReader, dict[int, int]]:
+    fleet = FleetReader()
     homes: dict[int, int] = {}
     for table in root.tables("desks"):
         fleet.add(table, KindCode.DESK, _NOWHERE)
@@ -181,7 +183,7 @@ def _read_machines(root: Table, cells: dict[str, int] | None, floor: Floor | Non
     return fleet, homes
 
 
-def _cell(table: Table, key: str, name: Any, cells: dict[str, int] | None, item: int | None = None) -> int | None:
+def _cell(table: TomlTable, key: str, name: Any, cells: dict[str, int] | None, item: int | None = None) -> int | None:
     """The free cell of a name; None, noted, where there is none, and None where the floor is not known."""
     if cells is None or key in table.wrong:
         return None
@@ -191,7 +193,7 @@ def _cell(table: Table, key: str, name: Any, cells: dict[str, int] | None, item:
     return cell
 
 
-def _read_endpoints(demand: Table, cells: dict[str, int] | None) -> tuple[int, ...]:
+def _read_endpoints(demand: TomlTable, cells: dict[str, int] | None) -> tuple[int, ...]:
     found: list[int] = []
     for number, name in enumerate(_items(demand, "endpoints")):
         cell = _cell(demand, "endpoints", name, cells, number)
@@ -204,7 +206,9 @@ def _read_endpoints(demand: Table, cells: dict[str, int] | None) -> tuple[int, .
     return tuple(found)
 
 
-def _read_tasks(demand: Table, cells: dict[str, int] | None, endpoints: tuple[int, ...]) -> tuple[Task, ...]:
+def _read_tasks(
+    demand: TomlTable, cells: dict[str, int] | None, endpoints: tuple[int, ...]
+) -> tuple[TransportTask, ...]:
     form = f'write [release step from 0 to {MAX_RELEASE}, "from", "to"], both endpoints'
     tasks = []
     known = set(endpoints)
@@ -217,11 +221,11 @@ def _read_tasks(demand: Table, cells: dict[str, int] | None, endpoints: tuple[in
             if start is None or end is None or not {start, end} <= known:
                 demand.bad("tasks", value, "not between endpoints", form, item=number)
             else:
-                tasks.append(Task(number, value[0], start, end))
+                tasks.append(TransportTask(number, value[0], start, end))
     return tuple(tasks)
 
 
-def _check_ways(root: Table, floor: Floor, homes: dict[int, int], endpoints: tuple[int, ...]) -> None:
+def _check_ways(root: TomlTable, floor: Floor, homes: dict[int, int], endpoints: tuple[int, ...]) -> None:
     """That all robots but one may stay at home for ever and the last one still gets everywhere."""
     start = next(iter(homes.values()))
     for cell in endpoints:

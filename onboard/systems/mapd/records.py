@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from onboard.core.journal_records import MOST_OVER, End, JournalRecord, Keep, RecordTypes
+from onboard.core.journal_records import MOST_OVER, JournalRecord, Keep, RecordEnd, RecordTypes
 
 _TASK = ("task",)
 
@@ -51,7 +51,7 @@ class ServedRecord(JournalRecord):
     """
 
     NAME = "served"
-    RULES = (End(("transport",), _TASK), Keep("served", _TASK), End(("served",), _TASK, most=MOST_OVER))
+    RULES = (RecordEnd(("transport",), _TASK), Keep("served", _TASK), RecordEnd(("served",), _TASK, most=MOST_OVER))
 
     task: int
     step: int | None = None

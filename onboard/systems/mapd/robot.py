@@ -26,7 +26,7 @@ from onboard.core.authority import TokenKey
 from onboard.core.effects import Effect, Send
 from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import successor
-from onboard.systems.mapd.auction import Offer, Rule, cost
+from onboard.systems.mapd.auction import Availability, BidWeights, cost
 from onboard.systems.mapd.bidding import Round, UnitGeneration, bid_timing
 from onboard.systems.mapd.calls import mark_of
 from onboard.systems.mapd.driving import Driving
@@ -59,7 +59,7 @@ _OF_INTEREST = (Bid, StepState, PathMoves, PathHead, StepTurn, Award, CallForPro
 _OF_DESK = (StepTurn, Award, CallForProposals, StepRound)
 
 
-class Phase(Enum):
+class GridStepPhase(Enum):
     """Where a robot stands within a step."""
 
     GATHER = "waits for all robots to come to this step, and for its round"
@@ -74,9 +74,9 @@ class UnitRobot(Plain):
 
     kind: KindCode = KindCode.VEHICLE
     state: MachineState = MachineState.STARTING
-    rule: Rule = field(default_factory=Rule)
+    rule: BidWeights = field(default_factory=BidWeights)
     generation: UnitGeneration = field(default_factory=UnitGeneration)
-    phase: Phase = Phase.GATHER
+    phase: GridStepPhase = GridStepPhase.GATHER
     step: int = 0
     task: int = NO_TASK
     round: StepRound | None = None
@@ -222,13 +222,13 @@ class UnitRobot(Plain):
         self.task, self.step = past.task, past.step
         if past.step > 0 and past.step > path.start:
             # It had set out for that step: it goes there (again), and tells when it is there.
-            self.step, self.phase = past.step - 1, Phase.MOVE
+            self.step, self.phase = past.step - 1, GridStepPhase.MOVE
         if past.served[0] == past.task:
             # Unloading had begun: on the way to this step, or before.
             self.driving.unloaded = past.task
-            if past.served[1] != self.step or self.phase is not Phase.MOVE:
+            if past.served[1] != self.step or self.phase is not GridStepPhase.MOVE:
                 self.task = NO_TASK
-        self._served = past.served if self.phase is not Phase.MOVE else (NO_TASK, -1)
+        self._served = past.served if self.phase is not GridStepPhase.MOVE else (NO_TASK, -1)
         self.turns = Turns(self.step)
         head = self._head_of(path, past.version, kept=False)
         self.knowledge.put(head, path)
@@ -261,7 +261,7 @@ class UnitRobot(Plain):
             same = len(self.knowledge.open_tasks) == self.round.open_tasks
             # Once the round is closed others may have gone on and picked up: the number is of no use any more.
             if same or self.turns.is_complete or not self.round.bidding:
-                return effects + self._enter(Phase.BID if self.round.bidding else Phase.MOVE)
+                return effects + self._enter(GridStepPhase.BID if self.round.bidding else GridStepPhase.MOVE)
             asked = self._ask([self.site.desk], now_us)
             if asked:
                 self.knowledge.forget_open()
@@ -271,14 +271,14 @@ class UnitRobot(Plain):
     def bid(self, now_us: int) -> list[Effect]:
         """Bid until the desk closes the round."""
         if self.turns.is_complete:
-            return self._enter(Phase.TURNS)
+            return self._enter(GridStepPhase.TURNS)
         assert self.round is not None
         effects: list[Effect] = []
         if self._bids is None:
-            wishes = self._wishes()
-            self.generation.costs, self.generation.mark = {task: bid for bid, task in wishes}, mark_of(self.round)
+            preferences = self._preferences()
+            self.generation.costs, self.generation.mark = {task: bid for bid, task in preferences}, mark_of(self.round)
             self.fleet.negotiation.leave_round(self.site.desk)
-            self._bids = Round(self.fleet.node_id, now_us, wishes)
+            self._bids = Round(self.fleet.node_id, now_us, preferences)
             for heard in self._heard_bids:
                 self._bids.hear(heard)
             if self._must_yield():
@@ -289,13 +289,13 @@ class UnitRobot(Plain):
 
     def _look(self, bids: Round, now_us: int) -> None:
         """Take part in the call for the task that is cheapest among those for which nobody is better."""
-        wish = bids.wish
-        call = None if wish is None else self.knowledge.calls.get(wish)
-        if call is None or wish is None or wish == bids.looked_at:
+        preferred = bids.preferred
+        call = None if preferred is None else self.knowledge.calls.get(preferred)
+        if call is None or preferred is None or preferred == bids.looked_at:
             return
-        bids.looked_at = wish
+        bids.looked_at = preferred
         until_us = bids.begun_us + self.site.bid_window_us
-        self.fleet.negotiation.look(call, (bids.begun_us, until_us), bids.bids.get(wish, ()), now_us)
+        self.fleet.negotiation.look(call, (bids.begun_us, until_us), bids.bids.get(preferred, ()), now_us)
 
     def take_turns(self, now_us: int) -> list[Effect]:
         """Wait for the paths of those before me, plan if it is my turn, wait for those after me."""
@@ -315,7 +315,7 @@ class UnitRobot(Plain):
             if missing:
                 return effects + self._ask(missing, now_us)
             effects += self._plan(won)
-        return effects + self._enter(Phase.MOVE)
+        return effects + self._enter(GridStepPhase.MOVE)
 
     def move(self, now_us: int) -> list[Effect]:
         """Go on by the path, and begin the next step."""
@@ -329,9 +329,9 @@ class UnitRobot(Plain):
             return effects
         self.step += 1
         self.turns, self.round, self._bids, self._heard_bids = Turns(self.step), None, None, []
-        return effects + self._enter(Phase.GATHER)
+        return effects + self._enter(GridStepPhase.GATHER)
 
-    def _enter(self, phase: Phase) -> list[Effect]:
+    def _enter(self, phase: GridStepPhase) -> list[Effect]:
         self.phase, self._ask_us = phase, None
         return []
 
@@ -350,21 +350,21 @@ class UnitRobot(Plain):
         body = self.driving.cart.state
         return body is not None and body.task != NO_TASK
 
-    def _wishes(self) -> list[tuple[int, int]]:
+    def _preferences(self) -> list[tuple[int, int]]:
         """What each open task would cost, cheapest first: the task-generation function of this system."""
         offer = self._offer()
         bids = ((cost(self.site.floor, self.rule, offer, task), task.number) for task in self.knowledge.open_tasks)
         return sorted((bid, number) for bid, number in bids if bid is not None)
 
-    def _offer(self) -> Offer:
+    def _offer(self) -> Availability:
         """Where and when it will be free: at once, or where it delivers what it carries."""
         path, me = self.knowledge.paths.by_robot[self.fleet.node_id], self.fleet.node_id
         carried = self.knowledge.tasks.get(self.task)
         if not self._is_loaded or carried is None:
-            return Offer(me, path.at(self.step), 0)
+            return Availability(me, path.at(self.step), 0)
         steps = range(self.step, max(self.step, path.end) + 1)
         free_at = next((step for step in steps if path.at(step) == carried.delivery), path.end)
-        return Offer(me, carried.delivery, free_at - self.step)
+        return Availability(me, carried.delivery, free_at - self.step)
 
     def _rests(self) -> frozenset[int]:
         """Where it may end: not in others' homes, nor where somebody has to pick up or deliver; its home always."""
@@ -400,9 +400,9 @@ class UnitRobot(Plain):
             self.knowledge.taken[robot] = task.number
 
 
-_STEPS: dict[Phase, Callable[[UnitRobot, int], list[Effect]]] = {
-    Phase.GATHER: UnitRobot.gather,
-    Phase.BID: UnitRobot.bid,
-    Phase.TURNS: UnitRobot.take_turns,
-    Phase.MOVE: UnitRobot.move,
+_STEPS: dict[GridStepPhase, Callable[[UnitRobot, int], list[Effect]]] = {
+    GridStepPhase.GATHER: UnitRobot.gather,
+    GridStepPhase.BID: UnitRobot.bid,
+    GridStepPhase.TURNS: UnitRobot.take_turns,
+    GridStepPhase.MOVE: UnitRobot.move,
 }

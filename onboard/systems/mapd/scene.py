@@ -24,7 +24,7 @@ MOST_TASKS = 1024
 
 
 @dataclass
-class _Robot:
+class _SeenGridRobot:
     """Where a robot is, by step, and the path that it told; incomplete, a path is not shown."""
 
     cell: int
@@ -46,7 +46,7 @@ class MapdScene:
         self.view = view
         self.words = view.words
         self._spots = _spots(site)
-        self._robots = {node: _Robot(cell, bound_for=cell) for node, cell in site.homes.items()}
+        self._robots = {node: _SeenGridRobot(cell, bound_for=cell) for node, cell in site.homes.items()}
         self._tasks: dict[int, CallForProposals] = {}
         for robot in self._robots.values():
             robot.path = still(self._spots[robot.cell])
@@ -115,7 +115,7 @@ class MapdScene:
             self.view.history.tasks.own(self._reference(task), node)
             self.view.say(time_us, f"{self.view.name(node)} wins {self._thing(task)}")
 
-    def _on_state(self, robot: _Robot, state: StepState, time_us: int) -> None:
+    def _on_state(self, robot: _SeenGridRobot, state: StepState, time_us: int) -> None:
         if state.cell not in self._spots:
             return
         if state.loaded and not robot.loaded:
@@ -132,7 +132,7 @@ class MapdScene:
         if robot is not None and isinstance(message, CartState) and message.cell in self._spots:
             self._go(robot, message.cell, time_us)
 
-    def _go(self, robot: _Robot, cell: int, time_us: int) -> None:
+    def _go(self, robot: _SeenGridRobot, cell: int, time_us: int) -> None:
         """To the next cell, unless it is on its way there already."""
         if cell == robot.bound_for:
             return
@@ -155,7 +155,7 @@ class MapdScene:
             "told": told,
         }
 
-    def _ahead(self, robot: _Robot) -> Iterator[int]:
+    def _ahead(self, robot: _SeenGridRobot) -> Iterator[int]:
         """The cells of its path that it has not come to yet."""
         head = robot.head
         if head is None or head.cell not in self._spots:

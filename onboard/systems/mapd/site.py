@@ -6,18 +6,18 @@ from functools import cached_property
 from typing import ClassVar
 
 from onboard.contract.codes import KindCode
-from onboard.core.site import Needs, Site
-from onboard.systems.mapd.auction import Task
-from onboard.systems.mapd.floor import FAR, FREE, Floor, Line, grid_floor, lasting_rests, network_floor
+from onboard.core.site import MotionNeeds, Site
+from onboard.systems.mapd.auction import TransportTask
+from onboard.systems.mapd.floor import FAR, FREE, Floor, NetworkLine, grid_floor, lasting_rests, network_floor
 from onboard.systems.mapd.rights import cell_station
 
 __all__ = [
     "FAR",
     "FREE",
     "Floor",
-    "Line",
     "Mapd",
-    "Task",
+    "NetworkLine",
+    "TransportTask",
     "cell_station",
     "grid_floor",
     "lasting_rests",
@@ -35,16 +35,16 @@ class Mapd(Site):
 
     system: ClassVar[str] = "mapd"
     demand: ClassVar[frozenset[str]] = frozenset({"tasks"})
-    moved_by: ClassVar[Mapping[str, Needs]] = {"CartOrder": Needs.RIGHT}
+    moved_by: ClassVar[Mapping[str, MotionNeeds]] = {"CartOrder": MotionNeeds.RIGHT}
     no_hold: ClassVar[str] = "these robots move in step, and one that is held would hold all"
 
     rows: tuple[str, ...] = ()
     points: tuple[str, ...] = ()
-    lines: tuple[Line, ...] = ()
+    lines: tuple[NetworkLine, ...] = ()
     zones: tuple[tuple[str, ...], ...] = ()
     homes: dict[int, int]
     endpoints: tuple[int, ...]
-    tasks: tuple[Task, ...]
+    tasks: tuple[TransportTask, ...]
     step_ms: int
 
     @cached_property

@@ -13,7 +13,7 @@ REPEAT_US = 500_000
 
 
 @dataclass
-class Body:
+class VehicleParts:
     """One vehicle's devices. ``move`` and ``handler`` are what they said last, None before they spoke.
 
     What was ordered is said again only as far as what permitted it still does.

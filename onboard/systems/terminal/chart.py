@@ -19,7 +19,7 @@ PIECES = 24
 Corners = tuple[Spot, Spot]
 
 
-class Chart(NamedTuple):
+class TerminalChart(NamedTuple):
     """Spots of areas, crossings and lanes; corners of areas and stations; lanes as lines in their direction."""
 
     spots: dict[int, Spot]
@@ -27,7 +27,7 @@ class Chart(NamedTuple):
     lines: dict[int, list[Spot]]
 
 
-def chart_of(site: Terminal) -> Chart:
+def chart_of(site: Terminal) -> TerminalChart:
     """The chart of a terminal. A lane has a spot of its own between its ends, so that two lanes lie side by side."""
     spots = _spots(site)
     corners: dict[int, Corners] = {}
@@ -35,7 +35,7 @@ def chart_of(site: Terminal) -> Chart:
         if site.entities[number].kind is EntityKind.AREA:
             corners.update(_area(site, number, spots[number]))
     lanes = [one for one in site.entities.values() if one.kind is EntityKind.LANE]
-    return Chart(spots, corners, {lane.number: _line(site, lane, spots, corners) for lane in lanes})
+    return TerminalChart(spots, corners, {lane.number: _line(site, lane, spots, corners) for lane in lanes})
 
 
 def _spots(site: Terminal) -> dict[int, Spot]:

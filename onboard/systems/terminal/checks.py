@@ -10,15 +10,15 @@ from onboard.contract.terminal import PlanHead, PlanStep, StepReport, StepResult
 from onboard.contract.terminal_device import HandlerState, MoveOrder, MoveState
 from onboard.systems.terminal.site import Entity, EntityKind, Terminal
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
-from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.holds import LetGoAgain
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.trace.check.tokens_seen import Token
 
 
-class Slot(NamedTuple):
+class EntitySlot(NamedTuple):
     """One body's room on an entity: the entity's number, and the slot in it."""
 
     entity: int
@@ -35,7 +35,7 @@ class _TerminalRule(Rule):
         site = self.picture.site
         return site.entities.get(number) if isinstance(site, Terminal) else None
 
-    def name_of(self, slot: Slot) -> str:
+    def name_of(self, slot: EntitySlot) -> str:
         """A slot for people."""
         entity = self.entity(slot.entity)
         return f"slot {slot.slot} of {entity.name if entity is not None else slot.entity}"
@@ -49,17 +49,17 @@ class OneBodyInSlot(_TerminalRule):
     source = "rows M15, M19, decision on flag 8; design 5"
     on_devices = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
-        self._at: dict[int, Slot] = {}
+        self._at: dict[int, EntitySlot] = {}
 
     def handlers(self) -> Handlers:
         """Reads where drives say that they are."""
         return {MoveState: self._on_state}
 
-    def _on_state(self, event: Event[MoveState]) -> None:
+    def _on_state(self, event: LogEvent[MoveState]) -> None:
         state = event.message
-        here = Slot(state.entity, state.slot)
+        here = EntitySlot(state.entity, state.slot)
         if self._at.get(state.sender) == here:
             return
         self._at[state.sender] = here
@@ -84,7 +84,7 @@ class MovesByRight(_TerminalRule):
         """Reads the orders that drives are given."""
         return {MoveOrder: self._on_order}
 
-    def _on_order(self, event: Event[MoveOrder]) -> None:
+    def _on_order(self, event: LogEvent[MoveOrder]) -> None:
         order = event.message
         entity = self.entity(order.entity)
         if entity is None or entity.kind is EntityKind.AREA:
@@ -93,7 +93,7 @@ class MovesByRight(_TerminalRule):
         holder = self.picture.tokens.holder(token)
         self.picture.unjudged += holder is None
         if not self.picture.tokens.may_use(token, order.sender, event.time_us):
-            here = self.name_of(Slot(order.entity, order.slot))
+            here = self.name_of(EntitySlot(order.entity, order.slot))
             self.find(event, (order.sender,), f"is sent into {here}, which {holder} holds")
 
 
@@ -104,7 +104,7 @@ class BoxInOnePlace(_TerminalRule):
     title = "no box twice, none stated without the right to it"
     source = "row M07; design 5: one holder a token"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._aboard: dict[int, int] = {}
 
@@ -112,7 +112,7 @@ class BoxInOnePlace(_TerminalRule):
         """Reads labels that handlers see, and statements about boxes."""
         return {HandlerState: self._on_state, CarAt: self._on_statement}
 
-    def _on_state(self, event: Event[HandlerState]) -> None:
+    def _on_state(self, event: LogEvent[HandlerState]) -> None:
         state = event.message
         if self._aboard.get(state.sender, 0) == state.box:
             return
@@ -121,7 +121,7 @@ class BoxInOnePlace(_TerminalRule):
         if others:
             self.find(event, (*others, state.sender), f"box {state.box} is aboard of both")
 
-    def _on_statement(self, event: Event[CarAt]) -> None:
+    def _on_statement(self, event: LogEvent[CarAt]) -> None:
         statement = event.message
         token = Token(TokenKind.CAR, statement.car.origin << 16 | statement.car.number)
         if statement.station == ANY_STATION and not self.picture.tokens.may_use(token, statement.sender, event.time_us):
@@ -138,7 +138,7 @@ class NobodyOvertakes(_TerminalRule):
     source = "row M18"
     undisturbed = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._rows: dict[int, list[int]] = {}
         self._steps: dict[tuple[int, int, int], int] = {}
@@ -147,11 +147,11 @@ class NobodyOvertakes(_TerminalRule):
         """Plans and reports: the entity of the step after the one reported is entered."""
         return {PlanStep: self._on_step, StepReport: self._on_report}
 
-    def _on_step(self, event: Event[PlanStep]) -> None:
+    def _on_step(self, event: LogEvent[PlanStep]) -> None:
         step = event.message
         self._steps[step.sender, step.version, step.step] = step.entity
 
-    def _on_report(self, event: Event[StepReport]) -> None:
+    def _on_report(self, event: LogEvent[StepReport]) -> None:
         report = event.message
         if report.result is not StepResult.DONE:
             return
@@ -179,7 +179,7 @@ class PlansInOrder(_TerminalRule):
     title = "a plan's steps follow each other in time and along the network"
     source = "rows M09, M12"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._last: dict[int, PlanStep] = {}
 
@@ -187,10 +187,10 @@ class PlansInOrder(_TerminalRule):
         """Plans as they are told."""
         return {PlanHead: self._on_head, PlanStep: self._on_step}
 
-    def _on_head(self, event: Event[PlanHead]) -> None:
+    def _on_head(self, event: LogEvent[PlanHead]) -> None:
         self._last.pop(event.message.sender, None)
 
-    def _on_step(self, event: Event[PlanStep]) -> None:
+    def _on_step(self, event: LogEvent[PlanStep]) -> None:
         step = event.message
         last = self._last.get(step.sender)
         self._last[step.sender] = step

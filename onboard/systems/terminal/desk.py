@@ -35,12 +35,12 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.effects import Effect, Halt, Record, Report, Send, Tell
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import EVENT_TYPES, CallTerms, Closed, Estimator, NegotiationEvent
+from onboard.core.negotiation import EVENT_TYPES, Closed, Estimator, NegotiationEvent, RequestedTerms
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Site
 from onboard.systems.terminal.memory import box_record, read_boxes
 from onboard.systems.terminal.mirror import TerminalMirror
-from onboard.systems.terminal.missions import Orders, Transport
+from onboard.systems.terminal.missions import MissionBook, Transport
 from onboard.systems.terminal.routes import least_end_ms
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.systems.terminal.vehicle import terminal
@@ -68,7 +68,7 @@ class DeskGeneration(NoEstimator):
 
 
 @dataclass(frozen=True)
-class DeskFactory(BehaviourFactory):
+class TerminalDeskFactory(BehaviourFactory):
     """Makes desks."""
 
     fleet_type = CarFleet
@@ -91,8 +91,8 @@ class Desk:
     fleet: CarFleet
     generation: DeskGeneration
     kind: KindCode = KindCode.DESK
-    orders: Orders = field(init=False)
-    calls: dict[Reference, CallTerms] = field(default_factory=dict)
+    orders: MissionBook = field(init=False)
+    calls: dict[Reference, RequestedTerms] = field(default_factory=dict)
     taken: dict[int, int] = field(default_factory=dict)
     interrupted: int = 0
     _look_at_us: int | None = None
@@ -108,7 +108,7 @@ class Desk:
     _told_buried: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        self.orders = Orders(self.site, self.fleet.node_id)
+        self.orders = MissionBook(self.site, self.fleet.node_id)
         self.orders.replay(self.fleet.entries)
 
     @property
@@ -297,7 +297,7 @@ class Desk:
             for box, upper in found
         ]
 
-    def _withdraw(self, terms: CallTerms, now_us: int) -> list[Effect]:
+    def _withdraw(self, terms: RequestedTerms, now_us: int) -> list[Effect]:
         self.interrupted += 1
         effects: list[Effect] = []
         for item in self.fleet.negotiation.withdraw(terms, now_us):
@@ -335,7 +335,7 @@ class Desk:
         """Call all robots for one transport."""
         date = TaskTerms(self.fleet.node_id, transport.task, to_bus_ms(transport.before_us))
         self.mirror.hear(date, now_us)
-        terms = CallTerms(
+        terms = RequestedTerms(
             task=transport.task,
             operation=Operation.TRANSPORT,
             kind=KindCode.VEHICLE,

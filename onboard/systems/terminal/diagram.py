@@ -6,14 +6,14 @@ from onboard.contract.codes import TokenKind
 from onboard.contract.messages import Message, TokenGrant, TokenHeld
 from onboard.contract.terminal import LaneState, PlanHead, PlanStep, StepReport, StepResult
 from onboard.systems.terminal.site import EntityKind, Terminal
-from onboard.trace.chart.over_time import Bar, Line, Panel, Rows
+from onboard.trace.chart.over_time import Bar, Panel, PanelLine, Rows
 
 #: A lane has as many rows as slots, but at most so many.
 _MOST_ROWS = 4
 
 
 @dataclass
-class _Body:
+class _DrawnVehicle:
     """One vehicle: its plan as far as it was told, and the step that it is at since when."""
 
     steps: dict[int, PlanStep] = field(default_factory=dict)
@@ -41,7 +41,7 @@ class TerminalDiagram(Rows):
             names += [one.name, *[""] * (count - 1)]
         self._panel = Panel("entities", names)
         self.panels = [self._panel]
-        self._bodies = {node: _Body(entity=site.machines[node].home.track) for node in site.vehicles}
+        self._bodies = {node: _DrawnVehicle(entity=site.machines[node].home.track) for node in site.vehicles}
         self._held: dict[int, tuple[int, int]] = {}
         self._blocked: dict[int, int] = {}
 
@@ -65,7 +65,7 @@ class TerminalDiagram(Rows):
             case LaneState():
                 self._on_lane(message, time_us)
 
-    def _on_done(self, report: StepReport, body: _Body) -> None:
+    def _on_done(self, report: StepReport, body: _DrawnVehicle) -> None:
         if report.version != body.version or report.step + 1 <= body.current:
             return
         time_us = self.log_us(report.at_ms, self.last_us)
@@ -74,7 +74,7 @@ class TerminalDiagram(Rows):
         following = body.steps.get(body.current)
         body.entity = following.entity if following is not None else report.entity
 
-    def _passed(self, node: int, body: _Body, until_us: int) -> None:
+    def _passed(self, node: int, body: _DrawnVehicle, until_us: int) -> None:
         """One step was done: along a lane from its entry to its end, anywhere else in the middle."""
         since_us = self.first_us if body.since_us is None else body.since_us
         if body.entity not in self._places:
@@ -84,7 +84,7 @@ class TerminalDiagram(Rows):
         begin = end = self._beside(node, body.entity)
         if is_lane:
             begin, end = first - 0.5, first + count - 0.5
-        self._panel.lines.append(Line(node, [(since_us, begin), (until_us, end)]))
+        self._panel.lines.append(PanelLine(node, [(since_us, begin), (until_us, end)]))
 
     def _beside(self, node: int, entity: int) -> float:
         """Vehicles in one place stand side by side."""
@@ -124,7 +124,7 @@ class TerminalDiagram(Rows):
         for node, body in self._bodies.items():
             since_us = self.first_us if body.since_us is None else body.since_us
             row = self._beside(node, body.entity)
-            self._panel.lines.append(Line(node, [(since_us, row), (time_us, row)]))
+            self._panel.lines.append(PanelLine(node, [(since_us, row), (time_us, row)]))
 
 
 DIAGRAM = TerminalDiagram

@@ -6,11 +6,11 @@ from typing import Any
 
 from onboard.contract.messages import CarAt, Message
 from onboard.contract.terminal import BoxOrder, PlanHead, PlanStep, StepReport, StepResult
-from onboard.gateway.edge import Edge
-from onboard.gateway.order import Order, Wish
-from onboard.gateway.records import Life
-from onboard.gateway.whereabouts import Tracker, Whereabouts
-from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes
+from onboard.gateway.bus_orders import BusOrders, NoBusOrders, OrderMessages, RefusedError
+from onboard.gateway.edge import SystemEdge
+from onboard.gateway.order import GatewayOrder, OrderRequest
+from onboard.gateway.positions import MachinePosition, Tracker
+from onboard.gateway.records import OrderPhase
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.view import SiteView
 
@@ -20,7 +20,7 @@ ORDER_AGAIN_US = 1_000_000
 MOST_WITHIN_S = 32_767
 
 
-class TerminalWishes(NoWishes):
+class TerminalOrders(NoBusOrders):
     """A container terminal: a mission of its desk, for one box (rows M05, M39)."""
 
     def __init__(self, site: Terminal) -> None:
@@ -30,31 +30,33 @@ class TerminalWishes(NoWishes):
         stations = [one for one in site.entities.values() if one.kind is EntityKind.STATION]
         self._stations = {one.name: one.number for one in stations}
 
-    def transport(self, told: dict[str, Any]) -> Wish:
+    def transport(self, body: dict[str, Any]) -> OrderRequest:
         """``load``, a box by its name, ``to`` a station."""
         for key in ("load", "to"):
-            if key not in told:
+            if key not in body:
                 raise RefusedError("INCOMPLETE", "name the box and the station", f"$.{key}")
-        if told["load"] not in self._boxes:
+        if body["load"] not in self._boxes:
             raise RefusedError("UNKNOWN_LOAD", "no box of this name", "$.load")
-        if told["to"] not in self._stations:
+        if body["to"] not in self._stations:
             raise RefusedError("UNKNOWN_PLACE", f"no station; one of {', '.join(self._stations)}", "$.to")
-        stops = (self._boxes[told["load"]], self._stations[told["to"]])
-        return Wish("send", self._terminal.desk, stops=stops, urgent=told.get("priority", 0) > 0)
+        stops = (self._boxes[body["load"]], self._stations[body["to"]])
+        return OrderRequest("send", self._terminal.desk, stops=stops, urgent=body.get("priority", 0) > 0)
 
-    def say(self, order: Order, sender: int, wall_us: int) -> Said:
+    def say(self, order: GatewayOrder, sender: int, wall_us: int) -> OrderMessages:
         """The order, until the desk answers."""
-        wish, within_s = order.wish, 0
+        request, within_s = order.request, 0
         if order.before_us is not None:
             within_s = min(max(1, (order.before_us - wall_us) // 1_000_000), MOST_WITHIN_S)
-        box, station = wish.stops
-        return Said((BoxOrder(sender, wish.node, wish.number, box, station, within_s, wish.urgent),), ORDER_AGAIN_US)
+        box, station = request.stops
+        return OrderMessages(
+            (BoxOrder(sender, request.node, request.number, box, station, within_s, request.urgent),), ORDER_AGAIN_US
+        )
 
-    def is_done(self, order: Order, message: Message) -> bool:
+    def is_done(self, order: GatewayOrder, message: Message) -> bool:
         """The box stands there: the vehicle's own report may have been lost."""
-        if not isinstance(message, CarAt) or order.life in (Life.ACCEPTED, Life.CALLED):
+        if not isinstance(message, CarAt) or order.life in (OrderPhase.ACCEPTED, OrderPhase.CALLED):
             return False
-        box, station = order.wish.stops
+        box, station = order.request.stops
         return (message.car.number, message.station) == (box, station)
 
 
@@ -73,7 +75,7 @@ class EntityTracker:
 
     def __init__(self, site: Terminal) -> None:
         self._site = site
-        self._at = {node: Whereabouts(self._name(site.machines[node].home.track)) for node in site.vehicles}
+        self._at = {node: MachinePosition(self._name(site.machines[node].home.track)) for node in site.vehicles}
         self._plans: dict[int, _Plan] = {}
 
     def feed(self, message: Message) -> bool:
@@ -98,9 +100,9 @@ class EntityTracker:
             return
         plan.done = max(plan.done, report.step + 1)
         node, old = self._name(plan.entities.get(plan.done, report.entity)), self._at[report.sender]
-        self._at[report.sender] = Whereabouts(node, (), old.passed + (node != old.node), plan.done < plan.steps)
+        self._at[report.sender] = MachinePosition(node, (), old.passed + (node != old.node), plan.done < plan.steps)
 
-    def where(self, node_id: int) -> Whereabouts:
+    def where(self, node_id: int) -> MachinePosition:
         """The entity where the vehicle is, and those of its plan that lie ahead."""
         at, plan = self._at[node_id], self._plans.get(node_id)
         if plan is None or len(plan.entities) < plan.steps:
@@ -117,16 +119,16 @@ class EntityTracker:
         return entity.name if entity is not None else str(number)
 
 
-class TerminalEdge(Edge):
+class TerminalEdge(SystemEdge):
     """A terminal: entities by their names."""
 
     def __init__(self, site: Terminal) -> None:
         super().__init__(site)
         self._terminal = site
 
-    def wishes(self, view: SiteView, place: Callable[[int], str | None]) -> Wishes:
+    def bus_orders(self, view: SiteView, place: Callable[[int], str | None]) -> BusOrders:
         """Orders from outside become missions for one box."""
-        return TerminalWishes(self._terminal)
+        return TerminalOrders(self._terminal)
 
     def tracker(self) -> Tracker:
         """By the plans that vehicles tell."""

@@ -8,9 +8,9 @@ from onboard.core.negotiation import CallKey, Proposal
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine
 from onboard.systems.terminal.mirror import TerminalMirror
-from onboard.systems.terminal.plan import Load, Plan
+from onboard.systems.terminal.plan import ActionPlan, Load
 from onboard.systems.terminal.routes import carry_us, free_flow_us, least_end_ms
-from onboard.systems.terminal.search import Found, Job, Search, remaining
+from onboard.systems.terminal.search import BoxTransport, FoundPlan, PlanSearch, remaining
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.systems.terminal.traffic import Traffic, copy_of
 
@@ -73,19 +73,19 @@ class VehicleGeneration:
         node = self.machine.node_id
         return self.mirror.where[node], self.mirror.traffic.end_of(node, now_us)
 
-    def plan(self, job: Job, now_us: int, *, version: int) -> Found | None:
+    def plan(self, job: BoxTransport, now_us: int, *, version: int) -> FoundPlan | None:
         """What is left of the plan in hand, and then ``job``."""
         kept = remaining(self.mirror.traffic, self.machine.node_id, now_us)
         here, free_us = self.start(now_us)
         return self.search(now_us).best(here, free_us, job, version=version, kept=kept)
 
-    def search(self, now_us: int, traffic: Traffic | None = None) -> Search:
+    def search(self, now_us: int, traffic: Traffic | None = None) -> PlanSearch:
         """A search over the mirror as it is, or over another picture; lanes that are blocked for long are left out."""
         self.searches += 1
         found = self.mirror.traffic if traffic is None else traffic
-        return Search(self.site, found, self.machine.node_id, now_us, self.mirror.long_blocked(now_us))
+        return PlanSearch(self.site, found, self.machine.node_id, now_us, self.mirror.long_blocked(now_us))
 
-    def again(self, now_us: int, *, version: int) -> Plan | None:
+    def again(self, now_us: int, *, version: int) -> ActionPlan | None:
         """The loads of the plan in hand planned anew from the step in hand, around everybody's plans; None if no way.
 
         What is done at a station is ended there first.
@@ -108,7 +108,7 @@ class VehicleGeneration:
             source = left.steps[load.pick].entity if load.pick < len(left.steps) else 0
             if at_station and load.pick < count:
                 source = 0
-            job = Job(load.box, load.task, source, left.steps[load.put].entity, traffic.date_of(load))
+            job = BoxTransport(load.box, load.task, source, left.steps[load.put].entity, traffic.date_of(load))
             found = search.best(here, began, job, version=version, kept=kept)
             if found is None:
                 return None
@@ -121,15 +121,15 @@ class VehicleGeneration:
         return kept
 
 
-def _handled(left: Plan) -> tuple[Plan, tuple[Load, ...]]:
+def _handled(left: ActionPlan) -> tuple[ActionPlan, tuple[Load, ...]]:
     """The steps at the station in hand as a plan that comes first, and the loads that are not put down by then."""
     count = left.visits()[0][1] + 1
     loads = tuple(load for load in left.loads if load.put >= count)
     done = tuple(load for load in left.loads if load.put < count)
-    return Plan(left.owner, left.version, left.begin, left.steps[:count], done), loads
+    return ActionPlan(left.owner, left.version, left.begin, left.steps[:count], done), loads
 
 
-def job_of(mirror: TerminalMirror, call: CallForProposals) -> Job:
+def job_of(mirror: TerminalMirror, call: CallForProposals) -> BoxTransport:
     """What a call asks for."""
     before = mirror.traffic.before.get(call.task, 0)
-    return Job(call.car.number, call.task, call.from_station, call.to_station, before)
+    return BoxTransport(call.car.number, call.task, call.from_station, call.to_station, before)

@@ -13,7 +13,7 @@ from onboard.work import manual
 
 
 @dataclass
-class Manual(manual.Manual):
+class VehicleMode(manual.Manual):
     """One vehicle's mode. ``allowed`` are plan version and step of a step by hand."""
 
     allowed: tuple[int, int] | None = None
@@ -24,7 +24,7 @@ class Manual(manual.Manual):
         if effects:
             step = order.manual_mode is ManualMode.STEP and owned is not None
             self.allowed = (owned.plan.version, owned.current) if step and owned is not None else None
-        return effects or [self.told()]
+        return effects or [self.report()]
 
     def may_begin(self, owned: Owned) -> bool:
         """Whether something may be begun for the step in hand; a step by hand that is over holds the vehicle again."""

@@ -5,11 +5,11 @@ from collections.abc import Iterable
 from onboard.contract.messages import CarAt, Reference
 from onboard.contract.terminal import Action
 from onboard.core.journal_records import Entry, records_in
-from onboard.systems.terminal.plan import Load, Plan, Step, VisitKey
+from onboard.systems.terminal.plan import ActionPlan, ActionStep, EntityStay, Load
 from onboard.systems.terminal.records import BoxRecord, PlanRecord, StepOverRecord
 
 
-def plan_record(plan: Plan) -> PlanRecord:
+def plan_record(plan: ActionPlan) -> PlanRecord:
     """A plan; steps and loads as numbers, one after the other."""
     steps = ";".join(",".join(str(int(n)) for n in (*step[:4], *step.after)) for step in plan.steps)
     loads = ";".join(
@@ -31,9 +31,9 @@ def read_boxes(node: int, desk: int, entries: Iterable[Entry]) -> list[CarAt]:
     ]
 
 
-def read_plan(owner: int, entries: Iterable[Entry]) -> tuple[Plan | None, list[tuple[int, int]]]:
+def read_plan(owner: int, entries: Iterable[Entry]) -> tuple[ActionPlan | None, list[tuple[int, int]]]:
     """The newest plan, None where there was never one, and its steps that are over with their times."""
-    plan: Plan | None = None
+    plan: ActionPlan | None = None
     over: list[tuple[int, int]] = []
     for record in records_in(entries, PlanRecord, StepOverRecord):
         if isinstance(record, PlanRecord):
@@ -47,7 +47,9 @@ def _rows(text: str) -> list[list[int]]:
     return [[int(one) for one in row.split(",")] for row in text.split(";") if row]
 
 
-def _plan(owner: int, record: PlanRecord) -> Plan:
-    steps = tuple(Step(Action(row[0]), row[1], row[2], row[3], VisitKey(row[4], row[5])) for row in _rows(record.steps))
+def _plan(owner: int, record: PlanRecord) -> ActionPlan:
+    steps = tuple(
+        ActionStep(Action(row[0]), row[1], row[2], row[3], EntityStay(row[4], row[5])) for row in _rows(record.steps)
+    )
     loads = tuple(Load(row[0], Reference(row[1], row[2]), *row[3:6]) for row in _rows(record.loads))
-    return Plan(owner, record.version, record.begin, steps, loads)
+    return ActionPlan(owner, record.version, record.begin, steps, loads)

@@ -9,7 +9,7 @@ from onboard.contract.messages import CarAt, Heartbeat, Message, SyncRequest
 from onboard.contract.terminal import LaneState, PlanHead, PlanStep, PlanTask, StepReport, StepResult, TaskTerms
 from onboard.core.effects import Effect, Send
 from onboard.core.serial import from_bus_ms, is_newer
-from onboard.systems.terminal.plan import Plan, PlanReader
+from onboard.systems.terminal.plan import ActionPlan, PlanReader
 from onboard.systems.terminal.site import EntityKind, StationKind, Terminal
 from onboard.systems.terminal.traffic import Traffic
 from onboard.ways.cars import CarMirror
@@ -67,7 +67,7 @@ class TerminalMirror:
         if plan is not None:
             self.take_up(plan, now_us)
 
-    def take_up(self, plan: Plan, now_us: int) -> None:
+    def take_up(self, plan: ActionPlan, now_us: int) -> None:
         """A whole plan; one without steps means that there is none."""
         known = self.traffic.plans.get(plan.owner)
         if known is not None and known.plan == plan:

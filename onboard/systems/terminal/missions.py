@@ -23,7 +23,7 @@ KNOWN = 127
 
 
 @dataclass
-class Order:
+class MissionOrder:
     """One mission: ``left`` boxes of ``type`` from ``source``, or those ``named``; ``before_us`` 0 for no date."""
 
     number: int
@@ -57,12 +57,12 @@ class Transport(WorkOrder):
 
 
 @dataclass
-class Orders:
+class MissionBook:
     """A desk's missions. What a mission still lacks is not called for before a robot is about to be free (M27)."""
 
     site: Terminal
     node_id: int
-    missions: dict[int, Order] = field(default_factory=dict)
+    missions: dict[int, MissionOrder] = field(default_factory=dict)
     open: dict[Reference, Transport] = field(default_factory=dict)
     done: int = 0
     last_task: int = 0
@@ -70,15 +70,15 @@ class Orders:
     over: deque[Reference] = field(default_factory=lambda: deque(maxlen=MOST_OVER))
     #: The newest missions that were taken, so that one said again is not carried out again.
     taken: deque[int] = field(default_factory=lambda: deque(maxlen=KNOWN))
-    _typed: dict[int, Order] = field(default_factory=dict)
+    _typed: dict[int, MissionOrder] = field(default_factory=dict)
 
-    def key(self, key: MissionKey) -> Order | None:
+    def key(self, key: MissionKey) -> MissionOrder | None:
         """What an operator types; the mission that it completes, or None. Unknown types and boxes are passed over."""
         if key.mission in self.taken:
             return None
         order = self._typed.setdefault(
             key.mission,
-            Order(key.mission, key.target, before_us=key.before_s * 1_000_000, urgent=key.urgent),
+            MissionOrder(key.mission, key.target, before_us=key.before_s * 1_000_000, urgent=key.urgent),
         )
         if key.verb is Verb.TRANSHIP:
             if 1 <= key.what <= len(self.site.boxes) and key.what not in order.named:
@@ -134,7 +134,7 @@ class Orders:
             return transport
         return None
 
-    def _available(self, order: Order, mirror: TerminalMirror, taken: set[int]) -> int | None:
+    def _available(self, order: MissionOrder, mirror: TerminalMirror, taken: set[int]) -> int | None:
         """A box with nothing above but what robots already plan to take away."""
         if order.named:
             boxes = list(order.named)
@@ -189,7 +189,7 @@ class Orders:
         del self.open[task]
         order = self.missions.setdefault(
             transport.mission,
-            Order(
+            MissionOrder(
                 transport.mission,
                 transport.target,
                 type=transport.type,
@@ -236,7 +236,7 @@ class Orders:
     def order(self, task: Reference, box: int, target: int, before_us: int, *, urgent: bool) -> None:
         """One box for one station, as a mission of its own; its number is none that a keyboard has."""
         number = task.origin << 16 | task.number
-        self.missions[number] = Order(number, target, named=[box], before_us=before_us, urgent=urgent, task=task)
+        self.missions[number] = MissionOrder(number, target, named=[box], before_us=before_us, urgent=urgent, task=task)
 
     # --- journal -----------------------------------------------------------------------------------------------
 
@@ -271,7 +271,7 @@ class Orders:
             if row:
                 number, target, left, kind, source, before, is_urgent, named, *name = row.split(",")
                 boxes = [int(box) for box in named.split("+") if box]
-                self.missions[int(number)] = Order(
+                self.missions[int(number)] = MissionOrder(
                     int(number), int(target), int(left), kind, int(source), boxes, int(before), is_urgent == "1"
                 )
                 self.missions[int(number)].task = Reference(int(name[0]), int(name[1])) if name else None

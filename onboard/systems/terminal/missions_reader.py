@@ -4,7 +4,7 @@ import re
 from typing import Protocol
 
 from onboard.config.problems import nearest
-from onboard.config.reader import Table
+from onboard.config.reader import TomlTable
 from onboard.contract.codes import KindCode
 from onboard.core.site import Machine
 from onboard.systems.terminal.site import Blockage, EntityKind, Mission, Press
@@ -17,16 +17,16 @@ PRESSES = ("hold", "step", "release")
 MOST_BOXES = 31
 
 
-class Places(Protocol):
+class EntityNames(Protocol):
     """What is asked of the network: the entity that a key names."""
 
-    def find(self, table: Table, key: str, kinds: tuple[EntityKind, ...], name: str | None = None) -> int:
+    def find(self, table: TomlTable, key: str, kinds: tuple[EntityKind, ...], name: str | None = None) -> int:
         """Its number, 0 for none; a mistake is noted."""
 
 
 def read_missions(
-    root: Table,
-    network: Places,
+    root: TomlTable,
+    network: EntityNames,
     boxes: dict[str, int],
     machines: dict[str, Machine | None],
     desk: int,
@@ -63,7 +63,7 @@ def read_missions(
     return tuple(found)
 
 
-def _boxes(table: Table, boxes: dict[str, int]) -> tuple[int, ...]:
+def _boxes(table: TomlTable, boxes: dict[str, int]) -> tuple[int, ...]:
     named = []
     for item, name in enumerate(table.items("tranship", "a list of boxes") or []):
         number = boxes.get(name) if isinstance(name, str) else None
@@ -74,7 +74,7 @@ def _boxes(table: Table, boxes: dict[str, int]) -> tuple[int, ...]:
     return tuple(named)
 
 
-def _desk(table: Table, machines: dict[str, Machine | None], desk: int) -> int:
+def _desk(table: TomlTable, machines: dict[str, Machine | None], desk: int) -> int:
     if not table.has("desk"):
         return desk
     machine = machines.get(table.text("desk"))
@@ -85,11 +85,11 @@ def _desk(table: Table, machines: dict[str, Machine | None], desk: int) -> int:
     return machine.node_id
 
 
-def _is_urgent(table: Table) -> bool:
+def _is_urgent(table: TomlTable) -> bool:
     return table.choice("priority", ["normal", "urgent"], "normal") == "urgent"
 
 
-def _before_us(table: Table, at_s: int, begins_s: int) -> int:
+def _before_us(table: TomlTable, at_s: int, begins_s: int) -> int:
     """The date in us from the begin of the run, 0 for none."""
     if not table.has("before"):
         return 0
@@ -107,7 +107,7 @@ def _before_us(table: Table, at_s: int, begins_s: int) -> int:
     return before_s * 1_000_000
 
 
-def read_blockages(root: Table, network: Places) -> tuple[Blockage, ...]:
+def read_blockages(root: TomlTable, network: EntityNames) -> tuple[Blockage, ...]:
     """Obstacles on lanes (row M03), by no machine known beforehand."""
     found = []
     for table in root.tables("blockages"):
@@ -117,7 +117,7 @@ def read_blockages(root: Table, network: Places) -> tuple[Blockage, ...]:
     return tuple(found)
 
 
-def read_presses(root: Table, machines: dict[str, Machine | None]) -> tuple[Press, ...]:
+def read_presses(root: TomlTable, machines: dict[str, Machine | None]) -> tuple[Press, ...]:
     """What a person does to vehicles by hand (row M38)."""
     found = []
     vehicles = {name: one for name, one in machines.items() if one is not None and one.kind is KindCode.VEHICLE}

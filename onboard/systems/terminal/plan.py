@@ -16,7 +16,7 @@ MAX_STEPS = 31
 NO_STEP = 31
 
 
-class VisitKey(NamedTuple):
+class EntityStay(NamedTuple):
     """A machine's stay in an entity, named by its first step there."""
 
     owner: int
@@ -24,17 +24,17 @@ class VisitKey(NamedTuple):
 
 
 #: After nobody that is not there yet.
-NOBODY_BEFORE = VisitKey(0, 0)
+NOBODY_BEFORE = EntityStay(0, 0)
 
 
-class Step(NamedTuple):
+class ActionStep(NamedTuple):
     """One elementary action on ``entity``: at least ``duration`` long; told to end at ``end``; whom it comes after."""
 
     action: Action
     entity: int
     duration: int
     end: int = 0
-    after: VisitKey = NOBODY_BEFORE
+    after: EntityStay = NOBODY_BEFORE
 
 
 class Load(NamedTuple):
@@ -51,13 +51,13 @@ class Load(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class ActionPlan:
     """A machine's elementary actions in order, from ``begin`` on."""
 
     owner: int
     version: int
     begin: int
-    steps: tuple[Step, ...]
+    steps: tuple[ActionStep, ...]
     loads: tuple[Load, ...] = ()
 
     @property
@@ -76,25 +76,25 @@ class Plan:
         return found
 
 
-def drive_steps(site: Terminal, route: tuple[int, ...], before: int = 0) -> list[Step]:
+def drive_steps(site: Terminal, route: tuple[int, ...], before: int = 0) -> list[ActionStep]:
     """GOTO for each entity of a route but the last, which is what they lead to."""
     steps = []
     for number, entity in enumerate(route[:-1]):
         came = route[number - 1] if number else before
-        steps.append(Step(Action.GOTO, entity, site.entities[entity].crossing_us(came, route[number + 1])))
+        steps.append(ActionStep(Action.GOTO, entity, site.entities[entity].crossing_us(came, route[number + 1])))
     return steps
 
 
-def handling_steps(site: Terminal, station: int, action: Action) -> list[Step]:
+def handling_steps(site: Terminal, station: int, action: Action) -> list[ActionStep]:
     """DOCK, PICK UP or PUT DOWN, UNDOCK."""
     return [
-        Step(Action.DOCK, station, site.dock_us),
-        Step(action, station, site.handle_us),
-        Step(Action.UNDOCK, station, site.undock_us),
+        ActionStep(Action.DOCK, station, site.dock_us),
+        ActionStep(action, station, site.handle_us),
+        ActionStep(Action.UNDOCK, station, site.undock_us),
     ]
 
 
-def to_frames(plan: Plan) -> list[Message]:
+def to_frames(plan: ActionPlan) -> list[Message]:
     """A plan as it is told."""
     frames: list[Message] = [
         PlanHead(plan.owner, plan.version, len(plan.steps), len(plan.loads), to_bus_ms(plan.begin))
@@ -116,7 +116,7 @@ class PlanReader:
     steps: dict[int, PlanStep] = field(default_factory=dict)
     tasks: dict[int, PlanTask] = field(default_factory=dict)
 
-    def feed(self, message: PlanHead | PlanStep | PlanTask, now_us: int) -> Plan | None:
+    def feed(self, message: PlanHead | PlanStep | PlanTask, now_us: int) -> ActionPlan | None:
         """The plan that this frame completes, or None. Entities that the site does not have make it none."""
         match message:
             case PlanHead():
@@ -132,7 +132,7 @@ class PlanReader:
         self.head = None
         return self._plan(head, now_us)
 
-    def _plan(self, head: PlanHead, now_us: int) -> Plan | None:
+    def _plan(self, head: PlanHead, now_us: int) -> ActionPlan | None:
         told = [self.steps[number] for number in sorted(self.steps)][: head.steps]
         if any(step.entity not in self.site.entities for step in told):
             return None
@@ -143,10 +143,12 @@ class PlanReader:
             before, after = ways[number - 1] if number else 0, ways[number + 1] if number + 1 < len(ways) else 0
             duration = _duration(self.site, step.action, step.entity, before, after)
             end_us = begin_us + step.end_ms * 1000
-            steps.append(Step(step.action, step.entity, duration, end_us, VisitKey(step.after, step.after_step)))
+            steps.append(
+                ActionStep(step.action, step.entity, duration, end_us, EntityStay(step.after, step.after_step))
+            )
         tasks = [self.tasks[number] for number in sorted(self.tasks)][: head.tasks]
         loads = tuple(Load(task.box, task.task, task.pick, task.put) for task in tasks)
-        return Plan(head.sender, head.version, begin_us, tuple(steps), loads)
+        return ActionPlan(head.sender, head.version, begin_us, tuple(steps), loads)
 
 
 def _duration(site: Terminal, action: Action, entity: int, before: int, after: int) -> int:

@@ -10,12 +10,12 @@ from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.negotiation import Awarded, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import successor, to_bus_ms
-from onboard.systems.terminal.body import Body
+from onboard.systems.terminal.body import VehicleParts
 from onboard.systems.terminal.generation import VehicleGeneration, job_of
 from onboard.systems.terminal.memory import plan_record, read_plan
 from onboard.systems.terminal.mirror import TerminalMirror
-from onboard.systems.terminal.plan import Load, Plan, PlanReader, to_frames
-from onboard.systems.terminal.search import Job, remaining
+from onboard.systems.terminal.plan import ActionPlan, Load, PlanReader, to_frames
+from onboard.systems.terminal.search import BoxTransport, remaining
 from onboard.systems.terminal.site import Terminal
 from onboard.systems.terminal.traffic import Owned
 
@@ -39,8 +39,8 @@ class Planner:
 
     fleet: Fleet
     generation: VehicleGeneration
-    body: Body
-    queue: deque[Job] = field(default_factory=deque)
+    body: VehicleParts
+    queue: deque[BoxTransport] = field(default_factory=deque)
     touched: int = 0
     version: int = 0
     stamp: Stamp = _NO_STAMP
@@ -121,7 +121,7 @@ class Planner:
     def over(self, now_us: int) -> list[Effect]:
         """The plan is over; under a version of its own, so that whoever missed the report asks."""
         self.version = successor(self.version, 8)
-        nothing = Plan(self.fleet.node_id, self.version, now_us, ())
+        nothing = ActionPlan(self.fleet.node_id, self.version, now_us, ())
         return [Record(plan_record(nothing)), *self.statement(now_us)]
 
     # --- tasks -------------------------------------------------------------------------------------------------
@@ -140,12 +140,12 @@ class Planner:
         if order.task in known or any(job.task == order.task for job in self.queue):
             return [taken]
         before = self.mirror.traffic.before.get(order.task, 0)
-        job = Job(order.box, order.task, self.mirror.station_of(order.box), order.target, before)
+        job = BoxTransport(order.box, order.task, self.mirror.station_of(order.box), order.target, before)
         if job.source:
             self._take(job)
         return [taken] if job.source else []
 
-    def _take(self, job: Job) -> None:
+    def _take(self, job: BoxTransport) -> None:
         """It is planned in my next turn."""
         self.queue.append(job)
         self.generation.has_queue = True
@@ -233,14 +233,14 @@ class Planner:
 
     # --- plans -------------------------------------------------------------------------------------------------
 
-    def _adopt(self, plan: Plan, now_us: int) -> list[Effect]:
+    def _adopt(self, plan: ActionPlan, now_us: int) -> list[Effect]:
         """Journal the plan, put it between the others' and tell it."""
         plan = self._as_told(plan, now_us)
         self.version = plan.version
         self.mirror.take_up(plan, now_us)
         return [Record(plan_record(plan)), *self.statement(now_us)]
 
-    def _as_told(self, plan: Plan, now_us: int) -> Plan:
+    def _as_told(self, plan: ActionPlan, now_us: int) -> ActionPlan:
         """The plan as all others read it: in whole ms, with the durations that they know."""
         reader, read = PlanReader(self.site), None
         for frame in to_frames(plan):
@@ -255,7 +255,7 @@ class Planner:
         if self.version == 0:
             return []
         node = self.fleet.node_id
-        plan = owned.plan if owned is not None else Plan(node, self.version, now_us, ())
+        plan = owned.plan if owned is not None else ActionPlan(node, self.version, now_us, ())
         grade = Grade.FIRM if owned is not None else Grade.RELEASED
         itinerary = Itinerary(node, self.version, grade, self.stamp, ())
         self.fleet.mirror.on_itinerary(itinerary, now_us)

@@ -3,9 +3,9 @@
 import re
 from dataclasses import dataclass, field, replace
 
-from onboard.config.fleet import Fleet
+from onboard.config.fleet import FleetReader
 from onboard.config.problems import nearest
-from onboard.config.reader import Common, Table
+from onboard.config.reader import Common, TomlTable
 from onboard.config.timing import read_timing
 from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
@@ -25,10 +25,10 @@ class Network:
 
     numbers: dict[str, int] = field(default_factory=dict)
     entities: dict[int, Entity] = field(default_factory=dict)
-    tables: dict[int, Table] = field(default_factory=dict)
+    tables: dict[int, TomlTable] = field(default_factory=dict)
 
     def add(
-        self, table: Table, kind: EntityKind, *, duration_us: int = 0, capacity: int = 0, length_mm: int = 0
+        self, table: TomlTable, kind: EntityKind, *, duration_us: int = 0, capacity: int = 0, length_mm: int = 0
     ) -> int:
         """One entity; its name is its own."""
         name = table.text("name")
@@ -45,7 +45,7 @@ class Network:
         self.tables[number] = table
         return number
 
-    def find(self, table: Table, key: str, kinds: tuple[EntityKind, ...], name: str | None = None) -> int:
+    def find(self, table: TomlTable, key: str, kinds: tuple[EntityKind, ...], name: str | None = None) -> int:
         """Number of the entity that a key names; 0 where it names none of these kinds."""
         asked = table.text(key) if name is None else name
         number = self.numbers.get(asked, 0)
@@ -58,7 +58,7 @@ class Network:
         return 0
 
 
-def read(root: Table, common: Common) -> Terminal:
+def read(root: TomlTable, common: Common) -> Terminal:
     """A terminal; every mistake is noted in ``root.problems``."""
     planning, vehicle = root.table("planning"), root.table("vehicle")
     speed_mm_s = vehicle.integer("speed_mm_s", 100, 20_000, 5_000)
@@ -103,7 +103,7 @@ def read(root: Table, common: Common) -> Terminal:
     return site
 
 
-def _clock(planning: Table) -> int:
+def _clock(planning: TomlTable) -> int:
     """Seconds of the day at which the run begins; dates by the clock count from there."""
     text = planning.text("begins", "00:00")
     found = re.fullmatch(r"([01]?\d|2[0-3]):([0-5]\d)", text)
@@ -113,7 +113,7 @@ def _clock(planning: Table) -> int:
     return int(found.group(1)) * 3600 + int(found.group(2)) * 60
 
 
-def _read_network(root: Table, speed_mm_s: int) -> Network:
+def _read_network(root: TomlTable, speed_mm_s: int) -> Network:
     network = Network()
     for table in root.tables("lanes"):
         length_mm = table.integer("length_mm", 1_000, 5_000_000)
@@ -147,7 +147,7 @@ def _read_network(root: Table, speed_mm_s: int) -> Network:
     return network
 
 
-def _join(network: Network, number: int, table: Table) -> None:
+def _join(network: Network, number: int, table: TomlTable) -> None:
     """What an entity leads to, and the durations of single ways through it."""
     entity = network.entities[number]
     if entity.kind is EntityKind.STATION:
@@ -179,8 +179,8 @@ def _join(network: Network, number: int, table: Table) -> None:
     network.entities[number] = replace(network.entities[number], leads_to=(*leads, *stations), turns=tuple(turns))
 
 
-def _read_machines(root: Table, network: Network) -> tuple[Fleet, dict[int, Table]]:
-    fleet, homes = Fleet(), {}
+def _read_machines(root: TomlTable, network: Network) -> tuple[FleetReader, dict[int, TomlTable]]:
+    fleet, homes = FleetReader(), {}
     for table in root.tables("desks"):
         fleet.add(table, KindCode.DESK, Segment(0, 0))
     bays: dict[int, int] = {}
@@ -192,7 +192,7 @@ def _read_machines(root: Table, network: Network) -> tuple[Fleet, dict[int, Tabl
     return fleet, homes
 
 
-def _read_boxes(root: Table, network: Network) -> tuple[Box, ...]:
+def _read_boxes(root: TomlTable, network: Network) -> tuple[Box, ...]:
     found: dict[str, Box] = {}
     standing: dict[int, int] = {}
     for table in root.tables("boxes"):
@@ -214,7 +214,7 @@ def _read_boxes(root: Table, network: Network) -> tuple[Box, ...]:
     return tuple(found.values())
 
 
-def _read_stewards(table: Table, network: Network, fleet: Fleet, first: int) -> dict[int, int]:
+def _read_stewards(table: TomlTable, network: Network, fleet: FleetReader, first: int) -> dict[int, int]:
     """Which desk holds the rights to which entity at first: the one named, else the lowest."""
     stewards = dict.fromkeys(network.entities, first)
     for name in sorted(network.numbers):
@@ -228,7 +228,7 @@ def _read_stewards(table: Table, network: Network, fleet: Fleet, first: int) -> 
     return stewards
 
 
-def _check_ways(root: Table, site: Terminal, homes: dict[int, Table]) -> None:
+def _check_ways(root: TomlTable, site: Terminal, homes: dict[int, TomlTable]) -> None:
     """That every station can be reached from every home, and every area left for every station."""
     stations = [one for one in site.entities.values() if one.kind is EntityKind.STATION]
     if not stations:

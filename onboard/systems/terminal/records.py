@@ -5,7 +5,7 @@ Rows of numbers stand as text: numbers with commas between, rows with semicolons
 
 from dataclasses import dataclass
 
-from onboard.core.journal_records import End, JournalRecord, Keep, RecordTypes, Which
+from onboard.core.journal_records import JournalRecord, Keep, RecordEnd, RecordTypes, Which
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,7 +13,7 @@ class PlanRecord(JournalRecord):
     """A plan that begins at ``begin``, bus time in us; a new one ends the steps of the one before."""
 
     NAME = "plan"
-    RULES = (Keep("plan"), End(("step",)))
+    RULES = (Keep("plan"), RecordEnd(("step",)))
 
     version: int
     begin: int

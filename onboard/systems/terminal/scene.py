@@ -21,7 +21,7 @@ _DRIVING = Action.GOTO
 
 
 @dataclass
-class _Body:
+class _SeenVehicle:
     """One vehicle: its plan as far as it was told, the step it is at, and how it moves meanwhile."""
 
     entity: int
@@ -45,7 +45,7 @@ class TerminalScene:
         self.words = view.words
         self._clock = view.history.clock
         self._rights = view.history.rights
-        self._bodies = {node: _Body(site.machines[node].home.track) for node in site.vehicles}
+        self._bodies = {node: _SeenVehicle(site.machines[node].home.track) for node in site.vehicles}
         self._blocked: dict[int, bool] = {}
         self._boxes = {number: box.station for number, box in enumerate(site.boxes, start=1)}
         chart = chart_of(site)
@@ -145,7 +145,7 @@ class TerminalScene:
         body.since_us = self._clock.log_us(report.at_ms, time_us) or time_us
         self._go(report.sender, body, time_us)
 
-    def _go(self, node: int, body: _Body, time_us: int) -> None:
+    def _go(self, node: int, body: _SeenVehicle, time_us: int) -> None:
         """The step in hand begins."""
         step = body.steps.get(body.current)
         if step is None:
@@ -160,7 +160,7 @@ class TerminalScene:
             else:
                 body.path = still(self._standing(node, step.entity), time_us)
 
-    def _in_slot(self, node: int, body: _Body, time_us: int, *, at_end: bool) -> None:
+    def _in_slot(self, node: int, body: _SeenVehicle, time_us: int, *, at_end: bool) -> None:
         """What the vehicle's own drive says: into this slot, evenly, or at its end."""
         entity = self.site.entities[body.entity]
         line = self._lines.get(body.entity)
@@ -198,10 +198,10 @@ class TerminalScene:
             "told": told,
         }
 
-    def _to_come(self, body: _Body) -> Iterator[PlanStep]:
+    def _to_come(self, body: _SeenVehicle) -> Iterator[PlanStep]:
         return (body.steps[number] for number in range(body.current, body.count) if number in body.steps)
 
-    def _ahead(self, node: int, body: _Body) -> list[str | list[float]]:
+    def _ahead(self, node: int, body: _SeenVehicle) -> list[str | list[float]]:
         """The way to come: lanes by their shapes, the one in hand too; other places by their spots."""
         found: list[str | list[float]] = []
         for step in self._to_come(body):

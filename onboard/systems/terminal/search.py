@@ -14,20 +14,20 @@ from onboard.systems.terminal.plan import (
     MAX_STEPS,
     NO_STEP,
     NOBODY_BEFORE,
+    ActionPlan,
+    ActionStep,
     Load,
-    Plan,
-    Step,
     drive_steps,
     handling_steps,
 )
 from onboard.systems.terminal.routes import routes
 from onboard.systems.terminal.site import EntityKind, StationKind, Terminal
-from onboard.systems.terminal.traffic import Node, Traffic, Visit, copy_of
+from onboard.systems.terminal.traffic import EntityVisit, StepDate, Traffic, copy_of
 
 _EVER = 1 << 62
 
 
-class Job(NamedTuple):
+class BoxTransport(NamedTuple):
     """One transport: a box from station to station; ``source`` 0 where it is aboard already."""
 
     box: int
@@ -51,7 +51,7 @@ class _Stay(NamedTuple):
     """One visit of a way: its entity and its steps."""
 
     entity: int
-    steps: tuple[Step, ...]
+    steps: tuple[ActionStep, ...]
     box: int
 
     @property
@@ -69,15 +69,15 @@ class _Reached:
     before: "_Reached | None"
 
 
-class Found(NamedTuple):
+class FoundPlan(NamedTuple):
     """A plan, and whether it delays others."""
 
-    plan: Plan
+    plan: ActionPlan
     pushes: bool
 
 
 @dataclass
-class Search:
+class PlanSearch:
     """Plans of one machine over its mirror. ``now`` in the unit of the site's durations."""
 
     site: Terminal
@@ -86,12 +86,14 @@ class Search:
     now: int
     avoid: frozenset[int] = frozenset()
 
-    def best(self, here: int, began: int, job: Job, *, version: int, kept: Plan | None = None) -> Found | None:
+    def best(
+        self, here: int, began: int, job: BoxTransport, *, version: int, kept: ActionPlan | None = None
+    ) -> FoundPlan | None:
         """The plan that ends first for a machine that is in ``here`` since ``began`` and has nothing to do but ``job``.
 
         ``kept`` are the steps that come first, of the plan in hand. None where no way leads there.
         """
-        found: list[Found] = []
+        found: list[FoundPlan] = []
         if kept is not None and self._buries(kept, job.source):
             return None
         for steps in self._ways(here, job):
@@ -102,7 +104,7 @@ class Search:
                 found.append(one)
         return min(found, key=lambda one: (one.pushes, one.plan.end), default=None)
 
-    def _buries(self, kept: Plan, source: int) -> bool:
+    def _buries(self, kept: ActionPlan, source: int) -> bool:
         """Whether the plan in hand ends with a box on the stack from which the next one is to be fetched: above it."""
         return self._is_stack(source) and any(kept.steps[load.put].entity == source for load in kept.loads)
 
@@ -111,7 +113,7 @@ class Search:
 
     # --- ways --------------------------------------------------------------------------------------------------
 
-    def _ways(self, here: int, job: Job) -> Iterator[list[Step]]:
+    def _ways(self, here: int, job: BoxTransport) -> Iterator[list[ActionStep]]:
         """Several routes to the loading station, several on to the unloading station."""
         site, count = self.site, self.site.routes
         if not job.source:
@@ -124,7 +126,7 @@ class Search:
             for second in routes(site, area, job.target, count, self.avoid):
                 yield load + self._unload(second, job, job.source)
 
-    def _unload(self, way: tuple[int, ...], job: Job, before: int) -> list[Step]:
+    def _unload(self, way: tuple[int, ...], job: BoxTransport, before: int) -> list[ActionStep]:
         return drive_steps(self.site, way, before) + handling_steps(self.site, job.target, Action.PUT_DOWN)
 
     # --- gaps --------------------------------------------------------------------------------------------------
@@ -165,7 +167,7 @@ class Search:
                     return None
         return Room(number, enter_low, enter_high, leave_low, leave_high)
 
-    def _stack_places(self, row: list[Visit], box: int, *, puts: bool) -> tuple[int, int]:
+    def _stack_places(self, row: list[EntityVisit], box: int, *, puts: bool) -> tuple[int, int]:
         """Behind whoever takes a box from above this one, before whoever takes one from below or puts one on it.
 
         Who ``puts`` one on a stack comes behind all who fetch from it.
@@ -188,13 +190,15 @@ class Search:
 
     # --- fitting -----------------------------------------------------------------------------------------------
 
-    def _fit(self, steps: list[Step], began: int, job: Job, version: int, kept: Plan | None) -> Found | None:
+    def _fit(
+        self, steps: list[ActionStep], began: int, job: BoxTransport, version: int, kept: ActionPlan | None
+    ) -> FoundPlan | None:
         stays = _stays(steps, job.box)
         last = self._through(stays, began, is_kept=kept is not None)
         if last is not None:
-            return Found(self._plan(steps, stays, last, job, version, kept), pushes=False)
+            return FoundPlan(self._plan(steps, stays, last, job, version, kept), pushes=False)
         plan = self._push(steps, stays, began, job, version, kept)
-        return Found(plan, pushes=True) if plan is not None else None
+        return FoundPlan(plan, pushes=True) if plan is not None else None
 
     def _through(self, stays: list[_Stay], began: int, *, is_kept: bool) -> _Reached | None:
         """The earliest way through the gaps: for each gap of each stay, the earliest coming in."""
@@ -249,22 +253,28 @@ class Search:
         for owner, owned in self.traffic.plans.items():
             for load in owned.plan.loads:
                 if owner != self.owner and owned.current <= load.pick < NO_STEP and self._is_above(load.box, box):
-                    at = max(at, self.traffic.dates(self.now).at[Node(owner, load.pick + 1)] + self.site.gap_us)
+                    at = max(at, self.traffic.dates(self.now).at[StepDate(owner, load.pick + 1)] + self.site.gap_us)
         return at
 
     def _is_above(self, upper: int, lower: int) -> bool:
         return lower in self.traffic.below.get(upper, ())
 
     def _plan(
-        self, steps: list[Step], stays: list[_Stay], last: _Reached, job: Job, version: int, kept: Plan | None
-    ) -> Plan:
+        self,
+        steps: list[ActionStep],
+        stays: list[_Stay],
+        last: _Reached,
+        job: BoxTransport,
+        version: int,
+        kept: ActionPlan | None,
+    ) -> ActionPlan:
         """The plan along the gaps, each stay ending when the next begins, with its predecessor on every list."""
         chain: list[_Reached] = []
         one: _Reached | None = last
         while one is not None:
             chain.insert(0, one)
             one = one.before
-        told: list[Step] = []
+        dated: list[ActionStep] = []
         for number, (stay, at) in enumerate(zip(stays, chain, strict=True)):
             ends = self._dates(stay, at.enter)
             ends[-1] = max(ends[-1], at.room.leave_low)
@@ -273,28 +283,36 @@ class Search:
             row = [visit for visit in self.traffic.lists.get(stay.entity, ()) if visit.owner != self.owner]
             after = row[at.room.place - 1].key if 0 < at.room.place <= len(row) else NOBODY_BEFORE
             for step, end in zip(stay.steps, ends, strict=True):
-                told.append(step._replace(end=end, after=after))
-        return self._joined(told, chain[0].enter, job, version, kept)
+                dated.append(step._replace(end=end, after=after))
+        return self._joined(dated, chain[0].enter, job, version, kept)
 
-    def _joined(self, told: list[Step], began: int, job: Job, version: int, kept: Plan | None) -> Plan:
+    def _joined(
+        self, dated: list[ActionStep], began: int, job: BoxTransport, version: int, kept: ActionPlan | None
+    ) -> ActionPlan:
         before = len(kept.steps) if kept is not None else 0
-        picks = [number for number, step in enumerate(told) if step.action is Action.PICK_UP]
-        puts = [number for number, step in enumerate(told) if step.action is Action.PUT_DOWN]
+        picks = [number for number, step in enumerate(dated) if step.action is Action.PICK_UP]
+        puts = [number for number, step in enumerate(dated) if step.action is Action.PUT_DOWN]
         load = Load(job.box, job.task, before + picks[0] if picks else NO_STEP, before + puts[0], job.before)
         if kept is None:
-            return Plan(self.owner, version, began, tuple(told), (load,))
-        return replace(kept, version=version, steps=(*kept.steps, *told), loads=(*kept.loads, load))
+            return ActionPlan(self.owner, version, began, tuple(dated), (load,))
+        return replace(kept, version=version, steps=(*kept.steps, *dated), loads=(*kept.loads, load))
 
     def _push(
-        self, steps: list[Step], stays: list[_Stay], began: int, job: Job, version: int, kept: Plan | None
-    ) -> Plan | None:
+        self,
+        steps: list[ActionStep],
+        stays: list[_Stay],
+        began: int,
+        job: BoxTransport,
+        version: int,
+        kept: ActionPlan | None,
+    ) -> ActionPlan | None:
         """Where others are delayed: before those only who follow on the lane in hand, behind all, or before all.
 
         None where each of these makes a circle.
         """
         followers = self._followers(stays[0].entity)
         for ahead_of in (followers, frozenset[int](), frozenset(self.traffic.plans)):
-            told: list[Step] = []
+            dated: list[ActionStep] = []
             at = began
             for stay in stays:
                 row = [visit for visit in self.traffic.lists.get(stay.entity, ()) if visit.owner != self.owner]
@@ -306,8 +324,8 @@ class Search:
                 after = row[place - 1].key if place else NOBODY_BEFORE
                 for step in stay.steps:
                     at = max(at + step.duration, self.now)
-                    told.append(step._replace(end=at, after=after))
-            plan = self._dated(self._joined(told, began, job, version, kept))
+                    dated.append(step._replace(end=at, after=after))
+            plan = self._dated(self._joined(dated, began, job, version, kept))
             if plan is not None:
                 return plan
         return None
@@ -320,18 +338,18 @@ class Search:
         mine = next((n for n, one in enumerate(row) if one.owner == self.owner), len(row))
         return frozenset(one.owner for one in row[mine + 1 :])
 
-    def _dated(self, plan: Plan) -> Plan | None:
+    def _dated(self, plan: ActionPlan) -> ActionPlan | None:
         """A plan with the dates that follow when it is put between the others; None where they would never end."""
         trial = copy_of(self.traffic)
         trial.take_up(plan, self.now)
         dates = trial.dates(self.now)
         if dates.circle:
             return None
-        ends = [dates.at[Node(self.owner, number + 1)] for number in range(len(plan.steps))]
+        ends = [dates.at[StepDate(self.owner, number + 1)] for number in range(len(plan.steps))]
         return replace(plan, steps=tuple(step._replace(end=end) for step, end in zip(plan.steps, ends, strict=True)))
 
 
-def _stays(steps: list[Step], box: int) -> list[_Stay]:
+def _stays(steps: list[ActionStep], box: int) -> list[_Stay]:
     """The steps in groups of one entity each; the box is named where it is picked up."""
     found: list[_Stay] = []
     for number, step in enumerate(steps):
@@ -344,7 +362,7 @@ def _stays(steps: list[Step], box: int) -> list[_Stay]:
     return found
 
 
-def remaining(traffic: Traffic, owner: int, now: int) -> Plan | None:
+def remaining(traffic: Traffic, owner: int, now: int) -> ActionPlan | None:
     """What is left of a machine's plan, as a plan of its own that begins with the step in hand; None where nothing is.
 
     Each step comes after whom it comes after now, so the lists stay as they are.
@@ -358,7 +376,7 @@ def remaining(traffic: Traffic, owner: int, now: int) -> Plan | None:
     for number in range(skip, len(old.steps)):
         step = old.steps[number]
         # On a circle there are no dates; a plan that is told then still follows itself in time.
-        end = max(dates[Node(owner, number + 1)], end + step.duration)
+        end = max(dates[StepDate(owner, number + 1)], end + step.duration)
         row = traffic.lists.get(step.entity, [])
         place = next((n for n, one in enumerate(row) if one.owner == owner and one.first <= number <= one.last), 0)
         after = row[place - 1].key if place else NOBODY_BEFORE
@@ -370,4 +388,4 @@ def remaining(traffic: Traffic, owner: int, now: int) -> Plan | None:
         for load in old.loads
         if load.put >= skip
     )
-    return Plan(owner, old.version, owned.began, tuple(steps), loads)
+    return ActionPlan(owner, old.version, owned.began, tuple(steps), loads)

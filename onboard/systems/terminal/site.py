@@ -12,7 +12,7 @@ from typing import ClassVar, NamedTuple
 
 from onboard.contract.codes import KindCode
 from onboard.contract.messages import Reference
-from onboard.core.site import Needs, Site
+from onboard.core.site import MotionNeeds, Site
 
 
 class EntityKind(Enum):
@@ -110,7 +110,7 @@ class Terminal(Site):
 
     system: ClassVar[str] = "terminal"
     demand: ClassVar[frozenset[str]] = frozenset({"missions", "blockages", "presses"})
-    moved_by: ClassVar[Mapping[str, Needs]] = {"MoveOrder": Needs.PLACE, "HandlerOrder": Needs.RIGHT}
+    moved_by: ClassVar[Mapping[str, MotionNeeds]] = {"MoveOrder": MotionNeeds.PLACE, "HandlerOrder": MotionNeeds.RIGHT}
 
     entities: Mapping[int, Entity] = field(default_factory=dict)
     boxes: tuple[Box, ...] = ()

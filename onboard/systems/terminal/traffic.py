@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple
 
-from onboard.systems.terminal.plan import Load, Plan, VisitKey
+from onboard.systems.terminal.plan import ActionPlan, EntityStay, Load
 from onboard.systems.terminal.site import EntityKind, StationKind, Terminal
 
 
-class Visit(NamedTuple):
+class EntityVisit(NamedTuple):
     """A machine's stay in an entity: steps ``first`` to ``last`` of its plan."""
 
     owner: int
@@ -22,23 +22,23 @@ class Visit(NamedTuple):
     last: int
 
     @property
-    def key(self) -> VisitKey:
+    def key(self) -> EntityStay:
         """Its name on the bus."""
-        return VisitKey(self.owner, self.first)
+        return EntityStay(self.owner, self.first)
 
 
-class Node(NamedTuple):
+class StepDate(NamedTuple):
     """One date: that at which step ``step`` of a machine's plan begins; for the number of steps, at which it ends."""
 
     owner: int
     step: int
 
 
-class Edge(NamedTuple):
+class DateConstraint(NamedTuple):
     """``to`` is at least ``weight`` after ``origin``."""
 
-    origin: Node
-    to: Node
+    origin: StepDate
+    to: StepDate
     weight: int
 
 
@@ -46,7 +46,7 @@ class Edge(NamedTuple):
 class Owned:
     """A plan in execution: ``current`` is its first step that is not over, begun at ``began``."""
 
-    plan: Plan
+    plan: ActionPlan
     current: int = 0
     began: int = 0
 
@@ -59,11 +59,11 @@ class Owned:
 class Dates(NamedTuple):
     """Earliest dates of all nodes, and the machines whose plans contradict each other, so that there are none."""
 
-    at: dict[Node, int]
+    at: dict[StepDate, int]
     circle: frozenset[int]
 
 
-class Violation(NamedTuple):
+class PlanViolation(NamedTuple):
     """Why a plan must be made anew."""
 
     owner: int
@@ -77,7 +77,7 @@ class Traffic:
     site: Terminal
     plans: dict[int, Owned] = field(default_factory=dict)
     #: Stays that are not over, by entity, in the order in which robots come.
-    lists: dict[int, list[Visit]] = field(default_factory=dict)
+    lists: dict[int, list[EntityVisit]] = field(default_factory=dict)
     #: Lanes that are blocked, and since when.
     blocked: dict[int, int] = field(default_factory=dict)
     #: Dates by which tasks are to be put down.
@@ -89,7 +89,7 @@ class Traffic:
 
     # --- plans and reports -------------------------------------------------------------------------------------
 
-    def take_up(self, plan: Plan, now: int) -> bool:
+    def take_up(self, plan: ActionPlan, now: int) -> bool:
         """Put a plan in place of its owner's former one; True where it was news."""
         known = self.plans.get(plan.owner)
         if known is not None and known.plan == plan:
@@ -101,7 +101,7 @@ class Traffic:
         self.plans[plan.owner] = Owned(plan, 0, plan.begin)
         for number, (first, last) in enumerate(plan.visits()):
             entity = plan.steps[first].entity
-            visit = Visit(plan.owner, first, last)
+            visit = EntityVisit(plan.owner, first, last)
             row = self.lists.setdefault(entity, [])
             if number == 0:
                 known_place = kept[1] if kept is not None and kept[0] == entity else None
@@ -161,7 +161,7 @@ class Traffic:
             None,
         )
 
-    def _place(self, row: list[Visit], visit: Visit, plan: Plan) -> int:
+    def _place(self, row: list[EntityVisit], visit: EntityVisit, plan: ActionPlan) -> int:
         """Right after the one named; where that one is gone, by the dates, and after everybody who is there."""
         step = plan.steps[visit.first]
         begin = plan.begin if visit.first == 0 else plan.steps[visit.first - 1].end
@@ -177,7 +177,7 @@ class Traffic:
         owned_at = [self._told_begin(other) for other in row]
         return max(inside, sum(1 for told in owned_at if told <= begin))
 
-    def _place_in_row(self, row: list[Visit], after: VisitKey, known: int | None) -> int:
+    def _place_in_row(self, row: list[EntityVisit], after: EntityStay, known: int | None) -> int:
         """Whoever is there already says whom it is behind: that is so on the ground. Nobody: in front."""
         owners = [visit.owner for visit in row]
         if not after.owner:
@@ -186,11 +186,11 @@ class Traffic:
             return owners.index(after.owner) + 1
         return known if known is not None else sum(1 for visit in row if self.is_inside(visit))
 
-    def _told_begin(self, visit: Visit) -> int:
+    def _told_begin(self, visit: EntityVisit) -> int:
         plan = self.plans[visit.owner].plan
         return plan.begin if visit.first == 0 else plan.steps[visit.first - 1].end
 
-    def is_inside(self, visit: Visit) -> bool:
+    def is_inside(self, visit: EntityVisit) -> bool:
         """Whether a stay has begun, by the reports heard."""
         owned = self.plans.get(visit.owner)
         return owned is not None and visit.first <= owned.current <= visit.last
@@ -221,7 +221,7 @@ class Traffic:
                 moved = True
         return moved
 
-    def _next_visit(self, visit: Visit) -> tuple[int, Visit] | None:
+    def _next_visit(self, visit: EntityVisit) -> tuple[int, EntityVisit] | None:
         """Where a machine goes from a stay, and its stay there."""
         steps = self.plans[visit.owner].plan.steps
         if visit.last + 1 >= len(steps):
@@ -239,15 +239,15 @@ class Traffic:
             self._known = (self.changes, now, earliest(*self._network(now)))
         return self._known[2]
 
-    def _network(self, now: int) -> tuple[dict[Node, int], list[Edge]]:
-        floors: dict[Node, int] = {}
-        edges: list[Edge] = []
+    def _network(self, now: int) -> tuple[dict[StepDate, int], list[DateConstraint]]:
+        floors: dict[StepDate, int] = {}
+        edges: list[DateConstraint] = []
         for owner, owned in self.plans.items():
             count = len(owned.plan.steps)
             for step in range(owned.current, count + 1):
-                floors[Node(owner, step)] = owned.began if step == owned.current else now
+                floors[StepDate(owner, step)] = owned.began if step == owned.current else now
             edges += [
-                Edge(Node(owner, step), Node(owner, step + 1), owned.plan.steps[step].duration)
+                DateConstraint(StepDate(owner, step), StepDate(owner, step + 1), owned.plan.steps[step].duration)
                 for step in range(owned.current, count)
             ]
             self._add_blocked(owned, floors, now)
@@ -256,34 +256,34 @@ class Traffic:
         edges += self._stack_edges()
         return floors, edges
 
-    def _add_blocked(self, owned: Owned, floors: dict[Node, int], now: int) -> None:
+    def _add_blocked(self, owned: Owned, floors: dict[StepDate, int], now: int) -> None:
         """Nobody knows how long a lane stays blocked: so long as waiting for it is patience."""
         for step in range(owned.current, len(owned.plan.steps)):
             since = self.blocked.get(owned.plan.steps[step].entity)
             if since is not None:
-                node = Node(owned.plan.owner, step + 1)
+                node = StepDate(owned.plan.owner, step + 1)
                 floors[node] = max(floors[node], since + self.site.patience_us, now)
 
-    def _begin(self, visit: Visit) -> Node:
-        return Node(visit.owner, max(visit.first, self.plans[visit.owner].current))
+    def _begin(self, visit: EntityVisit) -> StepDate:
+        return StepDate(visit.owner, max(visit.first, self.plans[visit.owner].current))
 
-    def _list_edges(self, entity: int, row: list[Visit]) -> list[Edge]:
+    def _list_edges(self, entity: int, row: list[EntityVisit]) -> list[DateConstraint]:
         place, gap = self.site.entities[entity], self.site.gap_us
-        edges: list[Edge] = []
+        edges: list[DateConstraint] = []
         is_lane = place.kind is EntityKind.LANE
         for number, visit in enumerate(row):
-            end = Node(visit.owner, visit.last + 1)
+            end = StepDate(visit.owner, visit.last + 1)
             if is_lane and number + 1 < len(row):
                 behind = row[number + 1]
-                edges.append(Edge(end, Node(behind.owner, behind.last + 1), gap))
+                edges.append(DateConstraint(end, StepDate(behind.owner, behind.last + 1), gap))
                 if not self.is_inside(behind):
-                    edges.append(Edge(self._begin(visit), self._begin(behind), gap))
+                    edges.append(DateConstraint(self._begin(visit), self._begin(behind), gap))
             follower = number + place.capacity
             if place.capacity and follower < len(row) and not self.is_inside(row[follower]):
-                edges.append(Edge(end, self._begin(row[follower]), gap))
+                edges.append(DateConstraint(end, self._begin(row[follower]), gap))
         return edges
 
-    def _stack_edges(self) -> list[Edge]:
+    def _stack_edges(self) -> list[DateConstraint]:
         """Upper box first (M17)."""
         picks = {}
         for owner, owned in self.plans.items():
@@ -297,36 +297,36 @@ class Traffic:
             for lower in self.below.get(upper, ()):
                 if lower in picks and picks[lower][2] == station:
                     other, pick, _ = picks[lower]
-                    edges.append(Edge(Node(owner, step + 1), Node(other, pick), self.site.gap_us))
+                    edges.append(DateConstraint(StepDate(owner, step + 1), StepDate(other, pick), self.site.gap_us))
         return edges
 
     # --- what follows ------------------------------------------------------------------------------------------
 
-    def begin_and_end(self, visit: Visit, now: int) -> tuple[int, int]:
+    def begin_and_end(self, visit: EntityVisit, now: int) -> tuple[int, int]:
         """Earliest dates at which a stay begins and ends."""
         dates = self.dates(now).at
-        return dates[self._begin(visit)], dates[Node(visit.owner, visit.last + 1)]
+        return dates[self._begin(visit)], dates[StepDate(visit.owner, visit.last + 1)]
 
     def end_of(self, owner: int, now: int) -> int:
         """When a machine's plan ends at the earliest; ``now`` where it has none."""
         owned = self.plans.get(owner)
-        return now if owned is None else self.dates(now).at[Node(owner, len(owned.plan.steps))]
+        return now if owned is None else self.dates(now).at[StepDate(owner, len(owned.plan.steps))]
 
     def date_of(self, load: Load) -> int:
         """By when a load is to be put down, 0 for no date."""
         return load.before or self.before.get(load.task, 0)
 
-    def violations(self, now: int) -> list[Violation]:
+    def violations(self, now: int) -> list[PlanViolation]:
         """Plans that cannot be kept (M16, M31): only these are to be made anew, the later ones of a circle first."""
         dates = self.dates(now)
         found = []
         if dates.circle:
-            return [Violation(self._breaker(dates.circle, now), "plans wait for each other")]
+            return [PlanViolation(self._breaker(dates.circle, now), "plans wait for each other")]
         for owner, owned in self.plans.items():
             for load in owned.plan.loads:
                 date = self.date_of(load)
-                if date and load.put >= owned.current and dates.at[Node(owner, load.put + 1)] >= date:
-                    found.append(Violation(owner, f"box {load.box} would be put down too late"))
+                if date and load.put >= owned.current and dates.at[StepDate(owner, load.put + 1)] >= date:
+                    found.append(PlanViolation(owner, f"box {load.box} would be put down too late"))
                     break
         return found
 
@@ -337,7 +337,7 @@ class Traffic:
             trial, owned = copy_of(self), self.plans[owner]
             _, last = next(visit for visit in owned.plan.visits() if visit[1] >= owned.current)
             steps = owned.plan.steps[owned.current : last + 1]
-            trial.take_up(Plan(owner, owned.plan.version, owned.began, steps), now)
+            trial.take_up(ActionPlan(owner, owned.plan.version, owned.began, steps), now)
             if not trial.dates(now).circle:
                 return owner
         return ranked[0]
@@ -359,12 +359,12 @@ def copy_of(traffic: Traffic) -> Traffic:
     )
 
 
-def earliest(floors: dict[Node, int], edges: list[Edge]) -> Dates:
+def earliest(floors: dict[StepDate, int], edges: list[DateConstraint]) -> Dates:
     """Earliest dates: the longest way to each node from its floor, each edge looked at once (Kahn's order).
 
     Nodes that are on a circle, or behind one, keep their floors; their machines are named.
     """
-    out: dict[Node, list[Edge]] = {node: [] for node in floors}
+    out: dict[StepDate, list[DateConstraint]] = {node: [] for node in floors}
     waiting = dict.fromkeys(floors, 0)
     for edge in edges:
         if edge.origin in out and edge.to in waiting:
@@ -386,7 +386,7 @@ def earliest(floors: dict[Node, int], edges: list[Edge]) -> Dates:
     return Dates(at, frozenset(_on_circle(out, {node for node, count in waiting.items() if count})))
 
 
-def _on_circle(out: dict[Node, list[Edge]], left: set[Node]) -> set[int]:
+def _on_circle(out: dict[StepDate, list[DateConstraint]], left: set[StepDate]) -> set[int]:
     """Machines on circles: what is only behind one is taken away from its end."""
     while True:
         dead = {node for node in left if not any(edge.to in left for edge in out[node])}

@@ -19,9 +19,9 @@ from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import Permit, authorised
 from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.site import Machine, Segment, Site
-from onboard.systems.terminal.body import Body
+from onboard.systems.terminal.body import VehicleParts
 from onboard.systems.terminal.generation import VehicleGeneration
-from onboard.systems.terminal.manual import Manual
+from onboard.systems.terminal.manual import VehicleMode
 from onboard.systems.terminal.memory import box_record, read_boxes
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.plan import Load
@@ -70,18 +70,18 @@ class Vehicle:
     fleet: CarFleet
     generation: VehicleGeneration
     kind: KindCode = KindCode.VEHICLE
-    body: Body = field(init=False)
+    body: VehicleParts = field(init=False)
     planner: Planner = field(init=False)
-    manual: Manual = field(init=False)
+    manual: VehicleMode = field(init=False)
     _retry_at_us: int | None = None
     _may_retry: bool = False
     _told_blocked: bool = False
     _actions: dict[Action, Callable[[Owned, int], list[Effect]]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self.body = Body(self.fleet.node_id)
+        self.body = VehicleParts(self.fleet.node_id)
         self.planner = Planner(self.fleet, self.generation, self.body)
-        self.manual = Manual(self.fleet.node_id)
+        self.manual = VehicleMode(self.fleet.node_id)
         self._actions = {
             Action.GOTO: self._goto,
             Action.DOCK: self._dock,

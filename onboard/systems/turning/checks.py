@@ -6,8 +6,8 @@ from onboard.contract.codes import CallResult, TaskPhase
 from onboard.contract.messages import Award, Bid, CallForProposals, Reference, TaskReport
 from onboard.contract.turning import BillBar, BillCutting, BillWaiting, LathePhase, LatheProgress
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 
 #: Five terms and their sum are rounded to cents one by one, ct.
@@ -21,7 +21,7 @@ class BillsAddUp(Rule):
     title = "the five terms of a bid sum to it"
     source = "row P26"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._terms: dict[tuple[int, Reference], dict[str, int]] = {}
         self._tasks: dict[tuple[int, int], Reference] = {}
@@ -39,27 +39,27 @@ class BillsAddUp(Rule):
     def _of(self, sender: int, manager: int, task: int) -> dict[str, int]:
         return self._terms.setdefault((sender, Reference(manager, task)), {})
 
-    def _on_cutting(self, event: Event[BillCutting]) -> None:
+    def _on_cutting(self, event: LogEvent[BillCutting]) -> None:
         word = event.message
         terms = self._of(word.sender, word.manager, word.task)
         terms["machining"], terms["tools"] = word.machining_ct, word.tools_ct
 
-    def _on_waiting(self, event: Event[BillWaiting]) -> None:
+    def _on_waiting(self, event: LogEvent[BillWaiting]) -> None:
         word = event.message
         terms = self._of(word.sender, word.manager, word.task)
         terms["setup"], terms["latency"] = word.setup_ct, word.latency_ct
 
-    def _on_bar(self, event: Event[BillBar]) -> None:
+    def _on_bar(self, event: LogEvent[BillBar]) -> None:
         word = event.message
         terms = self._of(word.sender, word.manager, word.task)
         terms["material"] = word.material_ct
         if len(terms) == 5 and abs(sum(terms.values()) - word.total_ct) > ROUNDING_CT:
             self.find(event, (word.sender,), f"terms sum to {sum(terms.values())} ct, told {word.total_ct} ct")
 
-    def _on_call(self, event: Event[CallForProposals]) -> None:
+    def _on_call(self, event: LogEvent[CallForProposals]) -> None:
         self._tasks[event.message.sender, event.message.call] = event.message.task
 
-    def _on_bid(self, event: Event[Bid]) -> None:
+    def _on_bid(self, event: LogEvent[Bid]) -> None:
         bid = event.message
         task = self._tasks.get((bid.initiator, bid.call))
         terms = self._terms.get((bid.sender, task), {}) if task is not None else {}
@@ -70,7 +70,7 @@ class BillsAddUp(Rule):
 class BillsGoDown(BidsGoDown):
     """As everywhere; a bid that is not the sum of its bill does not count."""
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._totals_ct: dict[tuple[int, Reference], int] = {}
 
@@ -78,7 +78,7 @@ class BillsGoDown(BidsGoDown):
         """Reads bills beside what the rule for bids needs."""
         return {**super().handlers(), BillBar: self._on_bar}
 
-    def _on_bar(self, event: Event[BillBar]) -> None:
+    def _on_bar(self, event: LogEvent[BillBar]) -> None:
         word = event.message
         self._totals_ct[word.sender, Reference(word.manager, word.task)] = word.total_ct
 
@@ -94,7 +94,7 @@ class OneLathe(Rule):
     title = "every order is on one lathe, and its batch only grows"
     source = "row P11"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._owner: dict[Reference, int] = {}
         self._made: dict[Reference, int] = {}
@@ -103,12 +103,12 @@ class OneLathe(Rule):
         """Reports, progress, and what the desk takes back."""
         return {TaskReport: self._on_report, LatheProgress: self._on_progress, Award: self._on_award}
 
-    def _on_award(self, event: Event[Award]) -> None:
+    def _on_award(self, event: LogEvent[Award]) -> None:
         word = event.message
         if word.result is CallResult.REJECTED and word.sender == word.task.origin:
             self._owner.pop(word.task, None)
 
-    def _on_report(self, event: Event[TaskReport]) -> None:
+    def _on_report(self, event: LogEvent[TaskReport]) -> None:
         word = event.message
         if word.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED):
             if self._owner.get(word.task) == word.sender:
@@ -119,7 +119,7 @@ class OneLathe(Rule):
             what = f"tells to have order {word.task.origin}.{word.task.number}, which another has"
             self.find(event, (word.sender, owner), what)
 
-    def _on_progress(self, event: Event[LatheProgress]) -> None:
+    def _on_progress(self, event: LogEvent[LatheProgress]) -> None:
         word = event.message
         task = Reference(word.manager, word.task)
         if word.made < self._made.get(task, 0) and word.lathe_phase is LathePhase.TURNING:

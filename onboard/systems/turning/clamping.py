@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from onboard.systems.turning.drawing import Drawing
-from onboard.systems.turning.lathe import Chuck, Job, Lathe
+from onboard.systems.turning.lathe import Chuck, Lathe, TurningJob
 
 #: What stays between the jaws and the last cut, mm: enough that a tool holder passes.
 JAW_GAP_MM = 5.0
@@ -18,7 +18,7 @@ class Clamping:
     bar_length_mm: float
 
 
-def choose_clamping(job: Job, drawing: Drawing, lathe: Lathe) -> Clamping | None:
+def choose_clamping(job: TurningJob, drawing: Drawing, lathe: Lathe) -> Clamping | None:
     """The first chuck that grips the bar; the tailstock where the part sticks out too far for its diameter.
 
     None where the lathe cannot hold the part, or the bar is too thin for the drawing.

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import pi, sqrt
 
 from onboard.systems.turning.drawing import Drawing
-from onboard.systems.turning.lathe import Job, Lathe, LatheState, Material, Tool, Work
+from onboard.systems.turning.lathe import Lathe, LatheOperation, LatheState, Material, Tool, TurningJob
 
 #: Share of the motor's power that reaches the cut. Usual for geared lathes.
 EFFICIENCY = 0.8
@@ -16,7 +16,7 @@ ALLOWANCE_MM = 0.4
 class Conditions:
     """How one operation is cut: surface speed in m/min, feed in mm a revolution, depth on the radius in mm."""
 
-    work: Work
+    work: LatheOperation
     tool: Tool
     speed_m_min: float
     feed_mm: float
@@ -30,15 +30,15 @@ class Conditions:
         return min(self.spindle_max_rpm, 1000 * self.speed_m_min / (pi * diameter_mm))
 
 
-def operations(job: Job, drawing: Drawing) -> tuple[Work, ...]:
+def operations(job: TurningJob, drawing: Drawing) -> tuple[LatheOperation, ...]:
     """What a part needs: facing where the bar is longer, roughing where it is thicker than finishing takes off."""
     depth_mm = job.bar_mm / 2 - drawing.front_um / 1000
-    face = (Work.FACE,) if job.face_mm > 0 else ()
-    rough = (Work.ROUGH,) if depth_mm > ALLOWANCE_MM else ()
-    return (*face, *rough, Work.FINISH)
+    face = (LatheOperation.FACE,) if job.face_mm > 0 else ()
+    rough = (LatheOperation.ROUGH,) if depth_mm > ALLOWANCE_MM else ()
+    return (*face, *rough, LatheOperation.FINISH)
 
 
-def choose_tools(works: tuple[Work, ...], lathe: Lathe, state: LatheState) -> tuple[Tool, ...] | None:
+def choose_tools(works: tuple[LatheOperation, ...], lathe: Lathe, state: LatheState) -> tuple[Tool, ...] | None:
     """For each operation the suited tool with the cheapest minute of cutting; of equals the one with more life left.
 
     None where the turret has no tool for an operation.
@@ -53,16 +53,16 @@ def choose_tools(works: tuple[Work, ...], lathe: Lathe, state: LatheState) -> tu
 
 
 def choose_conditions(
-    works: tuple[Work, ...], tools: tuple[Tool, ...], material: Material, drawing: Drawing, lathe: Lathe
+    works: tuple[LatheOperation, ...], tools: tuple[Tool, ...], material: Material, drawing: Drawing, lathe: Lathe
 ) -> tuple[Conditions, ...]:
     """Speed by tool and material, feed by tool or by the roughness asked for, depth by tool and spindle power."""
     return tuple(_conditions(work, tool, material, drawing, lathe) for work, tool in zip(works, tools, strict=True))
 
 
-def _conditions(work: Work, tool: Tool, material: Material, drawing: Drawing, lathe: Lathe) -> Conditions:
+def _conditions(work: LatheOperation, tool: Tool, material: Material, drawing: Drawing, lathe: Lathe) -> Conditions:
     speed_m_min = tool.speed_m_min * material.speed_factor
     feed_mm = tool.feed_mm
-    if work is Work.FINISH:
+    if work is LatheOperation.FINISH:
         feed_mm = min(feed_mm, finish_feed_mm(drawing.roughness_um, tool.nose_mm))
     depth_mm = min(tool.depth_mm, power_depth_mm(lathe.power_kw, material.cutting_force_n_mm2, feed_mm, speed_m_min))
     return Conditions(work, tool, speed_m_min, feed_mm, depth_mm, lathe.spindle_max_rpm)

@@ -23,7 +23,7 @@ class Bill(NamedTuple):
         return round(self.total_eur * 100)
 
 
-class Edge(NamedTuple):
+class ToolEdgeUse(NamedTuple):
     """Use of one tool's edge: price, minutes cut for one part, minutes that an edge lives."""
 
     price_eur: float
@@ -34,7 +34,7 @@ class Edge(NamedTuple):
 def bill(
     hourly_eur: float,
     machining_min: float,
-    edges: tuple[Edge, ...],
+    edges: tuple[ToolEdgeUse, ...],
     setup_min: float,
     batch: int,
     material_eur: float,

@@ -11,11 +11,11 @@ from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.effects import Effect
 from onboard.core.journal_records import records_in
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import CallTerms, Estimator
+from onboard.core.negotiation import Estimator, RequestedTerms
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.core.site import Machine, Site
 from onboard.systems.turning.generation import call_terms, least_cents, longest_us, turning
-from onboard.systems.turning.lathe import Job
+from onboard.systems.turning.lathe import TurningJob
 from onboard.systems.turning.records import JobOrderRecord, JobOrderStateRecord
 from onboard.work.order_desk import OrderDesk
 from onboard.work.order_life import WorkOrder
@@ -23,15 +23,15 @@ from onboard.work.plain import NoEstimator
 
 
 @dataclass
-class Order(WorkOrder):
+class BatchOrder(WorkOrder):
     """An order for a batch of parts; ``total_ct`` is the price of one."""
 
-    job: Job
+    job: TurningJob
     total_ct: int = field(default=0, kw_only=True)
 
 
 @dataclass(frozen=True)
-class DeskFactory(BehaviourFactory):
+class BatchDeskFactory(BehaviourFactory):
     """Makes order desks."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
@@ -44,7 +44,7 @@ class DeskFactory(BehaviourFactory):
 
 
 @dataclass
-class JobDesk(OrderDesk[Order]):
+class JobDesk(OrderDesk[BatchOrder]):
     """One desk of a workshop."""
 
     #: A batch takes long: its lathe is asked how it stands this often, us.
@@ -72,8 +72,8 @@ class JobDesk(OrderDesk[Order]):
             self.orders[task].answer_at_us = now_us
             return []
         face_mm = message.face_um / 1000
-        job = Job(message.drawing, message.material, message.bar_mm, message.batch, face_mm)
-        return self.come_in(Order(task, job), now_us)
+        job = TurningJob(message.drawing, message.material, message.bar_mm, message.batch, face_mm)
+        return self.come_in(BatchOrder(task, job), now_us)
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Prices, and lathes' reports."""
@@ -91,24 +91,24 @@ class JobDesk(OrderDesk[Order]):
 
     # --- the OrderDesk -----------------------------------------------------------------------------------------
 
-    def terms(self, order: Order) -> CallTerms:
+    def terms(self, order: BatchOrder) -> RequestedTerms:
         """A call to lathes; no lathe can make a part for less than its bar and its handling."""
         least_ct = least_cents(turning(self.fleet.site), order.job)
         return replace(call_terms(order.task, order.job), floor=lambda _call, _now_us: least_ct)
 
-    def stands_us(self, order: Order) -> int:
+    def stands_us(self, order: BatchOrder) -> int:
         """As long as the slowest lathe takes for one part, setting up included, tells no change."""
         return STANDS_AFTER_US + longest_us(turning(self.fleet.site), order.job)
 
-    def note_price(self, order: Order) -> None:
+    def note_price(self, order: BatchOrder) -> None:
         """As the winner's bill says."""
         order.total_ct = self._prices.get((order.winner, order.task), 0)
 
-    def state_record(self, order: Order) -> JobOrderStateRecord:
+    def state_record(self, order: BatchOrder) -> JobOrderStateRecord:
         """With its price in cents."""
         return JobOrderStateRecord(order.task.number, order.state, order.winner, order.total_ct)
 
-    def order_record(self, order: Order) -> JobOrderRecord:
+    def order_record(self, order: BatchOrder) -> JobOrderRecord:
         """What is to be made."""
         job = order.job
         face_um = round(job.face_mm * 1000)
@@ -120,13 +120,13 @@ class JobDesk(OrderDesk[Order]):
             match record:
                 case JobOrderRecord():
                     task = Reference(self.fleet.node_id, record.number)
-                    self.orders[task] = Order(task, record.job)
+                    self.orders[task] = BatchOrder(task, record.job)
                 case JobOrderStateRecord():
                     order = self.orders[Reference(self.fleet.node_id, record.number)]
                     order.winner, order.total_ct = record.winner, record.total_ct
                     self.take_up(order, record.state)
 
-    def answer(self, order: Order) -> Message:
+    def answer(self, order: BatchOrder) -> Message:
         """With the lathe and its price."""
-        number, result = order.task.number, OrderResult[order.told]
+        number, result = order.task.number, OrderResult[order.result_name]
         return JobAnswer(self.fleet.node_id, number, result, order.winner, order.total_ct)

@@ -27,7 +27,7 @@ class Shape(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Element:
+class ContourElement:
     """One element from ``start`` to ``end``; ``radius_um`` 0: straight, above 0: a convex arc, below 0: concave."""
 
     start: At
@@ -69,7 +69,7 @@ class Element:
         return centre.u_um - reach if self.radius_um > 0 else centre.u_um + reach
 
 
-def element_fault(element: Element) -> tuple[str, str] | None:
+def element_fault(element: ContourElement) -> tuple[str, str] | None:
     """What is wrong with an element and the remedy, or None: it falls back, is no arc, or bends more than a quarter."""
     start, end = element.start, element.end
     if end.u_um < start.u_um or end.r_um < start.r_um:
@@ -98,7 +98,7 @@ class Drawing:
 
     number: int
     name: str
-    elements: tuple[Element, ...]
+    elements: tuple[ContourElement, ...]
     roughness_um: float
 
     @property
@@ -117,7 +117,7 @@ class Drawing:
         first = self.elements[0]
         return first.end.r_um if first.shape is Shape.FACE else first.start.r_um
 
-    def behind_front(self) -> tuple[Element, ...]:
+    def behind_front(self) -> tuple[ContourElement, ...]:
         """The contour without the flat front face, which facing makes."""
         return self.elements[1:] if self.elements[0].shape is Shape.FACE else self.elements
 

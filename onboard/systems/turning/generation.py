@@ -10,11 +10,11 @@ from onboard.contract.codes import Criterion, KindCode, Operation
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import Bid, CallForProposals, Message, Reference
 from onboard.contract.turning import BillBar, BillCutting, BillWaiting, TurningOrder
-from onboard.core.negotiation import CallKey, CallTerms, Proposal
+from onboard.core.negotiation import CallKey, Proposal, RequestedTerms
 from onboard.core.site import Machine, Site
 from onboard.systems.turning.clamping import choose_clamping
 from onboard.systems.turning.cost import Bill
-from onboard.systems.turning.lathe import Job, Lathe, LatheState
+from onboard.systems.turning.lathe import Lathe, LatheState, TurningJob
 from onboard.systems.turning.process import Process, bar_eur, generate
 from onboard.systems.turning.site import Turning
 
@@ -35,10 +35,10 @@ class LatheGeneration:
     site: Turning
     machine: Machine
     state: LatheState = field(default_factory=LatheState)
-    in_hand: dict[Reference, Job] = field(default_factory=dict)
-    promised: dict[CallKey, Job] = field(default_factory=dict)
+    in_hand: dict[Reference, TurningJob] = field(default_factory=dict)
+    promised: dict[CallKey, TurningJob] = field(default_factory=dict)
     known: set[Reference] = field(default_factory=set)
-    _told: dict[Reference, Job] = field(default_factory=dict)
+    _told: dict[Reference, TurningJob] = field(default_factory=dict)
     #: The sums of the newest bills of others.
     _totals_ct: dict[tuple[int, Reference], int] = field(default_factory=dict)
 
@@ -96,7 +96,7 @@ class LatheGeneration:
             return None
         return process
 
-    def make(self, job: Job, state: LatheState) -> Process | None:
+    def make(self, job: TurningJob, state: LatheState) -> Process | None:
         """The five stages for a job in a state of the lathe; None for a drawing or material that the site has not."""
         drawing, material = self.site.drawings.get(job.drawing), self.site.materials.get(job.material)
         if drawing is None or material is None:
@@ -120,7 +120,7 @@ def turning(site: Site) -> Turning:
     return site
 
 
-def least_cents(site: Turning, job: Job) -> int:
+def least_cents(site: Turning, job: TurningJob) -> int:
     """What no lathe can be below for one part, in cents: bar, loading and unloading; all else depends on its state."""
     drawing, material = site.drawings.get(job.drawing), site.materials.get(job.material)
     if drawing is None or material is None:
@@ -134,7 +134,7 @@ def least_cents(site: Turning, job: Job) -> int:
     return min(least, default=0)
 
 
-def longest_us(site: Turning, job: Job) -> int:
+def longest_us(site: Turning, job: TurningJob) -> int:
     """The longest that any lathe takes between two words of its progress, us: for one part, and setting up for it."""
     drawing, material = site.drawings.get(job.drawing), site.materials.get(job.material)
     longest_min = 0.0
@@ -148,27 +148,27 @@ def longest_us(site: Turning, job: Job) -> int:
     return round(60_000_000 * longest_min)
 
 
-def after(job: Job, process: Process, state: LatheState) -> LatheState:
+def after(job: TurningJob, process: Process, state: LatheState) -> LatheState:
     """The state in which a job leaves the lathe: what its edges have still to live, and what it is set up for."""
     left_min = {number: wear.left_min for number, wear in process.wear.items()}
     used = {tool.number: tool.life_min - left_min[tool.number] for tool in process.tools}
     return LatheState({**state.used_min, **used}, (job.drawing, process.clamping.chuck.name))
 
 
-def job_of(message: TurningOrder) -> Job:
+def job_of(message: TurningOrder) -> TurningJob:
     """The job that an order's message asks for, lengths in mm."""
-    return Job(message.drawing, message.material, message.bar_mm, message.batch, message.face_um / 1000)
+    return TurningJob(message.drawing, message.material, message.bar_mm, message.batch, message.face_um / 1000)
 
 
-def order_message(task: Reference, job: Job) -> TurningOrder:
+def order_message(task: Reference, job: TurningJob) -> TurningOrder:
     """The message that asks for a job; lengths become whole um and mm."""
     face_um, bar_mm = round(job.face_mm * 1000), round(job.bar_mm)
     return TurningOrder(task.origin, task.number, job.drawing, job.material, job.batch, bar_mm, face_um)
 
 
-def call_terms(task: Reference, job: Job) -> CallTerms:
+def call_terms(task: Reference, job: TurningJob) -> RequestedTerms:
     """What a call for a job asks for; what the job is goes ahead in a frame of its own."""
-    terms = CallTerms(
+    terms = RequestedTerms(
         task, Operation.MACHINE, KindCode.LATHE, Criterion.MONEY, ANY_STATION, ANY_STATION, Reference(*task), 0
     )
     return replace(terms, detail=(order_message(task, job),))

@@ -5,7 +5,7 @@ revolution at constant surface speed, tool-nose compensation by the control (G42
 """
 
 from onboard.systems.turning.drawing import Drawing
-from onboard.systems.turning.lathe import Work
+from onboard.systems.turning.lathe import LatheOperation
 from onboard.systems.turning.trajectories import Cut, Trajectory, Xz
 
 
@@ -29,12 +29,12 @@ def _operation(path: Trajectory) -> list[str]:
         f"G95 G96 S{how.speed_m_min:.0f} M3",
         f"G0 X{_mm(2 * at.x_mm)} Z{_mm(at.z_mm)}",
     ]
-    if how.work is Work.FINISH:
+    if how.work is LatheOperation.FINISH:
         blocks.append("G42")
     for cut in path.cuts:
         blocks.append(_block(at, cut, how.feed_mm))
         at = cut.end
-    if how.work is Work.FINISH:
+    if how.work is LatheOperation.FINISH:
         blocks.append("G40")
     return blocks
 

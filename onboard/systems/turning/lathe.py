@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 
-class Work(Enum):
+class LatheOperation(Enum):
     """What a tool is made for; also the operations of a part, in their order."""
 
     FACE = "facing"
@@ -21,7 +21,7 @@ class Tool:
     """
 
     number: int
-    works: tuple[Work, ...]
+    works: tuple[LatheOperation, ...]
     speed_m_min: float
     depth_mm: float
     feed_mm: float
@@ -94,7 +94,7 @@ class LatheState:
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class TurningJob:
     """A turning task: a drawing's number, the bar (material, diameter, allowance at the face) and how many to make."""
 
     drawing: int

@@ -17,9 +17,9 @@ from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAs
 from onboard.core.site import Machine, Site
 from onboard.systems.turning.fields import text_frames
 from onboard.systems.turning.generation import LatheGeneration
-from onboard.systems.turning.lathe import Job
+from onboard.systems.turning.lathe import TurningJob
 from onboard.systems.turning.process import Process
-from onboard.systems.turning.records import JobLostRecord, JobOverRecord, JobRecord, JobStageRecord, Stage
+from onboard.systems.turning.records import BatchStage, JobLostRecord, JobOverRecord, JobRecord, JobStageRecord
 from onboard.systems.turning.site import Turning
 from onboard.work.device_link import DeviceLink
 from onboard.work.undertaking import TaskEvent, Undertakings
@@ -54,18 +54,18 @@ class Deed(Enum):
 
 #: (stage, control) -> (stage that follows, deed). The control counts parts anew when it is set up:
 #: until then the count is of the order before.
-TABLE: dict[tuple[Stage, Control], tuple[Stage, Deed]] = {
-    (Stage.WON, Control.BUSY): (Stage.WON, Deed.WAIT),
-    (Stage.WON, Control.UNMOVED): (Stage.WON, Deed.SAY_AGAIN),
-    (Stage.WON, Control.OTHER_PROGRAM): (Stage.WON, Deed.LOAD),
-    (Stage.WON, Control.FREE): (Stage.SETTING, Deed.SET_UP),
-    (Stage.SETTING, Control.BUSY): (Stage.SETTING, Deed.WAIT),
-    (Stage.SETTING, Control.UNMOVED): (Stage.SETTING, Deed.SAY_AGAIN),
-    (Stage.SETTING, Control.FREE): (Stage.MAKING, Deed.BEGIN),
-    (Stage.MAKING, Control.BUSY): (Stage.MAKING, Deed.WAIT),
-    (Stage.MAKING, Control.UNMOVED): (Stage.MAKING, Deed.SAY_AGAIN),
-    (Stage.MAKING, Control.FREE): (Stage.MAKING, Deed.MAKE),
-    (Stage.MAKING, Control.ALL_MADE): (Stage.MAKING, Deed.FINISH),
+TABLE: dict[tuple[BatchStage, Control], tuple[BatchStage, Deed]] = {
+    (BatchStage.WON, Control.BUSY): (BatchStage.WON, Deed.WAIT),
+    (BatchStage.WON, Control.UNMOVED): (BatchStage.WON, Deed.SAY_AGAIN),
+    (BatchStage.WON, Control.OTHER_PROGRAM): (BatchStage.WON, Deed.LOAD),
+    (BatchStage.WON, Control.FREE): (BatchStage.SETTING, Deed.SET_UP),
+    (BatchStage.SETTING, Control.BUSY): (BatchStage.SETTING, Deed.WAIT),
+    (BatchStage.SETTING, Control.UNMOVED): (BatchStage.SETTING, Deed.SAY_AGAIN),
+    (BatchStage.SETTING, Control.FREE): (BatchStage.MAKING, Deed.BEGIN),
+    (BatchStage.MAKING, Control.BUSY): (BatchStage.MAKING, Deed.WAIT),
+    (BatchStage.MAKING, Control.UNMOVED): (BatchStage.MAKING, Deed.SAY_AGAIN),
+    (BatchStage.MAKING, Control.FREE): (BatchStage.MAKING, Deed.MAKE),
+    (BatchStage.MAKING, Control.ALL_MADE): (BatchStage.MAKING, Deed.FINISH),
 }
 
 
@@ -74,8 +74,8 @@ class Batch:
     """An order in hand; ``process`` is worked out when it is begun, by the state that the lathe is in then (P20)."""
 
     task: Reference
-    job: Job
-    stage: Stage = Stage.WON
+    job: TurningJob
+    stage: BatchStage = BatchStage.WON
     process: Process | None = None
 
 
@@ -117,7 +117,7 @@ class LatheMachine:
         self.link = DeviceLink(lambda sequence, order: LatheOrder(me, sequence, *order), AGAIN_US)
         self.tasks = Undertakings(
             self.fleet,
-            is_begun=lambda one: one.stage is not Stage.WON,
+            is_begun=lambda one: one.stage is not BatchStage.WON,
             may_give=lambda one, node: node == one.task.origin,
             lose=lambda one: [Record(JobLostRecord(one.task))],
             changed=self._engage,
@@ -257,9 +257,9 @@ class LatheMachine:
             return Control.BUSY
         if self.link.wanted is not None:
             return Control.UNMOVED
-        if one.stage is Stage.WON and nc.program != _program_number(one.task):
+        if one.stage is BatchStage.WON and nc.program != _program_number(one.task):
             return Control.OTHER_PROGRAM
-        return Control.ALL_MADE if one.stage is Stage.MAKING and nc.parts >= one.job.batch else Control.FREE
+        return Control.ALL_MADE if one.stage is BatchStage.MAKING and nc.parts >= one.job.batch else Control.FREE
 
     def _make(self, process: Process, now_us: int) -> list[Effect]:
         """The next part; an edge that would not last for it is changed before, by what its sensor says."""
@@ -285,8 +285,10 @@ class LatheMachine:
         assert self.nc is not None
         if one.task not in self.tasks.in_hand:
             return []
-        phase = {Stage.WON: LathePhase.QUEUED, Stage.SETTING: LathePhase.SETTING_UP}.get(one.stage, LathePhase.TURNING)
-        made = min(self.nc.parts, one.job.batch) if one.stage is Stage.MAKING else 0
+        phase = {BatchStage.WON: LathePhase.QUEUED, BatchStage.SETTING: LathePhase.SETTING_UP}.get(
+            one.stage, LathePhase.TURNING
+        )
+        made = min(self.nc.parts, one.job.batch) if one.stage is BatchStage.MAKING else 0
         told = (one.task, made, phase)
         if told == self._told and self._progress_us is not None and self._progress_us > now_us:
             return []
@@ -304,9 +306,9 @@ class LatheMachine:
                 self.tasks.in_hand.pop(task, None)
             case JobOverRecord(task=task):
                 self.tasks.remember(task)
-            case JobStageRecord(task=task, stage=Stage.MAKING) if task in self.tasks.in_hand:
+            case JobStageRecord(task=task, stage=BatchStage.MAKING) if task in self.tasks.in_hand:
                 # Whether an order to set up was obeyed is not known: it is given again.
-                self.tasks.in_hand[task].stage = Stage.MAKING
+                self.tasks.in_hand[task].stage = BatchStage.MAKING
 
 
 def _program_number(task: Reference) -> int:

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 from onboard.systems.turning.clamping import Clamping, choose_clamping
 from onboard.systems.turning.conditions import Conditions, choose_conditions, choose_tools, operations
-from onboard.systems.turning.cost import Bill, Edge, bill
+from onboard.systems.turning.cost import Bill, ToolEdgeUse, bill
 from onboard.systems.turning.drawing import Drawing
 from onboard.systems.turning.iso import program
-from onboard.systems.turning.lathe import Job, Lathe, LatheState, Material, Tool
+from onboard.systems.turning.lathe import Lathe, LatheState, Material, Tool, TurningJob
 from onboard.systems.turning.trajectories import Trajectory, cutting_min, rapid_min, trajectories
 
 
@@ -55,7 +55,7 @@ class Process:
     bill: Bill
 
 
-def generate(job: Job, drawing: Drawing, material: Material, lathe: Lathe, state: LatheState) -> Process | None:
+def generate(job: TurningJob, drawing: Drawing, material: Material, lathe: Lathe, state: LatheState) -> Process | None:
     """The five stages, one after the other; None where the lathe cannot hold the bar or lacks a tool."""
     clamping = choose_clamping(job, drawing, lathe)
     if clamping is None:
@@ -87,7 +87,7 @@ def generate(job: Job, drawing: Drawing, material: Material, lathe: Lathe, state
         bill(
             lathe.hourly_eur,
             machining_min,
-            tuple(Edge(tool.edge_eur, wear_min[tool.number], tool.life_min) for tool in used),
+            tuple(ToolEdgeUse(tool.edge_eur, wear_min[tool.number], tool.life_min) for tool in used),
             _setup_min(job, clamping, lathe, state) + lathe.edge_change_min * sum(one.changes for one in wear.values()),
             job.batch,
             bar_eur(job, clamping, material),
@@ -97,7 +97,9 @@ def generate(job: Job, drawing: Drawing, material: Material, lathe: Lathe, state
     )
 
 
-def _wear(used: tuple[Tool, ...], wear_min: dict[int, float], job: Job, state: LatheState) -> dict[int, Wear] | None:
+def _wear(
+    used: tuple[Tool, ...], wear_min: dict[int, float], job: TurningJob, state: LatheState
+) -> dict[int, Wear] | None:
     found = {}
     for tool in used:
         wear = wear_of(state.left_min(tool), tool.life_min, wear_min[tool.number], job.batch)
@@ -107,12 +109,12 @@ def _wear(used: tuple[Tool, ...], wear_min: dict[int, float], job: Job, state: L
     return found
 
 
-def bar_eur(job: Job, clamping: Clamping, material: Material) -> float:
+def bar_eur(job: TurningJob, clamping: Clamping, material: Material) -> float:
     """The raw material of one part: the bar between the cuts, the part in the jaws included."""
     volume_dm3 = pi / 4 * (job.bar_mm / 100) ** 2 * clamping.bar_length_mm / 100
     return volume_dm3 * material.density_kg_dm3 * material.eur_kg
 
 
-def _setup_min(job: Job, clamping: Clamping, lathe: Lathe, state: LatheState) -> float:
+def _setup_min(job: TurningJob, clamping: Clamping, lathe: Lathe, state: LatheState) -> float:
     """Nothing where the lathe is set up for this part in this chuck already."""
     return 0.0 if state.set_up_for == (job.drawing, clamping.chuck.name) else lathe.setup_min

@@ -2,33 +2,33 @@
 
 from itertools import pairwise
 
-from onboard.config.fleet import Fleet
-from onboard.config.reader import Common, Table
+from onboard.config.fleet import FleetReader
+from onboard.config.reader import Common, TomlTable
 from onboard.config.timing import read_timing
 from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.systems.turning.site import (
     At,
+    BatchDemand,
     Chuck,
+    ContourElement,
     Drawing,
-    Element,
-    Job,
     Lathe,
+    LatheOperation,
     Material,
     Tool,
     Turning,
-    Wanted,
-    Work,
+    TurningJob,
     element_fault,
 )
 
 _NOWHERE = Segment(0, 0)
-_WORKS = {"facing": Work.FACE, "roughing": Work.ROUGH, "finishing": Work.FINISH}
+_WORKS = {"facing": LatheOperation.FACE, "roughing": LatheOperation.ROUGH, "finishing": LatheOperation.FINISH}
 
 
-def read(root: Table, common: Common) -> Turning:
+def read(root: TomlTable, common: Common) -> Turning:
     """Lathes with their chucks and tools, desks, materials, drawings, and the orders that a run of the site brings."""
-    fleet = Fleet()
+    fleet = FleetReader()
     lathes: dict[int, Lathe] = {}
     for table in root.tables("lathes"):
         _read_lathe(table, fleet, lathes)
@@ -61,7 +61,7 @@ def read(root: Table, common: Common) -> Turning:
     )
 
 
-def _read_lathe(table: Table, fleet: Fleet, lathes: dict[int, Lathe]) -> None:
+def _read_lathe(table: TomlTable, fleet: FleetReader, lathes: dict[int, Lathe]) -> None:
     chucks = tuple(_read_chuck(one) for one in table.tables("chucks"))
     tools = tuple(_read_tool(one) for one in table.tables("tools"))
     for name, found in (("chucks", chucks), ("tools", tools)):
@@ -91,14 +91,14 @@ def _read_lathe(table: Table, fleet: Fleet, lathes: dict[int, Lathe]) -> None:
         lathes[node] = Lathe(node, table.values["name"], chucks=chucks, tools=tools, has_tailstock=tailstock, **values)
 
 
-def _read_chuck(table: Table) -> Chuck:
+def _read_chuck(table: TomlTable) -> Chuck:
     low_mm, high_mm = table.number("min_mm", 1, 2_000), table.number("max_mm", 1, 2_000)
     if low_mm > high_mm and not table.wrong:
         table.bad("min_mm", low_mm, f"above max_mm {high_mm:g}", "make the range the right way round")
     return Chuck(table.text("name"), low_mm, high_mm, table.number("grip_mm", 1, 1_000))
 
 
-def _read_tool(table: Table) -> Tool:
+def _read_tool(table: TomlTable) -> Tool:
     works = []
     for number, word in enumerate(table.items("works", 'a list such as ["facing", "roughing"]') or []):
         if word in _WORKS:
@@ -119,7 +119,7 @@ def _read_tool(table: Table) -> Tool:
     )
 
 
-def _read_material(table: Table, materials: dict[int, Material]) -> None:
+def _read_material(table: TomlTable, materials: dict[int, Material]) -> None:
     number = table.integer("number", 1, 255)
     if number in materials:
         table.bad("number", number, "used twice", "give each material a number of its own")
@@ -133,7 +133,7 @@ def _read_material(table: Table, materials: dict[int, Material]) -> None:
     )
 
 
-def _read_drawing(table: Table, drawings: dict[int, Drawing]) -> None:
+def _read_drawing(table: TomlTable, drawings: dict[int, Drawing]) -> None:
     """Points of the contour as ``[depth, diameter]`` or ``[depth, diameter, arc radius]``, mm, a convex arc above 0."""
     number = table.integer("number", 1, 255)
     if number in drawings:
@@ -146,7 +146,7 @@ def _read_drawing(table: Table, drawings: dict[int, Drawing]) -> None:
         return
     ats = [At(1000.0 * one[0], 500.0 * one[1]) for one in points]
     radii = [1000.0 * one[2] if len(one) > 2 else 0.0 for one in points[1:]]
-    elements = [Element(*ends, radius) for ends, radius in zip(pairwise(ats), radii, strict=True)]
+    elements = [ContourElement(*ends, radius) for ends, radius in zip(pairwise(ats), radii, strict=True)]
     for place, element in enumerate(elements, 1):
         fault = element_fault(element)
         if fault is not None:
@@ -162,7 +162,7 @@ def _is_point(value: object) -> bool:
     return all(type(one) in (int, float) and abs(one) <= 5_000 for one in value) and min(value[:2]) >= 0
 
 
-def _read_order(table: Table, drawings: dict[int, Drawing], materials: dict[int, Material]) -> Wanted:
+def _read_order(table: TomlTable, drawings: dict[int, Drawing], materials: dict[int, Material]) -> BatchDemand:
     drawing, material = table.integer("drawing", 1, 255), table.integer("material", 1, 255)
     for name, value, known in (("drawing", drawing, drawings), ("material", material, materials)):
         if value not in known and name not in table.wrong:
@@ -174,5 +174,5 @@ def _read_order(table: Table, drawings: dict[int, Drawing], materials: dict[int,
         table.bad("face_um", face_um, "not in steps of 100 um", "round it")
     if drawing in drawings and bar_mm < drawings[drawing].diameter_mm and "bar_mm" not in table.wrong:
         table.bad("bar_mm", bar_mm, "thinner than the drawing", f"write {drawings[drawing].diameter_mm:g} or more")
-    job = Job(drawing, material, bar_mm, batch, face_um / 1000)
-    return Wanted(table.integer("at_s", 0, 86_400, 0) * 1000, job)
+    job = TurningJob(drawing, material, bar_mm, batch, face_um / 1000)
+    return BatchDemand(table.integer("at_s", 0, 86_400, 0) * 1000, job)

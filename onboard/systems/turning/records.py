@@ -4,14 +4,14 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from onboard.contract.messages import Reference
-from onboard.core.journal_records import MOST_OVER, End, JournalRecord, Keep, RecordTypes, stored_as
-from onboard.systems.turning.lathe import Job
+from onboard.core.journal_records import MOST_OVER, JournalRecord, Keep, RecordEnd, RecordTypes, stored_as
+from onboard.systems.turning.lathe import TurningJob
 from onboard.work.order_records import OrderRecord, OrderStateRecord
 
 _TASK = ("task",)
 
 
-class Stage(Enum):
+class BatchStage(Enum):
     """How far an order is, each a point from which a lathe that starts again can go on."""
 
     WON = "not begun"
@@ -34,9 +34,9 @@ class JobRecord(JournalRecord):
     face_um: int
 
     @property
-    def job(self) -> Job:
+    def job(self) -> TurningJob:
         """As a lathe reckons with it."""
-        return Job(self.drawing, self.material, self.bar_mm, self.batch, self.face_um / 1000)
+        return TurningJob(self.drawing, self.material, self.bar_mm, self.batch, self.face_um / 1000)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class JobStageRecord(JournalRecord):
     RULES = (Keep("job_stage", _TASK),)
 
     task: Reference = field(metadata=stored_as("origin", "number"))
-    stage: Stage
+    stage: BatchStage
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class JobLostRecord(JournalRecord):
     """Another has the job now, and this lathe forgets it."""
 
     NAME = "job_lost"
-    RULES = (End(("job", "job_stage"), _TASK),)
+    RULES = (RecordEnd(("job", "job_stage"), _TASK),)
 
     task: Reference = field(metadata=stored_as("origin", "number"))
 
@@ -66,9 +66,9 @@ class JobOverRecord(JournalRecord):
 
     NAME = "job_over"
     RULES = (
-        End(("job", "job_stage"), _TASK),
+        RecordEnd(("job", "job_stage"), _TASK),
         Keep("job_over", _TASK),
-        End(("job_over",), _TASK, most=MOST_OVER),
+        RecordEnd(("job_over",), _TASK, most=MOST_OVER),
     )
 
     task: Reference = field(metadata=stored_as("origin", "number"))
@@ -85,9 +85,9 @@ class JobOrderRecord(OrderRecord):
     face_um: int
 
     @property
-    def job(self) -> Job:
+    def job(self) -> TurningJob:
         """As a lathe reckons with it."""
-        return Job(self.drawing, self.material, self.bar_mm, self.batch, self.face_um / 1000)
+        return TurningJob(self.drawing, self.material, self.bar_mm, self.batch, self.face_um / 1000)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,32 +6,32 @@ from functools import cached_property
 from typing import ClassVar
 
 from onboard.contract.codes import KindCode
-from onboard.core.site import Needs, Site
-from onboard.systems.turning.drawing import At, Drawing, Element, element_fault
-from onboard.systems.turning.lathe import Chuck, Job, Lathe, Material, Tool, Work
+from onboard.core.site import MotionNeeds, Site
+from onboard.systems.turning.drawing import At, ContourElement, Drawing, element_fault
+from onboard.systems.turning.lathe import Chuck, Lathe, LatheOperation, Material, Tool, TurningJob
 
 __all__ = [
     "At",
+    "BatchDemand",
     "Chuck",
+    "ContourElement",
     "Drawing",
-    "Element",
-    "Job",
     "Lathe",
+    "LatheOperation",
     "Material",
     "Tool",
     "Turning",
-    "Wanted",
-    "Work",
+    "TurningJob",
     "element_fault",
 ]
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class BatchDemand:
     """An order that the site's own demand brings, ``at_ms`` after its begin."""
 
     at_ms: int
-    job: Job
+    job: TurningJob
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,12 +40,12 @@ class Turning(Site):
 
     system: ClassVar[str] = "turning"
     demand: ClassVar[frozenset[str]] = frozenset({"orders"})
-    moved_by: ClassVar[Mapping[str, Needs]] = {"LatheOrder": Needs.ALONE}
+    moved_by: ClassVar[Mapping[str, MotionNeeds]] = {"LatheOrder": MotionNeeds.ALONE}
 
     lathes: dict[int, Lathe]
     drawings: dict[int, Drawing]
     materials: dict[int, Material]
-    orders: tuple[Wanted, ...] = ()
+    orders: tuple[BatchDemand, ...] = ()
 
     @cached_property
     def desks(self) -> tuple[int, ...]:

@@ -9,8 +9,8 @@ from math import atan2, ceil, cos, hypot, pi, remainder, sin
 from typing import NamedTuple
 
 from onboard.systems.turning.conditions import ALLOWANCE_MM, Conditions
-from onboard.systems.turning.drawing import At, Drawing, Element
-from onboard.systems.turning.lathe import Job, Lathe, Work
+from onboard.systems.turning.drawing import At, ContourElement, Drawing
+from onboard.systems.turning.lathe import Lathe, LatheOperation, TurningJob
 
 #: How far a tool keeps from the bar in rapid moves, mm: an ordinary clearance, from no standard.
 CLEAR_MM = 2.0
@@ -46,13 +46,13 @@ class Trajectory:
     cuts: tuple[Cut, ...]
 
 
-def trajectories(job: Job, drawing: Drawing, conditions: tuple[Conditions, ...]) -> tuple[Trajectory, ...]:
+def trajectories(job: TurningJob, drawing: Drawing, conditions: tuple[Conditions, ...]) -> tuple[Trajectory, ...]:
     """The paths of all operations, in order."""
-    makers = {Work.FACE: _face, Work.ROUGH: _rough, Work.FINISH: _finish}
+    makers = {LatheOperation.FACE: _face, LatheOperation.ROUGH: _rough, LatheOperation.FINISH: _finish}
     return tuple(makers[one.work](job, drawing, one) for one in conditions)
 
 
-def _face(job: Job, drawing: Drawing, conditions: Conditions) -> Trajectory:
+def _face(job: TurningJob, drawing: Drawing, conditions: Conditions) -> Trajectory:
     """From outside to the axis, in as many cuts as the depth asks for; the last one makes the face."""
     outside_mm = job.bar_mm / 2 + CLEAR_MM
     count = ceil(job.face_mm / conditions.depth_mm)
@@ -64,7 +64,7 @@ def _face(job: Job, drawing: Drawing, conditions: Conditions) -> Trajectory:
     return Trajectory(conditions, Xz(outside_mm, job.face_mm + CLEAR_MM), tuple(cuts))
 
 
-def _rough(job: Job, drawing: Drawing, conditions: Conditions) -> Trajectory:
+def _rough(job: TurningJob, drawing: Drawing, conditions: Conditions) -> Trajectory:
     """Cuts along the axis, each as far as the contour and its allowance let it go, then one along the contour."""
     bar_mm, least_mm = job.bar_mm / 2, drawing.front_um / 1000 + ALLOWANCE_MM
     count = max(1, ceil((bar_mm - least_mm) / conditions.depth_mm))
@@ -79,20 +79,20 @@ def _rough(job: Job, drawing: Drawing, conditions: Conditions) -> Trajectory:
     return Trajectory(conditions, Xz(bar_mm + CLEAR_MM, CLEAR_MM), (*cuts, *_away(job, cuts[-1].end.z_mm)))
 
 
-def _finish(job: Job, drawing: Drawing, conditions: Conditions) -> Trajectory:
+def _finish(job: TurningJob, drawing: Drawing, conditions: Conditions) -> Trajectory:
     """Along the drawing's contour, beginning in the air before the face."""
     start = Xz(drawing.elements[0].start.r_um / 1000, CLEAR_MM)
     cuts = _along(drawing.elements, 0.0)
     return Trajectory(conditions, start, (*cuts, *_away(job, cuts[-1].end.z_mm)))
 
 
-def _along(elements: tuple[Element, ...], allowance_mm: float) -> list[Cut]:
+def _along(elements: tuple[ContourElement, ...], allowance_mm: float) -> list[Cut]:
     """A contour moved outwards and forwards by the allowance."""
     first = elements[0].start
     return [Cut(_moved(first, allowance_mm)), *(_cut(element, allowance_mm) for element in elements)]
 
 
-def _cut(element: Element, allowance_mm: float) -> Cut:
+def _cut(element: ContourElement, allowance_mm: float) -> Cut:
     end = _moved(element.end, allowance_mm)
     if not element.radius_um:
         return Cut(end)
@@ -103,7 +103,7 @@ def _moved(at: At, allowance_mm: float) -> Xz:
     return Xz(at.r_um / 1000 + allowance_mm, allowance_mm - at.u_um / 1000)
 
 
-def _away(job: Job, z_mm: float) -> list[Cut]:
+def _away(job: TurningJob, z_mm: float) -> list[Cut]:
     """Out of the cut, then before the bar, where the turret may turn."""
     outside_mm = job.bar_mm / 2 + CLEAR_MM
     return [Cut(Xz(outside_mm, z_mm)), Cut(Xz(outside_mm, CLEAR_MM), rapid=True)]

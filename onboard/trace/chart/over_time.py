@@ -10,10 +10,10 @@ from typing import Protocol
 
 from onboard.contract.messages import BusTime, Message
 from onboard.core.site import Site
-from onboard.history.clock import BusClock
+from onboard.history.clock import LoggedBusTime
 from onboard.systems.words import words_of
-from onboard.trace.chart.svg import Drawing, colour, dashes
-from onboard.trace.listener import Said
+from onboard.trace.chart.svg import SvgDrawing, colour, dashes
+from onboard.trace.listener import LoggedMessage
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM, GAP = 1200, 90, 20, 46, 30, 14
 #: Height of a row, pixels: the most, and what a panel has at most for all of its rows.
@@ -35,15 +35,15 @@ class Diagram(Protocol):
     first_us: int
     last_us: int
 
-    def feed(self, said: Said) -> None:
+    def feed(self, logged: LoggedMessage) -> None:
         """Take up one message of the fleet bus."""
 
-    def draw(self, start_us: int) -> Drawing:
+    def draw(self, start_us: int) -> SvgDrawing:
         """The log is over: the picture, its times since ``start_us``."""
 
 
 @dataclass
-class Line:
+class PanelLine:
     """One machine's way through the rows of a panel: (us, row), the first row 0; a row's middle is its number."""
 
     node: int
@@ -70,7 +70,7 @@ class Panel:
 
     title: str
     rows: Sequence[str]
-    lines: list[Line] = field(default_factory=list)
+    lines: list[PanelLine] = field(default_factory=list)
     bars: list[Bar] = field(default_factory=list)
 
 
@@ -86,19 +86,19 @@ class Rows:
         self.first_us, self.last_us = 0 if from_us is None else from_us, 0
         self._name, self._machines = site.name, sorted(site.machines)
         self._until_us, self._is_begun = until_us, from_us is not None
-        self._clock = BusClock()
+        self._clock = LoggedBusTime()
 
-    def feed(self, said: Said) -> None:
+    def feed(self, logged: LoggedMessage) -> None:
         """Take up one message of the fleet bus; what came before the time that is shown is heard all the same."""
-        if self._until_us is not None and said.time_us > self._until_us:
+        if self._until_us is not None and logged.time_us > self._until_us:
             return
         if not self._is_begun:
-            self._is_begun, self.first_us = True, said.time_us
-        self.last_us = max(self.last_us, said.time_us)
-        if isinstance(said.message, BusTime):
-            self._clock.feed(said.message, said.time_us)
-        self.words.hear(said.message)
-        self.take(said.message, said.time_us)
+            self._is_begun, self.first_us = True, logged.time_us
+        self.last_us = max(self.last_us, logged.time_us)
+        if isinstance(logged.message, BusTime):
+            self._clock.feed(logged.message, logged.time_us)
+        self.words.hear(logged.message)
+        self.take(logged.message, logged.time_us)
 
     def take(self, message: Message, time_us: int) -> None:
         """Take up one message at ``time_us``; each system's rows say which they draw."""
@@ -112,11 +112,11 @@ class Rows:
         found = self._clock.log_us(bus_ms, near_us)
         return near_us if found is None else found
 
-    def draw(self, start_us: int) -> Drawing:
+    def draw(self, start_us: int) -> SvgDrawing:
         """All panels, the machines by their colours."""
         self.end(self.last_us)
         heights = [min(_MOST_HEIGHT, _ROW * len(panel.rows)) for panel in self.panels]
-        drawing = Drawing(WIDTH, TOP + sum(heights) + GAP * len(heights) + BOTTOM, f"{self._name}: over time")
+        drawing = SvgDrawing(WIDTH, TOP + sum(heights) + GAP * len(heights) + BOTTOM, f"{self._name}: over time")
         numbers = {node: number for number, node in enumerate(self._machines)}
         shown = {line.node for panel in self.panels for line in panel.lines}
         shown |= {bar.node for panel in self.panels for bar in panel.bars}
@@ -124,17 +124,17 @@ class Rows:
         name_machines(drawing, machines, self.legend)
         top = float(TOP)
         for panel, height in zip(self.panels, heights, strict=True):
-            _Sheet(drawing, panel, top, height, self.first_us, self.last_us, numbers).draw()
+            _PanelSheet(drawing, panel, top, height, self.first_us, self.last_us, numbers).draw()
             top += height + GAP
         time_axis(drawing, self.first_us, self.last_us, start_us, top)
         return drawing
 
 
 @dataclass
-class _Sheet:
+class _PanelSheet:
     """One panel on the paper."""
 
-    drawing: Drawing
+    drawing: SvgDrawing
     panel: Panel
     top: float
     height: float
@@ -181,7 +181,7 @@ class _Sheet:
         if bar.text and len(bar.text) * _LETTER < x2 - x1 and y2 - y1 >= _LABEL:
             self.drawing.text(x1 + 3, (y1 + y2) / 2 + 4, bar.text)
 
-    def _line(self, line: Line) -> None:
+    def _line(self, line: PanelLine) -> None:
         points = [(self.x(time_us), self.y(row)) for time_us, row in line.points if time_us >= self.first_us]
         before = [row for time_us, row in line.points if time_us < self.first_us]
         if before and points:
@@ -198,7 +198,7 @@ def by_distance(far: Sequence[Sequence[float]]) -> list[int]:
     return sorted(range(len(far)), key=lambda number: (far[one][number] - far[two][number], number))
 
 
-def name_machines(drawing: Drawing, machines: list[tuple[str, int]], legend: str) -> None:
+def name_machines(drawing: SvgDrawing, machines: list[tuple[str, int]], legend: str) -> None:
     """Machines by name and number, in their colours, and what bands or bars mean behind them."""
     x = float(LEFT)
     for name, number in machines:
@@ -208,7 +208,7 @@ def name_machines(drawing: Drawing, machines: list[tuple[str, int]], legend: str
     drawing.text(x + 10, 18, legend)
 
 
-def time_axis(drawing: Drawing, first_us: int, last_us: int, start_us: int, bottom: float) -> None:
+def time_axis(drawing: SvgDrawing, first_us: int, last_us: int, start_us: int, bottom: float) -> None:
     """Seconds since ``start_us`` along the top."""
     scale = (WIDTH - LEFT - RIGHT) / max(1, last_us - first_us)
     step_s = next((step for step in _STEPS_S if (last_us - first_us) / 1e6 / step <= _MOST_TICKS), _STEPS_S[-1])

@@ -38,8 +38,8 @@ from onboard.contract.messages import (
 )
 from onboard.core.site import Site
 from onboard.history.calls import BidMade, CallAnswered, CallFact, CallOpened, Calls
-from onboard.trace.chart.svg import Drawing
-from onboard.trace.listener import Said
+from onboard.trace.chart.svg import SvgDrawing
+from onboard.trace.listener import LoggedMessage
 from onboard.trace.words import Words
 from onboard.ways.site import way_site
 
@@ -62,7 +62,7 @@ class Arrow(NamedTuple):
 
 
 @dataclass
-class Chart:
+class SequenceChart:
     """Nodes in the order of their lanes, and arrows in the order of time."""
 
     title: str
@@ -89,13 +89,13 @@ class _Story:
         self._desk_event: DeskEvent | None = None
         self.loaded = self.over = self.pressed = False
 
-    def arrows(self, said: Said) -> Iterator[Arrow]:
+    def arrows(self, logged: LoggedMessage) -> Iterator[Arrow]:
         """What a message adds to the chart."""
-        message = said.message
+        message = logged.message
         if self.over:
             return
-        for receiver, text, step in self._fleet(message, said.time_us) if said.is_fleet else self._device(message):
-            yield Arrow(said.time_us, message.sender, receiver, text, step)
+        for receiver, text, step in self._fleet(message, logged.time_us) if logged.is_fleet else self._device(message):
+            yield Arrow(logged.time_us, message.sender, receiver, text, step)
 
     def _dealt(self, fact: CallFact | None) -> Iterator[tuple[int, str, int]]:
         """What a message tells of the task's calls."""
@@ -225,12 +225,12 @@ class _Story:
         return before != value
 
 
-def chart(site: Site, said: Iterable[Said], task: Reference) -> Chart | None:
+def chart(site: Site, logged: Iterable[LoggedMessage], task: Reference) -> SequenceChart | None:
     """The chart of a task, None where the log does not hold it. What the bay's devices said just before counts in."""
     words = Words(site)
     story = _Story(site, task, words)
     arrows: list[Arrow] = []
-    for one in said:
+    for one in logged:
         words.hear(one.message)
         if not one.is_fleet and one.message.sender not in (task.origin, story.owner):
             continue
@@ -244,10 +244,10 @@ def chart(site: Site, said: Iterable[Said], task: Reference) -> Chart | None:
     winners = {one.receiver for one in arrows if one.text.startswith("call ")}
     relevant = {node for node in relevant | winners if node}
     arrows = [one for one in arrows if one.sender in relevant]
-    return Chart(f"task {words.reference(task)}", sorted(relevant), arrows)
+    return SequenceChart(f"task {words.reference(task)}", sorted(relevant), arrows)
 
 
-def as_text(found: Chart, words: Words, start_us: int) -> list[str]:
+def as_text(found: SequenceChart, words: Words, start_us: int) -> list[str]:
     """Lanes of characters; ``o`` a message to all, ``>`` and ``<`` to one, ``*`` of a machine's own devices."""
     head = " " * 17 + "".join(f"{words.machine(node):<{_TEXT_LANE}}" for node in found.nodes)
     lines = [found.title, head.rstrip()]
@@ -257,7 +257,7 @@ def as_text(found: Chart, words: Words, start_us: int) -> list[str]:
     return lines
 
 
-def _lanes(found: Chart, arrow: Arrow) -> str:
+def _lanes(found: SequenceChart, arrow: Arrow) -> str:
     row = [("|" + " " * (_TEXT_LANE - 1)) for _ in found.nodes]
     text = list("".join(row)[: _TEXT_LANE * (len(found.nodes) - 1) + 1])
     start = found.nodes.index(arrow.sender) * _TEXT_LANE
@@ -272,10 +272,10 @@ def _lanes(found: Chart, arrow: Arrow) -> str:
     return "".join(text)
 
 
-def as_svg(found: Chart, words: Words, start_us: int) -> Drawing:
+def as_svg(found: SequenceChart, words: Words, start_us: int) -> SvgDrawing:
     """Lifelines with arrows; a message to all goes to every lane."""
     width = _LEFT + _LANE * len(found.nodes) + _NOTES
-    drawing = Drawing(width, _TOP + _ROW * (len(found.arrows) + 2), found.title)
+    drawing = SvgDrawing(width, _TOP + _ROW * (len(found.arrows) + 2), found.title)
     drawing.text(8, 16, found.title)
     lanes = {node: _LEFT + _LANE * number + _LANE / 2 for number, node in enumerate(found.nodes)}
     for node, x in lanes.items():

@@ -20,7 +20,7 @@ def dashes(number: int) -> str:
     return DASHES[number // len(COLOURS) % len(DASHES)]
 
 
-class Drawing:
+class SvgDrawing:
     """Shapes in pixels, in the order in which they are put in: later ones lie on top."""
 
     def __init__(self, width: float, height: float, title: str) -> None:

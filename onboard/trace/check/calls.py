@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from onboard.contract.codes import CallResult, Criterion
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Award, Bid, CallForProposals, Halted, LeftOut, Progress, Reference
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 
 #: A call is closed at its deadline; a restart of the initiator, a journal write and a busy bus need less than this, us,
@@ -32,19 +32,19 @@ class CallSeen:
     """One call: when it was opened and is due (us of the log), its bids and its outcome."""
 
     call: CallForProposals
-    event: Event[CallForProposals]
+    event: LogEvent[CallForProposals]
     boot: int | None
     due_us: int | None
     bids: list[tuple[int, int, int]] = field(default_factory=list)
     option: bool = False
     outcome: Award | None = None
-    told: bool = False
+    is_reported: bool = False
 
 
 class _CallRule(Rule):
     """Keeps the calls of the last minutes."""
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self.calls: OrderedDict[tuple[int, int], CallSeen] = OrderedDict()
 
@@ -57,7 +57,7 @@ class _CallRule(Rule):
         while self.calls and now_us - next(iter(self.calls.values())).event.time_us > REMEMBERED_US:
             self.calls.popitem(last=False)
 
-    def _on_call(self, event: Event[CallForProposals]) -> None:
+    def _on_call(self, event: LogEvent[CallForProposals]) -> None:
         call = event.message
         known = self.calls.get((call.sender, call.call))
         if known is not None and known.call == call:
@@ -67,24 +67,24 @@ class _CallRule(Rule):
         self.calls.pop((call.sender, call.call), None)
         self.calls[call.sender, call.call] = seen
 
-    def _on_bid(self, event: Event[Bid]) -> None:
+    def _on_bid(self, event: LogEvent[Bid]) -> None:
         bid = event.message
         seen = self.calls.get((bid.initiator, bid.call))
         if seen is not None:
             self.judge_bid(event, seen)
             seen.bids.append((event.time_us, bid.sender, bid.cost))
 
-    def _on_award(self, event: Event[Award]) -> None:
+    def _on_award(self, event: LogEvent[Award]) -> None:
         seen = self.calls.get((event.message.sender, event.message.call))
         if seen is None:
             self.picture.unjudged += 1
             return
         self.judge_award(event, seen)
 
-    def judge_bid(self, event: Event[Bid], seen: CallSeen) -> None:
+    def judge_bid(self, event: LogEvent[Bid], seen: CallSeen) -> None:
         """A bid for a call that is known."""
 
-    def judge_award(self, event: Event[Award], seen: CallSeen) -> None:
+    def judge_award(self, event: LogEvent[Award], seen: CallSeen) -> None:
         """An award for a call that is known."""
 
 
@@ -100,7 +100,7 @@ class CallsClosed(_CallRule):
     title = "calls closed, once and in time"
     source = "rows P11, P12, P14; dbc/fleet.dbc, Award"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         #: When a machine last said that it is held: it closes its calls once it goes on.
         self._held_us: dict[int, int] = {}
@@ -109,11 +109,11 @@ class CallsClosed(_CallRule):
         """Beside calls, machines that do nothing any more for a while."""
         return {**super().handlers(), Halted: self._on_halted}
 
-    def _on_halted(self, event: Event[Halted]) -> None:
+    def _on_halted(self, event: LogEvent[Halted]) -> None:
         if event.message.sender == event.message.machine:
             self._held_us[event.message.sender] = event.time_us
 
-    def judge_award(self, event: Event[Award], seen: CallSeen) -> None:
+    def judge_award(self, event: LogEvent[Award], seen: CallSeen) -> None:
         """Another outcome than the first."""
         award, before = event.message, seen.outcome
         if award.result is CallResult.OPTION:
@@ -131,7 +131,7 @@ class CallsClosed(_CallRule):
         """Calls that should be closed by now."""
         super().tick(now_us)
         for seen in self.calls.values():
-            if seen.told or seen.outcome is not None or seen.option or seen.due_us is None:
+            if seen.is_reported or seen.outcome is not None or seen.option or seen.due_us is None:
                 continue
             # A sign of the same life after the time is over: before it, the initiator may have died without a word.
             lived_us = self.picture.heard_us.get(seen.call.sender, 0)
@@ -140,7 +140,7 @@ class CallsClosed(_CallRule):
             due_us = max(seen.due_us, seen.event.time_us, self.picture.clock_settles_us, held_us)
             late = lived_us - due_us > CLOSED_WITHIN_US
             if late and self.picture.is_alive(seen.call.sender, seen.boot):
-                seen.told = True
+                seen.is_reported = True
                 self.find(seen.event, (seen.call.sender,), f"call {seen.call.call} was never closed")
 
 
@@ -151,10 +151,10 @@ class BidsInTime(_CallRule):
     title = "no bid after the deadline counts"
     source = "row P05; docs/decisions.md, flag 11"
 
-    def judge_award(self, event: Event[Award], seen: CallSeen) -> None:
+    def judge_award(self, event: LogEvent[Award], seen: CallSeen) -> None:
         """The winner must have bid before the deadline less the guard."""
         award = event.message
-        if award.result not in (CallResult.AWARDED, CallResult.OPTION) or award.winner == NOBODY or seen.told:
+        if award.result not in (CallResult.AWARDED, CallResult.OPTION) or award.winner == NOBODY or seen.is_reported:
             return
         times_us = [time_us for time_us, node, _ in seen.bids if node == award.winner]
         due_us = seen.due_us
@@ -163,7 +163,7 @@ class BidsInTime(_CallRule):
         if times_us and seen.event.time_us < self.picture.clock_settles_us:
             # The caller's deadline was over when its own clock said so.
             return
-        seen.told = True
+        seen.is_reported = True
         late_us = min(times_us) - (due_us or 0) if times_us else 0
         what = f"bid {late_us} us after the deadline" if times_us else "never bid"
         self.find(event, (award.sender, award.winner), f"call {award.call} goes to {award.winner}, who {what}")
@@ -177,7 +177,7 @@ class BidsGoDown(_CallRule):
     source = "rows P06 to P10; dbc/fleet.dbc, Bid"
     undisturbed = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._left_out: OrderedDict[tuple[int, int], set[int]] = OrderedDict()
         self._places: dict[int, tuple[int, int, int]] = {}
@@ -194,19 +194,19 @@ class BidsGoDown(_CallRule):
         """Whether a bid goes with what its bidder said before it, where a system's bids say more than a number."""
         return True
 
-    def _on_left_out(self, event: Event[LeftOut]) -> None:
+    def _on_left_out(self, event: LogEvent[LeftOut]) -> None:
         word = event.message
         named = {word.node_a, word.node_b, word.node_c, word.node_d, word.node_e, word.node_f}
         self._left_out.setdefault((word.sender, word.call), set()).update(named - {NOBODY})
         while len(self._left_out) > MOST_LEFT_OUT:
             self._left_out.popitem(last=False)
 
-    def _on_progress(self, event: Event[Progress]) -> None:
-        told = event.message
-        place = told.track, told.index, told.offset_mm
-        if self._places.get(told.sender) != place:
-            self._places[told.sender] = place
-            self._won_us.pop(told.sender, None)
+    def _on_progress(self, event: LogEvent[Progress]) -> None:
+        progress = event.message
+        place = progress.track, progress.index, progress.offset_mm
+        if self._places.get(progress.sender) != place:
+            self._places[progress.sender] = place
+            self._won_us.pop(progress.sender, None)
 
     def _counts(self, node: int, seen: CallSeen, now_us: int) -> bool:
         """Whether a bid counts: not of who is left out, nor of who has won something and stands."""
@@ -218,7 +218,7 @@ class BidsGoDown(_CallRule):
         # Whom a call leaves out, that is left out of what is asked for a bid in it.
         return all(node not in self._left_out.get(call, ()) for call in (own, above))
 
-    def judge_bid(self, event: Event[Bid], seen: CallSeen) -> None:
+    def judge_bid(self, event: LogEvent[Bid], seen: CallSeen) -> None:
         """Not better than one heard before."""
         bid = event.message
         if not self.is_sound(bid, seen.call.task):
@@ -237,17 +237,17 @@ class BidsGoDown(_CallRule):
                 self.find(event, (bid.sender, node), what)
                 return
 
-    def judge_award(self, event: Event[Award], seen: CallSeen) -> None:
+    def judge_award(self, event: LogEvent[Award], seen: CallSeen) -> None:
         """Given to another than the best bidder."""
         award = event.message
         if award.result is CallResult.AWARDED and award.winner:
             self._won_us.setdefault(award.winner, event.time_us)
-        if award.result not in (CallResult.AWARDED, CallResult.OPTION) or seen.told or seen.due_us is None:
+        if award.result not in (CallResult.AWARDED, CallResult.OPTION) or seen.is_reported or seen.due_us is None:
             return
         last_us = seen.due_us - CLOCK_TOLERANCE_US
         counted = [bid for bid in seen.bids if self._counts(bid[1], seen, event.time_us)]
         in_time = [(node, cost) for time_us, node, cost in counted if time_us <= last_us]
-        seen.told = True
+        seen.is_reported = True
         best = _best(in_time, seen.call.criterion)
         if best is not None and best[0] != award.winner and award.winner in {node for node, _ in in_time}:
             what = f"call {award.call} goes to {award.winner}, though {best[0]} bid {best[1]}"

@@ -10,9 +10,9 @@ from onboard.contract.messages import BusTime, Heartbeat, Message
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.systems.contract import codecs_for
-from onboard.trace.candump_reader import CandumpReader, Record
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import SETTLING_US, Picture
+from onboard.trace.candump_reader import CandumpReader, LogRecord
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import SETTLING_US, BusPicture
 from onboard.trace.check.rule import Rule
 from onboard.trace.check.systems import rules_for
 from onboard.wire.codec import Codec
@@ -30,7 +30,7 @@ BACK_US = 1_000_000
 
 
 @dataclass
-class Verdict:
+class LogVerdict:
     """What came of a log. ``unknown`` counts frames that came to no message, by reason; ``waits_us`` by node-ID."""
 
     rules: tuple[type[Rule], ...]
@@ -118,7 +118,7 @@ class Checks:
         self._codecs = (fleet or both.fleet, device or both.device)
         self._decoders: dict[str, tuple[Decoder, Decoder]] = {}
         rules = rules_for(site) if rules is None else rules
-        self.verdict = Verdict(tuple(rule for rule in rules if not self._why_not(rule)))
+        self.verdict = LogVerdict(tuple(rule for rule in rules if not self._why_not(rule)))
         self.verdict.left_out = {rule.name: why for rule in rules if (why := self._why_not(rule))}
         self._last_us: int | None = None
         self._excused_us = 0
@@ -135,7 +135,7 @@ class Checks:
 
     def _begin(self) -> None:
         """Another run: nothing is known."""
-        self._picture = Picture(self._site, disturbed=self._disturbed)
+        self._picture = BusPicture(self._site, disturbed=self._disturbed)
         self._picture.excused_us = self._excused_us
         self._picture.clock_settles_us = self._clocks_until_us
         self._rules = [rule(self._picture, self._keep) for rule in self.verdict.rules]
@@ -180,7 +180,7 @@ class Checks:
                 return
         time_us = self._orderly(time_us, message)
         self.verdict.messages += 1
-        event = Event(time_us, message, channel, frame)
+        event = LogEvent(time_us, message, channel, frame)
         if self._tick_us is None or time_us - self._tick_us >= TICK_US:
             self._tick_us = time_us
             self._picture.now_us = time_us
@@ -191,7 +191,7 @@ class Checks:
             handler(event)
         self._picture.feed(event)
 
-    def finish(self) -> Verdict:
+    def finish(self) -> LogVerdict:
         """The log has ended: judge what is still open, and tell the verdict."""
         self._end()
         for decoders in self._decoders.values():
@@ -260,7 +260,7 @@ class Checks:
         decoder.drops.clear()
 
 
-def check_records(records: Iterable[Record], checks: Checks) -> Verdict:
+def check_records(records: Iterable[LogRecord], checks: Checks) -> LogVerdict:
     """Judge a whole log, such as a ``CandumpReader`` gives it."""
     for record in records:
         checks.feed(record.time_us, record.channel, record.frame)

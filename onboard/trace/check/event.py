@@ -11,7 +11,7 @@ from onboard.trace.candump import format_frame
 M_co = TypeVar("M_co", bound=Message, covariant=True)
 
 
-class Event(NamedTuple, Generic[M_co]):
+class LogEvent(NamedTuple, Generic[M_co]):
     """One message of a log: time in us of the log, the channel's name in the log, and the frame that completed it."""
 
     time_us: int

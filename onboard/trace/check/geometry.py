@@ -21,7 +21,7 @@ TOLERANCE_MM = 20
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class ReportedPosition:
     """A machine as its last ``Progress`` told it: the centre from that of index 1 of ``track``, in mm."""
 
     node: int
@@ -37,13 +37,13 @@ class Body:
         return self.track, self.position_mm
 
 
-def body_of(site: Site, progress: Progress, time_us: int) -> Body | None:
+def body_of(site: Site, progress: Progress, time_us: int) -> ReportedPosition | None:
     """The body that a message tells of; None where the site has no such track."""
     track = way_site(site).tracks.get(progress.track)
     if track is None:
         return None
     position_mm = (progress.index - 1) * track.pitch_mm + progress.offset_mm
-    return Body(progress.sender, progress.track, progress.index, position_mm, progress.speed_mm_s, time_us)
+    return ReportedPosition(progress.sender, progress.track, progress.index, position_mm, progress.speed_mm_s, time_us)
 
 
 def slots_of(site: Site, track: int, low_mm: float, high_mm: float) -> list[Segment]:
@@ -69,7 +69,7 @@ def spur_slots(site: Site, spur: int, low_mm: float) -> list[Segment]:
     return [track.joins[0], inside] if low_mm + TOLERANCE_MM < -track.pitch_mm / 2 else [inside]
 
 
-def occupied(site: Site, body: Body) -> list[Segment]:
+def occupied(site: Site, body: ReportedPosition) -> list[Segment]:
     """Slots that a robot's body is in."""
     ways = way_site(site)
     if ways.tracks[body.track].kind is TrackKind.SPUR:
@@ -80,7 +80,7 @@ def occupied(site: Site, body: Body) -> list[Segment]:
     return slots_of(site, body.track, body.position_mm - half_mm, body.position_mm + half_mm)
 
 
-def swept(site: Site, body: Body, until_mm: float) -> list[Segment]:
+def swept(site: Site, body: ReportedPosition, until_mm: float) -> list[Segment]:
     """Slots that a robot's body is in and comes through until its centre is at ``until_mm`` on the same track."""
     ways = way_site(site)
     if ways.tracks[body.track].kind is TrackKind.SPUR:
@@ -99,7 +99,7 @@ def slot_at(site: Site, position: Segment) -> Segment:
     return position if lift is None else Segment(lift, PLATFORM_INDEX)
 
 
-def lifts_under(site: Site, body: Body) -> set[int]:
+def lifts_under(site: Site, body: ReportedPosition) -> set[int]:
     """Lifts, by track, on whose platform a robot's body is, wholly or in part.
 
     A body is told of when its centre enters a segment, starts or stops: of one that goes away from a platform the last
@@ -119,7 +119,7 @@ def token_of(slot: Segment) -> Token:
     return Token(TokenKind.SEGMENT, slot.number)
 
 
-def floor_of(site: Site, lift: Body) -> int:
+def floor_of(site: Site, lift: ReportedPosition) -> int:
     """The alley at which a lift's platform is, by the nearest mark."""
     joins = way_site(site).tracks[lift.track].joins
     return joins[min(len(joins), max(1, lift.index)) - 1].track

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from onboard.contract.codes import ManualMode
 from onboard.contract.messages import ManualState
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 
 #: A machine that is held for longer than this has been forgotten, us: an hour is longer than anybody stays beside it.
@@ -20,16 +20,16 @@ class LetGoAgain(Rule):
     title = "a machine that is held is let go within the hour"
     source = "row M38; VDA 5050 2.1, startPause"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
-        self._held: dict[int, Event[ManualState]] = {}
+        self._held: dict[int, LogEvent[ManualState]] = {}
         self._told: set[int] = set()
 
     def handlers(self) -> Handlers:
         """Machines' words on who has a hand in."""
         return {ManualState: self._on_state}
 
-    def _on_state(self, event: Event[ManualState]) -> None:
+    def _on_state(self, event: LogEvent[ManualState]) -> None:
         if event.message.manual_mode is ManualMode.AUTOMATIC:
             self._held.pop(event.message.sender, None)
             self._told.discard(event.message.sender)

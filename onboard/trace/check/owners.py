@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 from onboard.contract.codes import CallResult, Operation, TaskPhase
 from onboard.contract.messages import Award, CallForProposals, Reference, TaskReport
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 
 #: Operations that are tasks of their own; calls for a part of one name the same task.
@@ -41,7 +41,7 @@ class OneOwner(Rule):
     title = "one owner a task"
     source = "design 4: acts only on the award; re-award by the custodian under a raised version"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._tasks: OrderedDict[Reference, TaskSeen] = OrderedDict()
         self._calls: OrderedDict[tuple[int, int], bool] = OrderedDict()
@@ -50,7 +50,7 @@ class OneOwner(Rule):
         """Reads calls, awards and reports of tasks."""
         return {CallForProposals: self._on_call, Award: self._on_award, TaskReport: self._on_report}
 
-    def _on_call(self, event: Event[CallForProposals]) -> None:
+    def _on_call(self, event: LogEvent[CallForProposals]) -> None:
         call = event.message
         whole = call.depth == 0 and call.operation in TASKS
         self._calls[call.sender, call.call] = whole
@@ -65,7 +65,7 @@ class OneOwner(Rule):
             self._tasks.popitem(last=False)
         return task
 
-    def _on_award(self, event: Event[Award]) -> None:
+    def _on_award(self, event: LogEvent[Award]) -> None:
         award = event.message
         task = self._tasks.get(award.task)
         if task is None:
@@ -82,7 +82,7 @@ class OneOwner(Rule):
             self.find(event, (award.sender, award.winner, task.owner), what)
         task.owner, task.version = award.winner, award.task_version
 
-    def _on_report(self, event: Event[TaskReport]) -> None:
+    def _on_report(self, event: LogEvent[TaskReport]) -> None:
         report = event.message
         task = self._tasks.get(report.task)
         if task is None:

@@ -19,8 +19,8 @@ from onboard.contract.messages import (
 from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment, Site
-from onboard.trace.check.event import Event
-from onboard.trace.check.geometry import Body, body_of, floor_of
+from onboard.trace.check.event import LogEvent
+from onboard.trace.check.geometry import ReportedPosition, body_of, floor_of
 from onboard.trace.check.tokens_seen import TokensSeen
 from onboard.ways.site import way_site
 
@@ -32,7 +32,7 @@ JUMP_US = 100_000
 SETTLING_US = 11_000_000
 
 
-class Picture:
+class BusPicture:
     """Bus time, holders of tokens, places of bodies and lives of machines, from the frames alone.
 
     ``disturbed`` is true where frames may have been lost, doubled or delayed on purpose; ``site`` None where no site
@@ -44,7 +44,7 @@ class Picture:
         self.now_us = 0
         self.offset_us: int | None = None
         self.tokens = TokensSeen(site)
-        self.bodies: dict[int, Body] = {}
+        self.bodies: dict[int, ReportedPosition] = {}
         #: Boot counter and last sign of life, us of the log, by node.
         self.boots: dict[int, int] = {}
         self.heard_us: dict[int, int] = {}
@@ -100,13 +100,13 @@ class Picture:
         """Whether a machine is heard and still in the life that had this boot counter; None for not known."""
         return self.boots.get(node) == boot and self.now_us - self.heard_us.get(node, 0) <= SILENT_US
 
-    def on_floor(self, body: Body) -> Body:
+    def on_floor(self, body: ReportedPosition) -> ReportedPosition:
         """A carrier on a platform is at the floor where its lift is, which it tells only when it moves on."""
         lift_track = way_site(self.site).platforms.get(Segment(body.track, body.index))
         lift = self.bodies.get(self.site.stewards[lift_track]) if lift_track is not None else None
         return body if lift is None else replace(body, track=floor_of(self.site, lift))
 
-    def feed(self, event: Event[Message]) -> None:
+    def feed(self, event: LogEvent[Message]) -> None:
         """Take up one message of the fleet bus before the rules see it."""
         self.now_us = time_us = event.time_us
         match event.message:

@@ -6,8 +6,8 @@ from typing import Any
 from onboard.contract.codes import TokenKind
 from onboard.contract.messages import TokenGrant, TokenHeld
 from onboard.core.serial import is_newer, successor
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.trace.check.tokens_seen import VERSION_BITS, Handover, Token
 
@@ -22,7 +22,7 @@ class OneHolder(Rule):
     title = "one holder a token"
     source = "design 5: erase, journal, then send; versions rise by one"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         #: What was told last of a token: frames that are said again show nothing new.
         self._told: dict[Token, str] = {}
@@ -31,12 +31,12 @@ class OneHolder(Rule):
         """Grants, and statements of who holds."""
         return {TokenGrant: self._on_grant, TokenHeld: self._on_held}
 
-    def _tell(self, event: Event[Any], token: Token, machines: tuple[int, ...], what: str) -> None:
+    def _tell(self, event: LogEvent[Any], token: Token, machines: tuple[int, ...], what: str) -> None:
         if self._told.get(token) != what:
             self._told[token] = what
             self.find(event, machines, what)
 
-    def _on_grant(self, event: Event[TokenGrant]) -> None:
+    def _on_grant(self, event: LogEvent[TokenGrant]) -> None:
         grant = event.message
         token, version = Token(grant.token_kind, grant.token), grant.version
         if grant.holder == grant.sender:
@@ -57,13 +57,13 @@ class OneHolder(Rule):
         elif version != successor(last.version, VERSION_BITS) and not self.picture.disturbed:
             self._tell(event, token, (grant.sender,), f"gives {token} under version {version}, after {last.version}")
 
-    def _judge_first(self, event: Event[TokenGrant], token: Token) -> None:
+    def _judge_first(self, event: LogEvent[TokenGrant], token: Token) -> None:
         """The first time that a token moves: only where the log begins at power-up is it known whose it is."""
         first = self.picture.tokens.holder(token)
         if first not in (None, event.message.sender):
             self._tell(event, token, (event.message.sender, first or 0), f"gives {token}, which is {first}'s at first")
 
-    def _on_held(self, event: Event[TokenHeld]) -> None:
+    def _on_held(self, event: LogEvent[TokenHeld]) -> None:
         held = event.message
         token, tokens = Token(held.token_kind, held.token), self.picture.tokens
         last = tokens.last(token)

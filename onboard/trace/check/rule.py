@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from onboard.contract.messages import Message
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 
 #: Each handler takes events of exactly the message class that it is listed under; Any is what a dispatch table costs.
 Handlers = Mapping[type[Message], Callable[[Any], None]]
@@ -18,7 +18,7 @@ class Rule(ABC):
     ``needs_site``: it cannot be judged without the site file. ``undisturbed``: it holds only where no frame was lost or
     doubled on purpose. ``on_devices``: it judges device buses, so a log of the fleet bus alone tells it nothing.
     ``liveness``: it says that something must happen in time; time in which machines were broken on purpose
-    (``Picture.excused_us``) does not count. All other rules hold at any time.
+    (``BusPicture.excused_us``) does not count. All other rules hold at any time.
     """
 
     name: ClassVar[str]
@@ -29,7 +29,7 @@ class Rule(ABC):
     on_devices: ClassVar[bool] = False
     liveness: ClassVar[bool] = False
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         self.picture = picture
         self._report = report
         #: Of a rule that bounds waiting: the longest wait of each machine, and the bound; 0 for none.
@@ -48,7 +48,7 @@ class Rule(ABC):
         """The log ends, or another run begins; most rules have said all by then."""
         return
 
-    def find(self, event: Event[Any], machines: tuple[int, ...], what: str) -> None:
+    def find(self, event: LogEvent[Any], machines: tuple[int, ...], what: str) -> None:
         """Report what an event shows."""
         self._report(Finding(event.time_us, self.name, machines, what, event.evidence))
 

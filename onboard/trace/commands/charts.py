@@ -12,7 +12,7 @@ from onboard.systems.contract import codecs_for
 from onboard.systems.registry import part
 from onboard.trace.chart.over_time import Diagram
 from onboard.trace.chart.sequence import as_svg, as_text, chart
-from onboard.trace.chart.svg import Drawing
+from onboard.trace.chart.svg import SvgDrawing
 from onboard.trace.commands.common import (
     Commands,
     TraceError,
@@ -25,7 +25,7 @@ from onboard.trace.commands.common import (
     write_text,
 )
 from onboard.trace.commands.story import task_of
-from onboard.trace.listener import Listener, Said
+from onboard.trace.listener import Listener, LoggedMessage
 from onboard.trace.readers.open_log import Log
 from onboard.trace.words import Words
 
@@ -74,7 +74,7 @@ class _Heard:
         self.start_us = 0
         self._frames = iter(log)
 
-    def first(self) -> Iterator[Said]:
+    def first(self) -> Iterator[LoggedMessage]:
         """All messages; ``start_us`` is known once the first is asked for."""
         found = self.listener.messages(self._frames)
         one = next(found, None)
@@ -132,7 +132,7 @@ def run_diagram(args: argparse.Namespace) -> int:
     return 0
 
 
-def _write(out: Path, drawing: Drawing) -> None:
+def _write(out: Path, drawing: SvgDrawing) -> None:
     if out.suffix == ".svg":
         write_text(out, str(drawing))
         return

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from onboard.core.site import Site
 from onboard.systems.contract import codecs_for
-from onboard.trace.check.checks import Checks, Verdict
+from onboard.trace.check.checks import Checks, LogVerdict
 from onboard.trace.commands.common import (
     Commands,
     TraceError,
@@ -63,11 +63,11 @@ def run(args: argparse.Namespace) -> int:
     return 0 if verdict.is_good else 1
 
 
-def _report(verdict: Verdict, site: Site | None) -> list[str]:
+def _report(verdict: LogVerdict, site: Site | None) -> list[str]:
     return verdict.lines(Words(site).machine)
 
 
-def _check(args: argparse.Namespace, checks: Checks) -> Verdict:
+def _check(args: argparse.Namespace, checks: Checks) -> LogVerdict:
     with open_log(args) as log:
         for frame in log:
             classic = frame.classic()

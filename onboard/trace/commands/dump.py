@@ -19,7 +19,7 @@ from onboard.trace.commands.common import (
 )
 from onboard.trace.dump.decode import DbcLines, MessageLines
 from onboard.trace.dump.filters import FilterSet, parse_filters
-from onboard.trace.dump.formats import Look, Screen, Stamp, log_line, time_of_name
+from onboard.trace.dump.formats import Look, Screen, TimeFormat, log_line, time_of_name
 from onboard.trace.raw import RawFrame
 from onboard.trace.readers.open_log import Log
 from onboard.wire.dbc_file import AnyDbc, AnyDbcError
@@ -103,7 +103,7 @@ class _Chosen:
 
 def _look(args: argparse.Namespace) -> Look:
     return Look(
-        Stamp(args.stamp),
+        TimeFormat(args.stamp),
         args.log_format,
         args.colour,
         args.extra,
@@ -115,7 +115,7 @@ def _look(args: argparse.Namespace) -> Look:
 
 
 def _decode(args: argparse.Namespace, chosen: _Chosen) -> None:
-    screen = Screen(Look(Stamp(args.stamp or "a"), colour=args.colour, errors=True))
+    screen = Screen(Look(TimeFormat(args.stamp or "a"), colour=args.colour, errors=True))
     lines: DbcLines | MessageLines
     if args.dbc is not None:
         lines = DbcLines(_read_dbc(args.dbc), screen)

@@ -14,7 +14,7 @@ from onboard.trace.commands.common import (
     site_of,
     tell_faults,
 )
-from onboard.trace.load import bounds_of, loads, told
+from onboard.trace.load import bounds_of, load_lines, loads
 
 HELP = """\
 "at most" is the time from the beginning of the busy stretch in which a frame was sent to the frame's end: a log tells
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
         found = loads(log, codecs_for(site), bit_rate)
     bounds = bounds_of(site) if site is not None else {}
     start_us = min((load.first_us for load in found.values() if load.first_us is not None), default=0)
-    print("\n".join(told(found.values(), bounds, start_us)))
+    print("\n".join(load_lines(found.values(), bounds, start_us)))
     sys.stdout.flush()
     tell_faults(log)
     return 0

@@ -12,7 +12,7 @@ from onboard.holon.holon import Holon
 from onboard.systems.contract import codecs_for
 from onboard.systems.registry import factory_for
 from onboard.trace.commands.common import Commands, TraceError, add_command, add_log, open_log, tell_faults
-from onboard.trace.replay.driver import JOURNAL_US, Driver, RaisedCosts, Recording, compare, in_words, record
+from onboard.trace.replay.driver import JOURNAL_US, RaisedCosts, Recording, ReplayDriver, compare, in_words, record
 from onboard.wire.codec import Codecs
 
 HELP = """\
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         factory = RaisedCosts(factory, args.raise_costs)
     first_us = recording.first_bits * 1_000_000 // site.bitrate if args.first_us is None else args.first_us
     origin_us = recording.first_us - first_us
-    driver = Driver(Holon(site, machine, factory), codecs, origin_us, args.journal_us)
+    driver = ReplayDriver(Holon(site, machine, factory), codecs, origin_us, args.journal_us)
     same, difference = compare(recording, driver.run(recording.heard, recording.last_us))
     if difference is None:
         print(f"{machine.name}: {same} frames on fleet and device bus, all the same")

@@ -18,9 +18,8 @@ from onboard.trace.commands.common import (
     tell_faults,
 )
 from onboard.trace.listener import Listener
-from onboard.trace.story.calls import told as told_call
-from onboard.trace.story.why import TaskStory, Why
-from onboard.trace.story.why import told as told_task
+from onboard.trace.story.calls import call_lines
+from onboard.trace.story.why import TaskStory, WaitingStory, task_lines
 from onboard.trace.words import Words
 
 CALLS_HELP = """\
@@ -73,7 +72,7 @@ def run_calls(args: argparse.Namespace) -> int:
                     calls.finish(done, said.time_us)
     shown = [call for call in calls.all if task is None or call.terms.task == task]
     for call in shown:
-        print("\n".join(told_call(call, words, start_us or 0)))
+        print("\n".join(call_lines(call, words, start_us or 0)))
     print(f"{len(shown)} calls, {sum(len(call.bids) for call in shown)} bids")
     sys.stdout.flush()
     tell_faults(log, listener)
@@ -86,7 +85,7 @@ def run_why(args: argparse.Namespace) -> int:
     assert site is not None, "argparse asks for it"
     task = task_of(args.task, site)
     words = Words(site)
-    listener, why = Listener(codecs_for(site)), Why(site, words)
+    listener, why = Listener(codecs_for(site)), WaitingStory(site, words)
     start_us: int | None = None
     with open_log(args) as log:
         for said in listener.messages(log):
@@ -101,7 +100,7 @@ def run_why(args: argparse.Namespace) -> int:
         known = ", ".join(words.reference(one) for one in list(why.tasks)[:20]) or "none"
         raise TraceError(f"{args.log}: no task {args.task} in it; tasks there: {known}")
     else:
-        print("\n".join(told_task(why.tasks[task], words, start_us or 0)))
+        print("\n".join(task_lines(why.tasks[task], words, start_us or 0)))
     sys.stdout.flush()
     tell_faults(log, listener)
     return 0

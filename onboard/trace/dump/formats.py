@@ -20,7 +20,7 @@ _EXTRA = {0: "- -", CANFD_BRS: "B -", CANFD_ESI: "- E", CANFD_BRS | CANFD_ESI: "
 _COLOUR_ALL = 2
 
 
-class Stamp(StrEnum):
+class TimeFormat(StrEnum):
     """``-t``: absolute, delta, since the first frame, absolute with date; NONE prints no time."""
 
     NONE = ""
@@ -34,7 +34,7 @@ class Stamp(StrEnum):
 class Look:
     """candump's letters: ``colour`` counts ``-c``; ``log`` is ``-L``, ``extra`` -x, ``ascii`` -a, ``swap`` -S."""
 
-    stamp: Stamp = Stamp.NONE
+    stamp: TimeFormat = TimeFormat.NONE
     log: bool = False
     colour: int = 0
     extra: bool = False
@@ -89,14 +89,14 @@ class Screen:
     def _time(self, time_us: int) -> str:
         seconds, microseconds = divmod(time_us, _MILLION)
         match self._look.stamp:
-            case Stamp.NONE:
+            case TimeFormat.NONE:
                 return ""
-            case Stamp.ABSOLUTE:
+            case TimeFormat.ABSOLUTE:
                 return f"({seconds:010d}.{microseconds:06d}) "
-            case Stamp.DATE:
+            case TimeFormat.DATE:
                 return f"({time.strftime('%Y-%m-%d %H:%M:%S', time.localtime(seconds))}.{microseconds:06d}) "
         before = time_us if self._last_us is None else self._last_us
-        if self._look.stamp is Stamp.DELTA or self._last_us is None:
+        if self._look.stamp is TimeFormat.DELTA or self._last_us is None:
             self._last_us = time_us
         seconds, microseconds = divmod(max(0, time_us - before), _MILLION)
         return f"({seconds:03d}.{microseconds:06d}) "

@@ -38,7 +38,7 @@ _DATES = (
 _MILLION = 1_000_000
 
 
-class _State:
+class _AscHeader:
     """What a header said, and the time so far."""
 
     def __init__(self) -> None:
@@ -50,7 +50,7 @@ class _State:
 
 def read_asc(lines: Iterable[bytes], faults: LogFaults) -> Iterator[tuple[int, RawFrame]]:
     """Frames with their line numbers; a line that is neither a frame nor the format's own is counted."""
-    state = _State()
+    state = _AscHeader()
     for number, raw in enumerate(lines, 1):
         line = raw.decode("utf-8", "replace").strip()
         if not line:
@@ -65,7 +65,7 @@ def read_asc(lines: Iterable[bytes], faults: LogFaults) -> Iterator[tuple[int, R
             yield number, found
 
 
-def _header(line: str, state: _State) -> None:
+def _header(line: str, state: _AscHeader) -> None:
     words = line.lower().split()
     if words[0] == "date":
         state.start_us = _date_us(line[4:])
@@ -89,7 +89,7 @@ def _date_us(text: str) -> int:
     return 0
 
 
-def _frame(line: str, state: _State) -> RawFrame | LogFault:
+def _frame(line: str, state: _AscHeader) -> RawFrame | LogFault:
     timed = _TIMED.fullmatch(line)
     if timed is None:
         return LogFault.NOT_A_LINE

@@ -16,7 +16,7 @@ from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send, Te
 from onboard.core.frame import Frame
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
-from onboard.core.negotiation.events import Needs, Proposal
+from onboard.core.negotiation.events import NeededAnswers, Proposal
 from onboard.core.site import Machine, Site
 from onboard.holon.holon import Holon
 from onboard.trace.candump import format_frame
@@ -90,7 +90,7 @@ class _Raised:
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         return self.inner.lower_bound(call, now_us)
 
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | Needs | None:
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
         found = self.inner.estimate(call, now_us)
         return found._replace(cost=found.cost + self.by) if isinstance(found, Proposal) else found
 
@@ -117,14 +117,14 @@ def record(frames: Iterable[RawFrame], machine: Machine, codecs: Codecs, fleet: 
     return found
 
 
-def _add(said: list[Sent] | None, found: Recording, sent: Sent) -> None:
-    if said is None:
+def _add(recorded: list[Sent] | None, found: Recording, sent: Sent) -> None:
+    if recorded is None:
         found.heard.append((sent.time_us, sent.is_fleet, sent.frame))
     else:
-        said.append(sent)
+        recorded.append(sent)
 
 
-class Driver:
+class ReplayDriver:
     """A holon, its inbox, its journal and its one timer, in the time of the log."""
 
     def __init__(self, holon: Holon, codecs: Codecs, origin_us: int, journal_us: int = JOURNAL_US) -> None:

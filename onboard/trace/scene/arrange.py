@@ -1,7 +1,7 @@
 """Spots for the nodes of a network whose file names lengths only: stress majorization (Gansner, Koren, North 2004).
 
 Two nodes want to be as far apart as the shortest way between them is long, the more the nearer they are; each is moved
-to where its wishes meet, one after the other. Nothing is drawn by chance: the same network always looks the same.
+to where the pulls on it meet, one after the other. Nothing is drawn by chance: the same network always looks the same.
 """
 
 import heapq
@@ -10,7 +10,7 @@ from math import atan2, cos, hypot, sin
 
 from onboard.trace.scene.scene import Spot
 
-#: Moves of single wishes altogether, so that the largest network takes about two seconds; and rounds at most and least.
+#: Moves of single nodes altogether, so that the largest network takes about two seconds; and rounds at most and least.
 _WISHES, _MOST_ROUNDS, _LEAST_ROUNDS = 2_000_000, 300, 30
 #: Nodes of parts that no way joins are so many times the longest way apart.
 _APART = 1.3
@@ -70,17 +70,17 @@ def _first_guess(far: list[list[float]]) -> list[Spot]:
 
 
 def _wanted(mine: int, spots: list[Spot], far: list[float]) -> Spot:
-    """Where the wishes of one node meet."""
+    """Where the pulls on one node meet."""
     x, y = spots[mine]
     sum_x = sum_y = weights = 0.0
     for number, (other_x, other_y) in enumerate(spots):
         if number == mine:
             continue
-        wish = far[number]
+        rest = far[number]
         gap = hypot(x - other_x, y - other_y) or 1e-9
-        weight = 1 / (wish * wish)
-        sum_x += weight * (other_x + wish * (x - other_x) / gap)
-        sum_y += weight * (other_y + wish * (y - other_y) / gap)
+        weight = 1 / (rest * rest)
+        sum_x += weight * (other_x + rest * (x - other_x) / gap)
+        sum_y += weight * (other_y + rest * (y - other_y) / gap)
         weights += weight
     return sum_x / weights, sum_y / weights
 

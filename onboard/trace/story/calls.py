@@ -2,11 +2,11 @@
 
 from onboard.contract.codes import Operation, Reason
 from onboard.contract.messages import Reference
-from onboard.history.calls import Call, is_task
+from onboard.history.calls import CallHistory, is_task
 from onboard.trace.words import Words
 
 
-def told(call: Call, words: Words, start_us: int) -> list[str]:
+def call_lines(call: CallHistory, words: Words, start_us: int) -> list[str]:
     """The lines of one call; times since the log's start, promises beside what came true."""
     terms = call.terms
     names = words.system
@@ -28,7 +28,7 @@ def told(call: Call, words: Words, start_us: int) -> list[str]:
     return lines
 
 
-def _ending(call: Call, words: Words, start_us: int) -> str:
+def _ending(call: CallHistory, words: Words, start_us: int) -> str:
     if call.result is None or call.closed_us is None:
         return "still open at the end of the log"
     reason = f": {words.system.reason(call.reason)}" if call.reason is not Reason.NONE else ""

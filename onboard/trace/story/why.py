@@ -43,7 +43,7 @@ class Cause(NamedTuple):
 
 
 @dataclass
-class Part:
+class WaitingPart:
     """One stretch of time, us of the log."""
 
     cause: Cause
@@ -64,7 +64,7 @@ class TaskStory:
     operation: Operation
     caller: int
     begin_us: int
-    parts: list[Part] = field(default_factory=list)
+    parts: list[WaitingPart] = field(default_factory=list)
     phases: dict[TaskPhase, int] = field(default_factory=dict)
     owner: int = 0
     calls: int = 1
@@ -80,7 +80,7 @@ class TaskStory:
 
 
 @dataclass
-class _Body:
+class _WaitingMachine:
     at: Segment | None = None
     is_moving: bool = False
     heard_us: int = 0
@@ -97,7 +97,7 @@ class _Body:
     deed: str = ""
 
 
-class Why:
+class WaitingStory:
     """A fold over the fleet bus: feed every message in the order of the log, then ``finish``."""
 
     def __init__(self, site: Site, words: Words | None = None) -> None:
@@ -105,7 +105,7 @@ class Why:
         self._site = site
         self._words = words or Words(site)
         self._calls = Calls()
-        self._bodies: dict[int, _Body] = {}
+        self._bodies: dict[int, _WaitingMachine] = {}
         self._open: list[TaskStory] = []
         self._silence_us = MISSED_BEATS * site.timing.heartbeat_us
         self._now_us: int | None = None
@@ -155,10 +155,10 @@ class Why:
 
     # --- messages ----------------------------------------------------------------------------------------------
 
-    def _body(self, node: int) -> _Body:
-        return self._bodies.setdefault(node, _Body())
+    def _body(self, node: int) -> _WaitingMachine:
+        return self._bodies.setdefault(node, _WaitingMachine())
 
-    def _on_heartbeat(self, body: _Body, beat: Heartbeat, time_us: int) -> None:
+    def _on_heartbeat(self, body: _WaitingMachine, beat: Heartbeat, time_us: int) -> None:
         if body.boot is not None and body.boot != beat.boot:
             body.is_fresh, body.is_moving, body.wait, body.refusal = True, False, None, None
             for story in self._open:
@@ -199,7 +199,7 @@ class Why:
         story.end_us = time_us
         self._open.remove(story)
 
-    def _on_progress(self, body: _Body, progress: Progress) -> None:
+    def _on_progress(self, body: _WaitingMachine, progress: Progress) -> None:
         at = Segment(progress.track, progress.index)
         is_moving = progress.speed_mm_s != 0
         if is_moving or at != body.at:
@@ -254,11 +254,11 @@ class Why:
         begun = TaskPhase.STARTED in story.phases or TaskPhase.LOADED in story.phases
         return not begun and (TaskPhase.STARTED in other.phases or other.begin_us < story.begin_us)
 
-    def _lift_under(self, body: _Body) -> int | None:
+    def _lift_under(self, body: _WaitingMachine) -> int | None:
         """Lift track of the platform on which a robot stands."""
         return way_site(self._site).platforms.get(body.at) if body.at is not None else None
 
-    def _ride(self, story: TaskStory, body: _Body, lift: int, now_us: int) -> Cause:
+    def _ride(self, story: TaskStory, body: _WaitingMachine, lift: int, now_us: int) -> Cause:
         node = self._site.stewards[lift]
         cabin = self._body(node)
         if now_us - cabin.heard_us > self._silence_us:
@@ -273,7 +273,7 @@ class Why:
             return Cause("silent while awaited at the sill", node)
         return Cause("started anew, awaited at the sill" if cabin.is_fresh else "is not ready at the sill", node)
 
-    def _standing(self, story: TaskStory, body: _Body, now_us: int) -> Cause:
+    def _standing(self, story: TaskStory, body: _WaitingMachine, now_us: int) -> Cause:
         if body.wait is not None:
             if body.wait.track in way_site(self._site).lifts:
                 return self._lift_awaited(self._site.stewards[body.wait.track], now_us)
@@ -298,7 +298,7 @@ class Why:
             return self._planned_wait(story, following)
         return Cause("about to move: rights asked for, orders on their way", story.owner)
 
-    def _work(self, body: _Body) -> Leg | None:
+    def _work(self, body: _WaitingMachine) -> Leg | None:
         """The plan's leg of taking or leaving a car right here: progress counts it with the way before it."""
         near = body.legs[body.leg : body.leg + 2]
         for leg in near:
@@ -307,10 +307,10 @@ class Why:
                 return leg
         return None
 
-    def _is_at_end(self, body: _Body, leg: Leg | None) -> bool:
+    def _is_at_end(self, body: _WaitingMachine, leg: Leg | None) -> bool:
         return leg is not None and body.at == Segment(leg.track, leg.to_index)
 
-    def _refused(self, body: _Body, now_us: int) -> Cause | None:
+    def _refused(self, body: _WaitingMachine, now_us: int) -> Cause | None:
         if body.refusal is None or now_us - body.refusal[0] > _REFUSAL_US:
             return None
         refusal = body.refusal[1]
@@ -346,10 +346,10 @@ def _put_down(story: TaskStory, begin_us: int, end_us: int, cause: Cause) -> Non
     if story.parts and story.parts[-1].cause == cause:
         story.parts[-1].end_us = end_us
     elif end_us > begin_us:
-        story.parts.append(Part(cause, begin_us, end_us))
+        story.parts.append(WaitingPart(cause, begin_us, end_us))
 
 
-def told(story: TaskStory, words: Words, start_us: int) -> list[str]:
+def task_lines(story: TaskStory, words: Words, start_us: int) -> list[str]:
     """The story of one task: its parts in order, then how much each machine and cause took."""
     what = words.system.operation(story.operation)
     state = (

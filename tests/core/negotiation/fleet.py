@@ -15,10 +15,8 @@ from onboard.contract.codes import Criterion, Grade, KindCode, Operation, Reason
 from onboard.contract.messages import Award, Bid, CallForProposals, Itinerary, Message, Reference, Stamp
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.negotiation import (
-    Answer,
     Awarded,
     CallKey,
-    CallTerms,
     Closed,
     Estimator,
     Negotiation,
@@ -26,7 +24,9 @@ from onboard.core.negotiation import (
     PreAssigned,
     Proposal,
     Released,
-    Slot,
+    RequestedTerms,
+    SpeakingSlot,
+    SubCallAnswer,
 )
 from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import BUS_MS_MODULUS
@@ -52,13 +52,13 @@ TIMING = Timing(
 )
 
 
-def terms(number: int = 1, **changes: int) -> CallTerms:
+def terms(number: int = 1, **changes: int) -> RequestedTerms:
     """A call for a robot to park car ``number``; ``changes`` are whole numbers such as stations."""
     car = Reference(CALLER, number)
     values = {"from_station": 0x104, "to_station": 0xFFFF, "wheelbase_mm": 2_500} | changes
     station, goal, wheelbase_mm = values.pop("from_station"), values.pop("to_station"), values.pop("wheelbase_mm")
     assert not values, "only these three may be changed here"
-    return CallTerms(
+    return RequestedTerms(
         car, Operation.PARK, KindCode.ROBOT, Criterion.FINISH_TIME, station, goal, load=car, load_mm=wheelbase_mm
     )
 
@@ -137,7 +137,7 @@ class Machine:
         *,
         kind: KindCode = KindCode.ROBOT,
         silent: bool = False,
-        slot: Slot = ANY_TIME,
+        slot: SpeakingSlot = ANY_TIME,
     ) -> None:
         if isinstance(costs, Costs):
             costs.node = node_id
@@ -145,7 +145,7 @@ class Machine:
         self.negotiation = Negotiation(node_id, kind, TIMING, costs, silent=silent, slot=slot)
         self.committed: set[CallKey] = set()
         self.assigned: list[CallForProposals] = []
-        self.parts: list[tuple[Answer, ...]] = []
+        self.parts: list[tuple[SubCallAnswer, ...]] = []
         self.released: list[Reason] = []
         self.closed: list[Closed] = []
         self.reports: list[str] = []
@@ -197,7 +197,7 @@ class Machine:
                     self.closed.append(item)
         return said
 
-    def call_for(self, what: CallTerms, now_us: int) -> list[Message]:
+    def call_for(self, what: RequestedTerms, now_us: int) -> list[Message]:
         """Open a call."""
         return self.carry_out(list(self.negotiation.open(what, now_us)), now_us)
 
@@ -241,7 +241,7 @@ class Bus:
             self.wire.append((self.now_us, message))
             heapq.heappush(self._arrivals, (self._free_us, next(self._sequence), message))
 
-    def call(self, what: CallTerms, node: int = CALLER) -> None:
+    def call(self, what: RequestedTerms, node: int = CALLER) -> None:
         """Let a machine open a call now."""
         self.post(self.machines[node].call_for(what, self.now_us))
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from onboard.contract.codes import Criterion, KindCode, Operation
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import CallForProposals
-from onboard.core.negotiation import Answer, CallTerms, Needs, Proposal, cost_difference
+from onboard.core.negotiation import NeededAnswers, Proposal, RequestedTerms, SubCallAnswer, cost_difference
 from onboard.core.negotiation.events import CallKey
 from onboard.core.serial import BUS_MS_MODULUS, from_bus_ms
 from tests.core.negotiation.fleet import CALLER, Bus, Machine, caller, terms
@@ -39,7 +39,7 @@ class Maker:
             return None
         return (call.deadline_ms + call.ready_ms + self.recipes[call.from_station][0]) % BUS_MS_MODULUS
 
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | Needs | None:
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
         """The bound where no part is needed."""
         self.estimates.append(CallKey(call.sender, call.call))
         bound = self.lower_bound(call, now_us)
@@ -49,14 +49,14 @@ class Maker:
             return Proposal(bound, None, (), ())
         return self._needs(call, bound, parts[:1] if self.one_by_one else parts, now_us)
 
-    def _needs(self, call: CallForProposals, bound: int, parts: tuple[int, ...], now_us: int) -> Needs:
+    def _needs(self, call: CallForProposals, bound: int, parts: tuple[int, ...], now_us: int) -> NeededAnswers:
         ready_us = from_bus_ms(call.deadline_ms, now_us) + call.ready_ms * 1000
         asked = tuple(goods(part, call, ready_us) for part in parts)
-        return Needs(bound, asked, lambda answers, then_us: self._combine(call, bound, answers, then_us))
+        return NeededAnswers(bound, asked, lambda answers, then_us: self._combine(call, bound, answers, then_us))
 
     def _combine(
-        self, call: CallForProposals, bound: int, answers: tuple[Answer, ...], now_us: int
-    ) -> Proposal | Needs | None:
+        self, call: CallForProposals, bound: int, answers: tuple[SubCallAnswer, ...], now_us: int
+    ) -> Proposal | NeededAnswers | None:
         own_ms, parts = self.recipes[call.from_station]
         if not all(answer.winner for answer in answers):
             return None
@@ -68,9 +68,9 @@ class Maker:
         return Proposal(cost, None, (), (), tuple(answer.part for answer in answers))
 
 
-def goods(good: int, call: CallForProposals, ready_us: int = 0) -> CallTerms:
+def goods(good: int, call: CallForProposals, ready_us: int = 0) -> RequestedTerms:
     """What is asked of others for a part of ``call``."""
-    return CallTerms(
+    return RequestedTerms(
         call.task,
         Operation.RECEIVE,
         KindCode.ROBOT,
@@ -83,7 +83,7 @@ def goods(good: int, call: CallForProposals, ready_us: int = 0) -> CallTerms:
     )
 
 
-def wanted(good: int, number: int = 1) -> CallTerms:
+def wanted(good: int, number: int = 1) -> RequestedTerms:
     """The caller's own call for a good, as task ``number``."""
     return terms(number, from_station=good)
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from onboard.contract.codes import CallResult, Criterion, Reason
 from onboard.contract.messages import Bid, CallForProposals, Message
-from onboard.core.negotiation import CallKey, Slot, beats, cost_difference
+from onboard.core.negotiation import CallKey, SpeakingSlot, beats, cost_difference
 from tests.core.negotiation.fleet import CALLER, TIMING, Bus, Costs, Machine, caller, fleet, terms
 
 #: Costs in ms after the deadline: near the floor, where delays differ, and far from it, where they hardly do.
@@ -40,7 +40,7 @@ def test_p11_p17_without_loss_all_name_the_best_bidder(costs: dict[int, int], la
 def test_p08_bids_strictly_improve_on_the_wire(costs: dict[int, int], latency_us: int, slack_ms: int) -> None:
     """In slots as long as the latency no two bids are on their way at once, however equal the machines are."""
     robots = [
-        Machine(node, Costs({1: cost}, slack_ms), slot=Slot(number, len(costs), 1_500))
+        Machine(node, Costs({1: cost}, slack_ms), slot=SpeakingSlot(number, len(costs), 1_500))
         for number, (node, cost) in enumerate(sorted(costs.items()))
     ]
     bus = Bus([caller(), *robots], latency_us)

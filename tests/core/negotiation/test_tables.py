@@ -11,13 +11,13 @@ from onboard.contract.codes import CallResult, Criterion, Grade, Reason, TaskPha
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Award, Bid, Itinerary, Reference, Stamp, TaskReport
 from onboard.core.negotiation import CallKey, delay_us, initiator, participant
-from onboard.core.negotiation.bidding import Slot, in_slot, slot_of
+from onboard.core.negotiation.bidding import SpeakingSlot, in_slot, slot_of
 from onboard.core.negotiation.negotiation import FORGET_US, MAX_CALLS
 from tests.core.negotiation.fleet import CALLER, START_US, TIMING, Bus, Costs, Machine, a_call, caller, fleet, terms
 from tests.sites import one_floor
 
-P, PE = participant.State, participant.Event
-IS = initiator.State
+P, PE = participant.ParticipantState, participant.ParticipantEvent
+IS = initiator.InitiatorState
 
 
 def reachable(start: Enum, steps: Iterable[tuple[Enum, Enum]]) -> set[Enum]:
@@ -277,6 +277,6 @@ def test_slots_keep_machines_a_bus_latency_apart() -> None:
     for delay in (0, 5_000, 123_456):
         moments = [in_slot(delay, slot) for slot in slots]
         assert [later - earlier for earlier, later in pairwise(moments)] == [length_us] * 3
-    assert in_slot(123_456, Slot(0, 1, 0)) == 123_456
+    assert in_slot(123_456, SpeakingSlot(0, 1, 0)) == 123_456
     with pytest.raises(ValueError, match="99"):
         slot_of(site, 99)

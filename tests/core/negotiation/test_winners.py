@@ -5,7 +5,7 @@ from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Award, Bid, LeftOut, Message, Reference
 from onboard.core.effects import Effect, Send
 from onboard.core.mirror import Obstacle
-from onboard.core.negotiation import CallTerms, Negotiation
+from onboard.core.negotiation import Negotiation, RequestedTerms
 from onboard.core.negotiation.initiator import ACCEPT_WITHIN_US
 from onboard.core.negotiation.winners import LOST_AFTER_US, STANDS_AFTER_US, Winners
 from onboard.work.plain import NoEstimator
@@ -14,7 +14,7 @@ from tests.sites import one_floor
 SITE = one_floor(robots=2)
 DESK, ALICE, BOB = 1, 11, 12
 TASK = Reference(DESK, 7)
-TERMS = CallTerms(TASK, Operation.TRANSPORT, KindCode.ROBOT, Criterion.LENGTH, 1, 2, TASK, 0)
+TERMS = RequestedTerms(TASK, Operation.TRANSPORT, KindCode.ROBOT, Criterion.LENGTH, 1, 2, TASK, 0)
 SECOND = 1_000_000
 
 

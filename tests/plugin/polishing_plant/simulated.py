@@ -9,8 +9,8 @@ from polishing_shop.site import Shop
 
 from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import Timers
-from bus_sim.systems.orders import Ended, OrderedSystem, Orders, tally
-from bus_sim.systems.stage import Stage, Tally
+from bus_sim.systems.orders import EndedOrder, OrderArrivals, OrderedSystem, tally
+from bus_sim.systems.stage import SystemStage, Tally
 from onboard.contract.codes import KindCode
 from onboard.contract.messages import Message
 
@@ -86,7 +86,7 @@ class Plant:
                 self.violations.append(f"{now_us / 1e6:.3f} s: part {message.number} went out rough")
 
 
-class ShopStage(Stage[Plant]):
+class ShopStage(SystemStage[Plant]):
     """One run of a shop: its picture and its figures."""
 
     who = "parts"
@@ -94,7 +94,7 @@ class ShopStage(Stage[Plant]):
     def tally(self) -> Tally:
         """What became of the parts."""
         parts = self.plant.parts.values()
-        ended = [Ended(part.out_us is not None, False, part.came_us, part.out_us) for part in parts]
+        ended = [EndedOrder(part.out_us is not None, False, part.came_us, part.out_us) for part in parts]
         return tally(ended, len(self.plant.site.parts_ms), self.plant.timers.now_us())
 
     def picture(self) -> str:
@@ -110,7 +110,7 @@ class ShopStage(Stage[Plant]):
         return {"parts": len(self.plant.parts), "polished": counted.served, "longest_wait_s": counted.longest_wait_s}
 
 
-def draw(site: Shop, orders: Orders, seed: int) -> Shop:
+def draw(site: Shop, orders: OrderArrivals, seed: int) -> Shop:
     """The site with parts that a seed draws."""
     chance: random.Random = orders.chance(site.name, seed)
     return replace(site, parts_ms=tuple(orders.moments_ms(chance)))
@@ -128,6 +128,6 @@ SIMULATED = OrderedSystem(
     draw,
     lambda site: ORIGIN_US / 1e6 + max(site.parts_ms, default=0) / 1e3,
     order_s,
-    lambda site: Orders(4, order_s(site) / len(site.polishing_us)),
+    lambda site: OrderArrivals(4, order_s(site) / len(site.polishing_us)),
     worker=KindCode.LATHE,
 )

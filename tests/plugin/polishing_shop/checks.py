@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from onboard.contract.codes import TaskPhase
 from onboard.contract.messages import Reference, TaskReport
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.trace.check.systems import COMMON
 
@@ -17,7 +17,7 @@ class PolishedOnce(Rule):
     title = "no part is polished twice"
     source = "the shop's drawings"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._done: dict[Reference, int] = {}
 
@@ -25,7 +25,7 @@ class PolishedOnce(Rule):
         """Ends of tasks."""
         return {TaskReport: self._on_report}
 
-    def _on_report(self, event: Event[TaskReport]) -> None:
+    def _on_report(self, event: LogEvent[TaskReport]) -> None:
         word = event.message
         if word.phase is TaskPhase.DONE and self._done.setdefault(word.task, word.sender) != word.sender:
             self.find(event, (word.sender, self._done[word.task]), f"part {word.task.number} was polished twice")

@@ -8,7 +8,7 @@ from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.effects import Effect, Send, Tell
 from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import ALONE, authorised
-from onboard.core.negotiation import Awarded, CallTerms, Closed, Estimator, NegotiationEvent, Proposal
+from onboard.core.negotiation import Awarded, Closed, Estimator, NegotiationEvent, Proposal, RequestedTerms
 from onboard.core.site import Machine, Site
 from onboard.work.plain import NoEstimator, Plain
 from polishing_shop.frames import PartIn, PartOut, Polish, Polished
@@ -104,7 +104,7 @@ class Desk(Plain):
             return []
         self.called.add(message.number)
         task = Reference(self.fleet.node_id, message.number)
-        terms = CallTerms(task, Operation.MACHINE, KindCode.LATHE, Criterion.FINISH_TIME, 0, 0, NO_REFERENCE, 0)
+        terms = RequestedTerms(task, Operation.MACHINE, KindCode.LATHE, Criterion.FINISH_TIME, 0, 0, NO_REFERENCE, 0)
         return self.fleet.negotiation.open(terms, now_us)
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:

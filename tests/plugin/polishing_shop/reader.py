@@ -1,7 +1,7 @@
 """The site file of a polishing shop."""
 
-from onboard.config.fleet import Fleet
-from onboard.config.reader import Common, Table
+from onboard.config.fleet import FleetReader
+from onboard.config.reader import Common, TomlTable
 from onboard.config.timing import read_timing
 from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
@@ -10,9 +10,9 @@ from polishing_shop.site import Shop
 _NOWHERE = Segment(0, 0)
 
 
-def read(root: Table, common: Common) -> Shop:
+def read(root: TomlTable, common: Common) -> Shop:
     """One desk, polishers, and when parts come; every mistake is one line."""
-    fleet, polishing_us = Fleet(), dict[int, int]()
+    fleet, polishing_us = FleetReader(), dict[int, int]()
     fleet.add(root.table("desk"), KindCode.DESK, _NOWHERE)
     desk = next(iter(fleet.by_node), 0)
     for table in root.tables("polishers"):

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from onboard.core.site import Needs, Site
+from onboard.core.site import MotionNeeds, Site
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,7 +15,7 @@ class Shop(Site):
     #: What a run asks of the site: no machine knows it, and the digest does not depend on it.
     demand: ClassVar[frozenset[str]] = frozenset({"parts_ms"})
     #: The order by which something moves, and what it needs: a polisher moves within itself only.
-    moved_by: ClassVar[Mapping[str, Needs]] = {"Polish": Needs.ALONE}
+    moved_by: ClassVar[Mapping[str, MotionNeeds]] = {"Polish": MotionNeeds.ALONE}
 
     desk: int
     polishing_us: dict[int, int]

@@ -16,13 +16,13 @@ from onboard.core.effects import Effect, Send
 from onboard.core.negotiation import (
     Awarded,
     CallKey,
-    CallTerms,
     Closed,
     Estimator,
     NegotiationEvent,
     PreAssigned,
     Proposal,
     Released,
+    RequestedTerms,
     beats,
     cut_off_us,
 )
@@ -89,12 +89,12 @@ class ContractNetInitiator:
     timing: Timing
     participants: frozenset[int]
     call: CallForProposals | None = None
-    terms: CallTerms | None = None
+    terms: RequestedTerms | None = None
     deadline_us: int = 0
     bids: dict[int, int] = field(default_factory=dict)
     _last_call: int = 0
 
-    def open(self, terms: CallTerms, now_us: int) -> list[Effect]:
+    def open(self, terms: RequestedTerms, now_us: int) -> list[Effect]:
         """Call for a task. Raises ``ValueError`` while another call is open."""
         if self.call is not None:
             raise ValueError(f"node {self.node_id} has call {self.call.call} open")

@@ -15,11 +15,11 @@ from onboard.core.mirror import Mirror
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park.generation import CarParkGeneration
-from onboard.systems.car_park.robot import RobotFactory
+from onboard.systems.car_park.robot import ParkingRobotFactory
 from onboard.systems.registry import factory_for
 from onboard.ways.lifts import platform
 from onboard.ways.mirror import way_mirror
-from onboard.ways.reservations import Reservations, Use, Window
+from onboard.ways.reservations import Reservations, SlotWindow, Use
 
 
 class SessionLocks(Reservations):
@@ -29,11 +29,11 @@ class SessionLocks(Reservations):
         super().__init__()
         self._mirror = mirror
 
-    def reserve(self, owner: int, windows: Iterable[Window], uses: Iterable[Use] = ()) -> None:
+    def reserve(self, owner: int, windows: Iterable[SlotWindow], uses: Iterable[Use] = ()) -> None:
         """As the base, with the time from the call to boarding added to each use, and to the platform's windows."""
         sessions = [use._replace(from_us=self._session_begin_us(owner, use)) for use in uses]
         locks = [
-            Window(platform(session.lift_track), session.from_us, session.to_us)
+            SlotWindow(platform(session.lift_track), session.from_us, session.to_us)
             for session in sessions
             if session.from_us < session.to_us
         ]
@@ -60,7 +60,7 @@ def _call_us(itinerary: Itinerary, use: Use) -> int:
     return call_us
 
 
-class LockingRobotFactory(RobotFactory):
+class LockingRobotFactory(ParkingRobotFactory):
     """Makes robots that see a lift as taken for the whole of a session."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> CarParkGeneration:

@@ -11,10 +11,10 @@ from bus_sim.systems.car_park.compare.free_flow import bounds_us
 from bus_sim.systems.car_park.compare.optimum import OptimumError, is_available
 from bus_sim.systems.car_park.compare.plays import POLICIES, Play, play
 from bus_sim.systems.car_park.compare.small_table import SmallTable, solve_case
-from bus_sim.systems.car_park.compare.table import Table, tabulate
-from bus_sim.systems.car_park.day import Day, choose_demand
+from bus_sim.systems.car_park.compare.table import ComparisonTable, tabulate
+from bus_sim.systems.car_park.day import ParkingDay, choose_demand
 from bus_sim.systems.car_park.demand import Demand
-from bus_sim.systems.car_park.window import Window, choose_window
+from bus_sim.systems.car_park.window import DayWindow, choose_window
 from onboard.core.site import Site
 from onboard.systems.car_park.site import CarPark
 
@@ -78,7 +78,7 @@ def run_compare(args: argparse.Namespace) -> int:
     if not isinstance(site, CarPark):
         raise DemandError(f"{args.site}: a {site.system}, and only car parks are compared; name a car park")
     small = find_site(SMALL_SITE)
-    found: dict[str, Table | SmallTable] = {}
+    found: dict[str, ComparisonTable | SmallTable] = {}
     for part in parts:
         if part == "small" and not is_available():
             print("no optimum: OR-Tools is not installed; pip install 'onboard-fleet[optimum]'\n", flush=True)
@@ -93,11 +93,11 @@ def run_compare(args: argparse.Namespace) -> int:
     if args.json is not None:
         values = {part: table.to_json() for part, table in found.items()}
         args.json.write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
-    tables = [table for table in found.values() if isinstance(table, Table)]
+    tables = [table for table in found.values() if isinstance(table, ComparisonTable)]
     return 1 if any(table.faults or table.left_out for table in tables) else 0
 
 
-def compare_random(site: Site, seeds: range, cars: int, interval_s: tuple[float, float]) -> Table:
+def compare_random(site: Site, seeds: range, cars: int, interval_s: tuple[float, float]) -> ComparisonTable:
     """All policies on random arrivals. Raises ``DemandError`` for intervals that make no sense."""
     demands = {seed: Demand.by_mean(*interval_s, seed, count=cars) for seed in seeds}
     plays = [_told(play(site, demands[seed], policy, seed)) for seed in seeds for policy in POLICIES]
@@ -108,17 +108,19 @@ def compare_random(site: Site, seeds: range, cars: int, interval_s: tuple[float,
     return tabulate(title, plays, {seed: bounds_us(site, demand, seed) for seed, demand in demands.items()})
 
 
-def compare_day(site: Site, args: argparse.Namespace) -> Table:
+def compare_day(site: Site, args: argparse.Namespace) -> ComparisonTable:
     """All policies on a window of a real day: what comes before is played too, and not counted."""
-    demand = choose_demand(Day(sessions=args.sessions, day=args.day), site)
+    demand = choose_demand(ParkingDay(sessions=args.sessions, day=args.day), site)
     window = choose_window(demand, args.window)
     seed = 1
     before = Demand(tuple(stay for stay in demand.stays if stay.arrival_us < window.end_us), demand.zero)
     plays = [_told(play(site, before, policy, seed, window)) for policy in POLICIES]
-    return tabulate(f"{site.name}: {window.told(demand)}", plays, {seed: _bounds_within(site, before, window, seed)})
+    return tabulate(
+        f"{site.name}: {window.described(demand)}", plays, {seed: _bounds_within(site, before, window, seed)}
+    )
 
 
-def _bounds_within(site: Site, demand: Demand, window: Window, seed: int) -> tuple[list[int], list[int]]:
+def _bounds_within(site: Site, demand: Demand, window: DayWindow, seed: int) -> tuple[list[int], list[int]]:
     """Least waiting of those who come, and of those who leave, within a window."""
 
     def inside(moment_us: int | None) -> bool:

@@ -5,15 +5,15 @@ compartment, and pays nothing for any of that; only its word goes over the bus.
 """
 
 from bus_sim.systems.car_park.compare.obedience import DISPATCHER, TASKS, ObedientNegotiation
-from bus_sim.systems.car_park.compare.policies import OpenTask, Order, Policy, Scene
+from bus_sim.systems.car_park.compare.policies import Dispatch, DispatchScene, OpenTask, Policy
 from bus_sim.systems.car_park.compare.prospect import Prospect
-from bus_sim.systems.car_park.plant.customer import State
+from bus_sim.systems.car_park.plant.customer import CustomerState
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import CallResult, Grade, MachineState, Reason, TaskPhase
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Award, CallForProposals, Itinerary, Message, TaskReport
 from onboard.core.negotiation import CallKey
-from onboard.systems.car_park.robot import Robot
+from onboard.systems.car_park.robot import ParkingRobot
 from onboard.ways.site import way_site
 from onboard.wire.codec import fleet_codec
 
@@ -22,7 +22,7 @@ SETTLING_US = 2_000
 #: Open tasks are looked at again at least this often, us: nothing that waits is overlooked.
 TICK_US = 15_000_000
 #: Customers in these states wait for their compartment's bay.
-WAITING = (State.QUEUEING, State.AT_DESK, State.AWAITING_DOOR)
+WAITING = (CustomerState.QUEUEING, CustomerState.AT_DESK, CustomerState.AWAITING_DOOR)
 
 
 class Dispatcher:
@@ -36,7 +36,7 @@ class Dispatcher:
         self._bus = simulation.fleet.attach("dispatcher", DISPATCHER)
         self._open: dict[CallKey, CallForProposals] = {}
         self._ordered: dict[int, CallKey] = {}
-        self._decided: list[Order] = []
+        self._decided: list[Dispatch] = []
         self._tries: dict[CallKey, int] = {}
         self._due_us: int | None = None
         simulation.observers.append(self.hear)
@@ -85,14 +85,14 @@ class Dispatcher:
 
     # --- what the dispatcher sees ------------------------------------------------------------------------------
 
-    def _robots(self) -> dict[int, Robot]:
+    def _robots(self) -> dict[int, ParkingRobot]:
         """Robots that can be sent."""
         found = {}
         for node in self._negotiations:
             holon = self._simulation.controllers[node].holon
             robot = holon.behaviour
             ready = holon.halted is None and robot.state not in (MachineState.STARTING, MachineState.STOPPED)
-            if isinstance(robot, Robot) and ready:
+            if isinstance(robot, ParkingRobot) and ready:
                 found[node] = robot
         return found
 
@@ -105,13 +105,13 @@ class Dispatcher:
         ends = [step.end_us for step in robot.program.remaining if step.work is not None]
         return ends[-1] - self._bus_us(node, loop_us) if ends else 0
 
-    def _scene(self, loop_us: int) -> Scene:
+    def _scene(self, loop_us: int) -> DispatchScene:
         robots = {node: robot for node, robot in self._robots().items() if node not in self._ordered}
         now_us = max((self._bus_us(node, loop_us) for node in robots), default=loop_us)
         planners = {node: robot.generation for node, robot in robots.items()}
         free = tuple(node for node in robots if self._free_in_us(node, loop_us) <= self._policy.ahead_us)
         tasks = tuple(OpenTask(call, self._waiting(call.sender)) for call in self._open.values())
-        return Scene(Prospect(planners, now_us, {}), free, tasks)
+        return DispatchScene(Prospect(planners, now_us, {}), free, tasks)
 
     def _waiting(self, compartment: int) -> int:
         """Customers whom the task in a compartment's bay keeps waiting: its own, and the queue behind."""
@@ -123,7 +123,7 @@ class Dispatcher:
 
     # --- what it says ------------------------------------------------------------------------------------------
 
-    def _order(self, order: Order) -> None:
+    def _order(self, order: Dispatch) -> None:
         call = order.call
         key = CallKey(call.sender, call.call)
         del self._open[key]
@@ -134,7 +134,7 @@ class Dispatcher:
         self.orders += 1
         self._say(call, order.node)
 
-    def _refuse_hopeless(self, scene: Scene) -> None:
+    def _refuse_hopeless(self, scene: DispatchScene) -> None:
         """A task for which no robot has a place is refused after as many looks as others call for it."""
         limit = self._simulation.site.timing.max_attempts
         for key, call in list(self._open.items()):

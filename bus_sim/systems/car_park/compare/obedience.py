@@ -18,16 +18,16 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import (
     Awarded,
     CallKey,
-    CallTerms,
     Initiator,
     Negotiation,
     NegotiationEvent,
     Proposal,
+    RequestedTerms,
 )
-from onboard.core.negotiation.initiator import Event
+from onboard.core.negotiation.initiator import InitiatorEvent
 from onboard.core.site import Machine, Segment, Site
 from onboard.systems.car_park.generation import AWARD_LATENCY_US, CarParkGeneration
-from onboard.systems.car_park.robot import RobotFactory
+from onboard.systems.car_park.robot import ParkingRobotFactory
 from onboard.systems.registry import factory_for
 
 #: Node-ID under which the dispatcher speaks: one of those that no machine of a site has, and that may award.
@@ -55,15 +55,15 @@ class WaitingInitiator(Initiator):
     def ordered(self, winner: int, now_us: int) -> Outcome:
         """The dispatcher has named a robot, or NOBODY where none can ever do it."""
         if winner == NOBODY:
-            return self._fire(Event.EXHAUSTED, now_us)
+            return self._fire(InitiatorEvent.EXHAUSTED, now_us)
         self.best = (0, winner)
-        return self._fire(Event.DEADLINE_WITH_BID, now_us)
+        return self._fire(InitiatorEvent.DEADLINE_WITH_BID, now_us)
 
 
 class CallingNegotiation(Negotiation):
     """A compartment that tells its tasks to a dispatcher and waits for the robot that it names."""
 
-    def open(self, terms: CallTerms, now_us: int) -> list[Effect]:
+    def open(self, terms: RequestedTerms, now_us: int) -> list[Effect]:
         """Tell a task; the answer comes as a ``Closed`` event once the dispatcher has decided."""
         if terms.operation not in TASKS:
             return super().open(terms, now_us)
@@ -112,7 +112,7 @@ class DispatchedGeneration(CarParkGeneration):
         return kept, segment, max(start_us, now_us + AWARD_LATENCY_US)
 
 
-class DispatchedRobotFactory(RobotFactory):
+class DispatchedRobotFactory(ParkingRobotFactory):
     """Makes robots for a dispatcher."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> CarParkGeneration:

@@ -36,7 +36,7 @@ class _Car:
 
 
 @dataclass
-class _Task:
+class _TaskAsSeen:
     """One task as robots see it: of which car, and whether it fetches."""
 
     car: int
@@ -51,7 +51,7 @@ class _Model:
     cars: list[_Car] = field(default_factory=list)
     waits: list[Any] = field(default_factory=list)
     bays: list[Any] = field(default_factory=list)
-    tasks: list[_Task] = field(default_factory=list)
+    tasks: list[_TaskAsSeen] = field(default_factory=list)
 
     def time(self, name: str) -> Any:
         return self.cp.new_int_var(0, self.horizon, name)
@@ -104,7 +104,7 @@ def _add_car(model: _Model, number: int) -> None:
     cp.add(parked == taken + to_bay + case.handle_ms)
     _occupy(model, begin, taken + case.close_ms + case.open_ms, f"bay for {number}")
     model.waits.append(out - visitor.arrival_ms)
-    model.tasks.append(_Task(number, fetches=False))
+    model.tasks.append(_TaskAsSeen(number, fetches=False))
     car = _Car(place, to_bay, reach, parked)
     model.cars.append(car)
     if visitor.departure_ms is not None:
@@ -125,7 +125,7 @@ def _add_fetching(model: _Model, number: int, car: _Car, parked_out: Any) -> Non
     gone = car.fetched + case.close_ms + case.open_ms + case.react_ms + visitor.drive_out_ms
     _occupy(model, begin, gone, f"bay from {number}")
     model.waits.append(gone - asked)
-    model.tasks.append(_Task(number, fetches=True))
+    model.tasks.append(_TaskAsSeen(number, fetches=True))
 
 
 def _occupy(model: _Model, begin: Any, end: Any, name: str) -> None:
@@ -176,24 +176,24 @@ def _route_robots(model: _Model) -> None:
         cp.add_exactly_one(robots)
 
 
-def _reach(model: _Model, task: _Task) -> Any:
+def _reach(model: _Model, task: _TaskAsSeen) -> Any:
     car = model.cars[task.car]
     return car.reach_fetch if task.fetches else car.reach_park
 
 
-def _end(model: _Model, task: _Task) -> Any:
+def _end(model: _Model, task: _TaskAsSeen) -> Any:
     car = model.cars[task.car]
     return car.fetched if task.fetches else car.parked
 
 
-def _from_home(model: _Model, home: int, task: _Task) -> Any:
+def _from_home(model: _Model, home: int, task: _TaskAsSeen) -> Any:
     row = list(model.case.way_ms[home])
     if not task.fetches:
         return row[model.case.bay]
     return model.way(model.cars[task.car].place, row[: len(model.case.places)], "")
 
 
-def _between(model: _Model, before: _Task, task: _Task) -> Any:
+def _between(model: _Model, before: _TaskAsSeen, task: _TaskAsSeen) -> Any:
     """The empty way from where one task ends to where another begins."""
     here, there = model.cars[before.car], model.cars[task.car]
     if not task.fetches:

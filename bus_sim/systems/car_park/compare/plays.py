@@ -10,9 +10,9 @@ from bus_sim.systems.car_park.compare import obedience
 from bus_sim.systems.car_park.compare.dispatcher import Dispatcher
 from bus_sim.systems.car_park.compare.policies import AnyFirst, JointChoice, NearestFirst, Policy
 from bus_sim.systems.car_park.demand import Demand
-from bus_sim.systems.car_park.plant.customer import Customer, Outcome
+from bus_sim.systems.car_park.plant.customer import Customer, VisitOutcome
 from bus_sim.systems.car_park.simulation import Simulation, build
-from bus_sim.systems.car_park.window import Window
+from bus_sim.systems.car_park.window import DayWindow
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.site import Site
 from onboard.trace.indicators import Indicators
@@ -51,7 +51,7 @@ class Play:
     faults: tuple[str, ...]
 
 
-def play(site: Site, demand: Demand, policy: str, seed: int, window: Window | None = None) -> Play:
+def play(site: Site, demand: Demand, policy: str, seed: int, window: DayWindow | None = None) -> Play:
     """Play a demand to its end, or to the end of a window, whose customers alone count and are still served.
 
     Raises ``KeyError`` for a policy that is not in ``POLICIES``.
@@ -67,7 +67,7 @@ def play(site: Site, demand: Demand, policy: str, seed: int, window: Window | No
 
 class _Run:
     def __init__(
-        self, site: Site, demand: Demand, policy: str, seed: int, window: Window | None, loop: VirtualTimeLoop
+        self, site: Site, demand: Demand, policy: str, seed: int, window: DayWindow | None, loop: VirtualTimeLoop
     ) -> None:
         self._policy, self._seed, self._window, self._demand = policy, seed, window, demand
         self._origin_us = LEAD_US - min((stay.arrival_us for stay in demand.stays), default=0)
@@ -127,7 +127,7 @@ class _Run:
         fleet = self._indicators.figures(now_us)
         visits = [one.visit for one in simulation.plant.street.customers]
         parked = [one for one in visits if one.in_wait_us is not None and self._counts(one.arrived_us)]
-        served = [one for one in visits if one.outcome is Outcome.SERVED and self._counts(one.asked_us)]
+        served = [one for one in visits if one.outcome is VisitOutcome.SERVED and self._counts(one.asked_us)]
         faults = [str(violation) for violation in simulation.plant.oracle.finish()]
         faults += [
             f"{controller.holon.machine.name} halted: {controller.holon.halted}"
@@ -154,7 +154,7 @@ def _waiting(simulation: Simulation) -> list[Customer]:
     return [
         one
         for one in simulation.plant.street.customers
-        if one.visit.outcome is Outcome.STAYING
+        if one.visit.outcome is VisitOutcome.STAYING
         and one.visit.arrived_us is not None
         and (one.visit.parked_us is None or one.visit.asked_us is not None)
     ]

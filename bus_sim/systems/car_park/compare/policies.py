@@ -37,7 +37,7 @@ class OpenTask(NamedTuple):
     waiting: int
 
 
-class Order(NamedTuple):
+class Dispatch(NamedTuple):
     """One robot is to do one task, as planned."""
 
     node: int
@@ -46,7 +46,7 @@ class Order(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Scene:
+class DispatchScene:
     """All that a dispatcher sees: robots as they are, those ``free`` to begin, and tasks by their age."""
 
     prospect: Prospect
@@ -60,7 +60,7 @@ class Policy(Protocol):
     name: str
     ahead_us: int
 
-    def choose(self, scene: Scene) -> list[Order]:
+    def choose(self, scene: DispatchScene) -> list[Dispatch]:
         """What is to be begun now; what is left out is decided anew later."""
 
 
@@ -70,7 +70,7 @@ class NearestFirst:
     name = "nearest first"
     ahead_us = RULE_AHEAD_US
 
-    def choose(self, scene: Scene) -> list[Order]:
+    def choose(self, scene: DispatchScene) -> list[Dispatch]:
         """Pairs of a free robot and a task by empty travelling time; ties by age of the task, then node-ID."""
 
         def key(pair: "_Pair", prospect: Prospect) -> tuple[int, int, int]:
@@ -92,7 +92,7 @@ class AnyFirst:
     def __post_init__(self) -> None:
         self.chance = random.Random(f"dispatcher:{self.seed}")
 
-    def choose(self, scene: Scene) -> list[Order]:
+    def choose(self, scene: DispatchScene) -> list[Dispatch]:
         """Pairs of a free robot and a task in random order."""
         return _one_by_one(scene, lambda pairs, _: self.chance.sample(pairs, len(pairs)))
 
@@ -106,9 +106,9 @@ class _Ranking(Protocol):
     def __call__(self, pairs: "list[_Pair]", prospect: Prospect) -> "list[_Pair]": ...
 
 
-def _one_by_one(scene: Scene, rank: _Ranking) -> list[Order]:
+def _one_by_one(scene: DispatchScene, rank: _Ranking) -> list[Dispatch]:
     """The first pair that can be planned, then the first of the rest, until no pair is left."""
-    orders: list[Order] = []
+    orders: list[Dispatch] = []
     prospect, free, tasks = scene.prospect, list(scene.free), list(scene.tasks)
     found = True
     while found and free and tasks:
@@ -116,7 +116,7 @@ def _one_by_one(scene: Scene, rank: _Ranking) -> list[Order]:
         for pair in rank([_Pair(node, task) for node in free for task in tasks], prospect):
             solution = prospect.solve(pair.node, pair.task.call)
             if solution is not None:
-                orders.append(Order(pair.node, pair.task.call, solution))
+                orders.append(Dispatch(pair.node, pair.task.call, solution))
                 prospect = prospect.after(pair.node, solution)
                 free.remove(pair.node)
                 tasks.remove(pair.task)
@@ -136,11 +136,11 @@ class JointChoice:
     name = "joint choice"
     ahead_us = JOINT_AHEAD_US
 
-    def choose(self, scene: Scene) -> list[Order]:
+    def choose(self, scene: DispatchScene) -> list[Dispatch]:
         """What free robots do first in the best plan found."""
-        search = _Search(scene)
+        search = _JointChoice(scene)
         search.run()
-        orders: list[Order] = []
+        orders: list[Dispatch] = []
         begun: set[int] = set()
         for order in search.best:
             if order.node not in begun and order.node in scene.free:
@@ -149,22 +149,24 @@ class JointChoice:
         return orders
 
 
-class _Search:
+class _JointChoice:
     """One joint choice. Costs are in us of customers' waiting from now on."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: DispatchScene) -> None:
         self._scene = scene
         self._nodes = sorted(scene.prospect.planners)
         self._searches = 0
         self._known: dict[tuple[tuple[int, CallForProposals], ...], Solution | None] = {}
-        self.best: tuple[Order, ...] = ()
+        self.best: tuple[Dispatch, ...] = ()
         self.best_cost = float("inf")
 
     def run(self) -> None:
         """Find ``best``."""
         self._descend(self._scene.prospect, (), self._scene.tasks, 0.0)
 
-    def _descend(self, prospect: Prospect, orders: tuple[Order, ...], left: tuple[OpenTask, ...], cost: float) -> None:
+    def _descend(
+        self, prospect: Prospect, orders: tuple[Dispatch, ...], left: tuple[OpenTask, ...], cost: float
+    ) -> None:
         if not left:
             if cost < self.best_cost:
                 self.best, self.best_cost = orders, cost
@@ -186,14 +188,14 @@ class _Search:
             solution = self._solve(prospect, orders, node, task.call)
             if solution is None:
                 continue
-            order = Order(node, task.call, solution)
+            order = Dispatch(node, task.call, solution)
             spent = cost + self._cost(task, serves_customer_us(task.call, solution), solution.finish_us)
             self._descend(prospect.after(node, solution), (*orders, order), others, spent)
         if cost + len(left) * LEFT_OUT_US < self.best_cost:
             self.best, self.best_cost = orders, cost + len(left) * LEFT_OUT_US
 
     def _solve(
-        self, prospect: Prospect, orders: tuple[Order, ...], node: int, call: CallForProposals
+        self, prospect: Prospect, orders: tuple[Dispatch, ...], node: int, call: CallForProposals
     ) -> Solution | None:
         key = (*((order.node, order.call) for order in orders), (node, call))
         if key not in self._known:

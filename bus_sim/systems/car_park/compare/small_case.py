@@ -82,7 +82,7 @@ class Case:
         )
 
 
-class Offer(NamedTuple):
+class TaskOffer(NamedTuple):
     """What a robot could do about a task: done at ``finish_ms``, the car taken at ``taken_ms``, at ``place``."""
 
     finish_ms: int
@@ -94,15 +94,15 @@ class Offer(NamedTuple):
 
 
 #: Picks one of the offers of all robots for a task told at a time (ms).
-Rule = Callable[[list[Offer], int], Offer]
+Rule = Callable[[list[TaskOffer], int], TaskOffer]
 
 
-def earliest_finish(offers: list[Offer], told_ms: int) -> Offer:
+def earliest_finish(offers: list[TaskOffer], told_ms: int) -> TaskOffer:
     """Our protocol: the earliest finish wins, then the lower robot, and a robot may still be busy."""
     return min(offers)
 
 
-def nearest(offers: list[Offer], told_ms: int) -> Offer:
+def nearest(offers: list[TaskOffer], told_ms: int) -> TaskOffer:
     """The shortest empty way among robots that are free, or become free first."""
     first_ms = max(told_ms, min(offer.begin_ms for offer in offers))
     return min((offer for offer in offers if offer.begin_ms <= first_ms), key=lambda offer: (offer.empty_ms, offer))
@@ -112,7 +112,7 @@ def any_robot(seed: int) -> Rule:
     """A robot by chance among those that are free, or become free first; it takes the best place."""
     chance = random.Random(f"small case:{seed}")
 
-    def choose(offers: list[Offer], told_ms: int) -> Offer:
+    def choose(offers: list[TaskOffer], told_ms: int) -> TaskOffer:
         first_ms = max(told_ms, min(offer.begin_ms for offer in offers))
         free = [offer for offer in offers if offer.begin_ms <= first_ms]
         robot = chance.choice(sorted({offer.robot for offer in free}))
@@ -122,7 +122,7 @@ def any_robot(seed: int) -> Rule:
 
 
 @dataclass
-class _State:
+class _CaseState:
     robots: list[tuple[int, int]]
     stored: dict[int, tuple[int, int]] = field(default_factory=dict)
     taken_until: dict[int, int | None] = field(default_factory=dict)
@@ -136,7 +136,7 @@ def play_case(case: Case, rule: Rule) -> int:
 
     The bay serves as the compartment does: a ticket whose car is stored first, then whoever came first.
     """
-    state = _State([(home, 0) for home in case.homes])
+    state = _CaseState([(home, 0) for home in case.homes])
     coming = {number: one.arrival_ms for number, one in enumerate(case.visitors)}
     leaving: dict[int, int] = {}
     while coming or leaving:
@@ -154,7 +154,7 @@ def play_case(case: Case, rule: Rule) -> int:
     return sum(state.waited_ms)
 
 
-def _park(case: Case, state: _State, rule: Rule, number: int, begin_ms: int, came_ms: int) -> None:
+def _park(case: Case, state: _CaseState, rule: Rule, number: int, begin_ms: int, came_ms: int) -> None:
     visitor = case.visitors[number]
     told_ms = begin_ms + case.react_ms + visitor.drive_in_ms
     out_ms = told_ms + visitor.walk_ms
@@ -168,7 +168,7 @@ def _park(case: Case, state: _State, rule: Rule, number: int, begin_ms: int, cam
             finish_ms = taken_ms + case.way_ms[case.bay][place] + case.handle_ms
             until_ms = state.taken_until.get(place, 0)
             if until_ms is not None and until_ms <= finish_ms - case.handle_ms:
-                offers.append(Offer(finish_ms, robot, place, taken_ms, way_ms, free_ms))
+                offers.append(TaskOffer(finish_ms, robot, place, taken_ms, way_ms, free_ms))
     offer = rule(offers, told_ms)
     state.robots[offer.robot] = offer.place, offer.finish_ms
     state.stored[number] = offer.place, offer.finish_ms
@@ -178,7 +178,7 @@ def _park(case: Case, state: _State, rule: Rule, number: int, begin_ms: int, cam
     state.waited_ms.append(out_ms - came_ms)
 
 
-def _fetch(case: Case, state: _State, rule: Rule, number: int, begin_ms: int, asked_ms: int) -> None:
+def _fetch(case: Case, state: _CaseState, rule: Rule, number: int, begin_ms: int, asked_ms: int) -> None:
     visitor = case.visitors[number]
     place, stored_ms = state.stored[number]
     told_ms = begin_ms + case.close_ms
@@ -187,7 +187,7 @@ def _fetch(case: Case, state: _State, rule: Rule, number: int, begin_ms: int, as
         way_ms = case.way_ms[here][place]
         taken_ms = max(max(free_ms, told_ms) + way_ms, stored_ms) + case.handle_ms
         finish_ms = taken_ms + case.way_ms[place][case.bay] + case.open_ms + case.handle_ms
-        offers.append(Offer(finish_ms, robot, place, taken_ms, way_ms, free_ms))
+        offers.append(TaskOffer(finish_ms, robot, place, taken_ms, way_ms, free_ms))
     offer = rule(offers, told_ms)
     state.robots[offer.robot] = case.bay, offer.finish_ms
     state.taken_until[place] = offer.taken_ms

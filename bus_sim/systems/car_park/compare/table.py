@@ -11,7 +11,7 @@ BOUND = "free-flow bound"
 
 
 @dataclass(frozen=True)
-class Row:
+class PolicyRow:
     """One policy, or the bound, which has waiting times only. Waiting is of all visits together; shares are 0 to 1."""
 
     policy: str
@@ -24,11 +24,11 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Table:
+class ComparisonTable:
     """One part of the comparison. ``left_out`` tells, by seed, why a run counts for no policy."""
 
     title: str
-    rows: tuple[Row, ...]
+    rows: tuple[PolicyRow, ...]
     left_out: tuple[str, ...]
     faults: tuple[str, ...]
 
@@ -53,11 +53,11 @@ class Table:
         text += ["", *(f"left out: {line}" for line in self.left_out)] if self.left_out else []
         return text + [f"FAULT {line}" for line in self.faults]
 
-    def _ratio(self, row: Row, name: str) -> float | None:
+    def _ratio(self, row: PolicyRow, name: str) -> float | None:
         other = next((one for one in self.rows if one.policy == name), None)
         return row.waiting_s / other.waiting_s if other is not None and other.waiting_s else None
 
-    def _line(self, row: Row) -> str:
+    def _line(self, row: PolicyRow) -> str:
         ratios = [self._ratio(row, name) for name in (JointChoice.name, BOUND)]
         cells = [
             row.policy,
@@ -72,7 +72,9 @@ class Table:
         return f"| {' | '.join(cells)} |"
 
 
-def tabulate(title: str, plays: Sequence[Play], bounds_us: dict[int, tuple[Sequence[int], Sequence[int]]]) -> Table:
+def tabulate(
+    title: str, plays: Sequence[Play], bounds_us: dict[int, tuple[Sequence[int], Sequence[int]]]
+) -> ComparisonTable:
     """All plays of one part as a table; ``bounds_us`` are the least waiting times in and out, by seed.
 
     A seed with a policy under which customers are still waiting at the end is left out for all: their waiting would
@@ -86,7 +88,7 @@ def tabulate(title: str, plays: Sequence[Play], bounds_us: dict[int, tuple[Seque
     least_in_us = [time_us for ins_us, _ in least for time_us in ins_us]
     least_out_us = [time_us for _, outs_us in least for time_us in outs_us]
     rows.append(_bare(BOUND, least_in_us, least_out_us))
-    return Table(
+    return ComparisonTable(
         title,
         tuple(rows),
         tuple(f"seed {one.seed}, under {one.policy} {one.left} customers were not served" for one in stuck),
@@ -98,16 +100,16 @@ def _names(plays: Sequence[Play]) -> list[str]:
     return [one.policy for one in plays]
 
 
-def _bare(policy: str, in_us: Sequence[int], out_us: Sequence[int]) -> Row:
-    return Row(policy, Durations.of(in_us), Durations.of(out_us), Durations.of([*in_us, *out_us]).mean_s)
+def _bare(policy: str, in_us: Sequence[int], out_us: Sequence[int]) -> PolicyRow:
+    return PolicyRow(policy, Durations.of(in_us), Durations.of(out_us), Durations.of([*in_us, *out_us]).mean_s)
 
 
-def _row(policy: str, plays: Sequence[Play]) -> Row:
+def _row(policy: str, plays: Sequence[Play]) -> PolicyRow:
     bare = _bare(policy, [us for one in plays for us in one.in_us], [us for one in plays for us in one.out_us])
     tasks = sum(one.tasks for one in plays)
     hours = sum(one.seconds_s for one in plays) / 3600
     travel_mm = sum(one.travel_mm for one in plays)
-    return Row(
+    return PolicyRow(
         policy,
         bare.wait_in,
         bare.wait_out,

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 
-from bus_sim.devices.link import DeviceLink
+from bus_sim.devices.link import DeviceBusLink
 from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.motion import Motion, braking, driving, standing
-from bus_sim.systems.car_park.plant.rules import Rule
+from bus_sim.systems.car_park.plant.rules import PlantRule
 from bus_sim.systems.car_park.plant.shaft import PlatformBody
-from bus_sim.systems.car_park.plant.world import Change, RobotBody, World
+from bus_sim.systems.car_park.plant.world import CarParkWorld, RobotBody, WorldChange
 from onboard.contract.codes import DriveMode
 from onboard.contract.messages import DriveOrder, DriveState, Message
 from onboard.core.serial import is_newer
@@ -43,9 +43,9 @@ class Carrier:
         self,
         node_id: int,
         site: WaySite,
-        world: World,
+        world: CarParkWorld,
         timers: Timers,
-        link: DeviceLink,
+        link: DeviceBusLink,
         shuttle_home: Callable[[], bool],
     ) -> None:
         self.node_id = node_id
@@ -129,7 +129,7 @@ class Carrier:
         if self._turn_timer is not None:
             return
         if not self._shuttle_home() and self._would_move(order, now_us):
-            self._world.hazard(Rule.ORDER_TO_TEAR, f"robot {self.node_id}")
+            self._world.hazard(PlantRule.ORDER_TO_TEAR, f"robot {self.node_id}")
         refusal = self._refusal(order)
         if refusal:
             self._fail(refusal, now_us)
@@ -239,10 +239,10 @@ class Carrier:
         self._brake(now_us)
         self._say(now_us)
 
-    def _on_change(self, change: Change, node_id: int, now_us: int) -> None:
-        if change is Change.SHUTTLE and node_id == self.node_id:
+    def _on_change(self, change: WorldChange, node_id: int, now_us: int) -> None:
+        if change is WorldChange.SHUTTLE and node_id == self.node_id:
             self._on_home_switch(now_us)
-        elif change is Change.PLATFORM:
+        elif change is WorldChange.PLATFORM:
             self._on_platform(now_us)
 
     def _on_platform(self, now_us: int) -> None:

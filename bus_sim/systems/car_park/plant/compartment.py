@@ -6,11 +6,11 @@ the output door only while the light curtain sees nobody (row P60).
 
 from collections.abc import Callable
 
-from bus_sim.devices.link import DeviceLink
+from bus_sim.devices.link import DeviceBusLink
 from bus_sim.devices.timers import Timers
 from bus_sim.systems.car_park.plant.bodies import CarBody
 from bus_sim.systems.car_park.plant.door import Door
-from bus_sim.systems.car_park.plant.world import BayBody, Change, World
+from bus_sim.systems.car_park.plant.world import BayBody, CarParkWorld, WorldChange
 from onboard.contract.codes import DeskInput, DeskText, DoorName, DoorPosition, LightColour
 from onboard.contract.messages import (
     BayState,
@@ -35,14 +35,14 @@ DESK_GAP_US = 50_000
 NO_CAR = Reference(0, 0)
 
 
-class Compartment:
+class CompartmentPlant:
     """Doors, light, desk and sensors of one compartment, and what a person standing before it sees.
 
     ``watch`` tells whenever something visible changed; ``watch_desk`` tells every text that the desk shows, with the
     car's number; TAKE_TICKET prints a ticket of that number. A DeskOrder like the last one is not shown again.
     """
 
-    def __init__(self, node_id: int, site: WaySite, world: World, timers: Timers, link: DeviceLink) -> None:
+    def __init__(self, node_id: int, site: WaySite, world: CarParkWorld, timers: Timers, link: DeviceBusLink) -> None:
         self.node_id = node_id
         self.light = LightColour.RED
         self.text = DeskText.WELCOME
@@ -181,10 +181,10 @@ class Compartment:
         self._say_doors()
         self._notify()
 
-    def _on_change(self, change: Change, node_id: int, now_us: int) -> None:
-        if change is Change.DOOR:
+    def _on_change(self, change: WorldChange, node_id: int, now_us: int) -> None:
+        if change is WorldChange.DOOR:
             return
-        if change is not Change.CARRIER:
+        if change is not WorldChange.CARRIER:
             for door in self.doors.values():
                 door.way_changed()
         if self.bay_state() != self._told:

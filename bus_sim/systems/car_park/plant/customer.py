@@ -13,10 +13,10 @@ from typing import ClassVar
 from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.demand import Stay
 from bus_sim.systems.car_park.plant.bodies import DRIVER_S
-from bus_sim.systems.car_park.plant.compartment import Compartment
+from bus_sim.systems.car_park.plant.compartment import CompartmentPlant
 from bus_sim.systems.car_park.plant.oracle import Oracle
-from bus_sim.systems.car_park.plant.rules import Rule
-from bus_sim.systems.car_park.plant.world import World
+from bus_sim.systems.car_park.plant.rules import PlantRule
+from bus_sim.systems.car_park.plant.world import CarParkWorld
 from onboard.contract.messages import Reference
 
 #: From seeing that one may go to going, us: a person's reaction.
@@ -31,7 +31,7 @@ UNKNOWN_RETRY_US = 60_000_000
 UNKNOWN_TRIES = 5
 
 
-class State(Enum):
+class CustomerState(Enum):
     """What the customer is doing."""
 
     COMING = "coming"
@@ -46,7 +46,7 @@ class State(Enum):
     GONE = "gone"
 
 
-class Event(Enum):
+class CustomerEvent(Enum):
     """What the customer sees, or what falls due."""
 
     ARRIVE = "arrive"
@@ -63,7 +63,7 @@ class Event(Enum):
     DOOR_OPEN = "door open"
 
 
-class Outcome(Enum):
+class VisitOutcome(Enum):
     """How the visit ended; STAYING until then."""
 
     STAYING = "staying"
@@ -76,33 +76,33 @@ class Outcome(Enum):
 
 
 #: (state, event) -> (next state, what the customer does). Pairs not listed change nothing.
-TABLE: dict[tuple[State, Event], tuple[State, str]] = {
-    (State.COMING, Event.ARRIVE): (State.QUEUEING, "arrive"),
-    (State.QUEUEING, Event.INVITED): (State.DRIVING_IN, "drive_in"),
-    (State.DRIVING_IN, Event.TIMER): (State.AWAITING_TICKET, "get_out"),
-    (State.AWAITING_TICKET, Event.TIMER): (State.AWAITING_TICKET, "press_key"),
-    (State.AWAITING_TICKET, Event.TICKET): (State.WALKING_OUT, "walk_out"),
-    (State.AWAITING_TICKET, Event.FULL): (State.DRIVING_OUT, "turn_back"),
-    (State.AWAITING_TICKET, Event.TOO_LARGE): (State.DRIVING_OUT, "turn_back_too_large"),
-    (State.WALKING_OUT, Event.FULL): (State.DRIVING_OUT, "turn_back"),
-    (State.WALKING_OUT, Event.TIMER): (State.PARKED, "walk_away"),
-    (State.PARKED, Event.FULL): (State.AWAITING_DOOR, "come_back"),
-    (State.PARKED, Event.LEAVE): (State.AT_DESK, "insert_ticket"),
-    (State.PARKED, Event.CANCEL): (State.AT_DESK, "cancel"),
-    (State.AT_DESK, Event.TIMER): (State.AT_DESK, "insert_ticket"),
-    (State.AT_DESK, Event.WAIT): (State.AT_DESK, "be_patient"),
-    (State.AT_DESK, Event.UNKNOWN): (State.AT_DESK, "try_later"),
-    (State.AT_DESK, Event.READY): (State.AWAITING_DOOR, "be_patient"),
-    (State.AWAITING_DOOR, Event.DOOR_OPEN): (State.DRIVING_OUT, "fetch"),
-    (State.DRIVING_OUT, Event.TIMER): (State.GONE, "drive_away"),
+TABLE: dict[tuple[CustomerState, CustomerEvent], tuple[CustomerState, str]] = {
+    (CustomerState.COMING, CustomerEvent.ARRIVE): (CustomerState.QUEUEING, "arrive"),
+    (CustomerState.QUEUEING, CustomerEvent.INVITED): (CustomerState.DRIVING_IN, "drive_in"),
+    (CustomerState.DRIVING_IN, CustomerEvent.TIMER): (CustomerState.AWAITING_TICKET, "get_out"),
+    (CustomerState.AWAITING_TICKET, CustomerEvent.TIMER): (CustomerState.AWAITING_TICKET, "press_key"),
+    (CustomerState.AWAITING_TICKET, CustomerEvent.TICKET): (CustomerState.WALKING_OUT, "walk_out"),
+    (CustomerState.AWAITING_TICKET, CustomerEvent.FULL): (CustomerState.DRIVING_OUT, "turn_back"),
+    (CustomerState.AWAITING_TICKET, CustomerEvent.TOO_LARGE): (CustomerState.DRIVING_OUT, "turn_back_too_large"),
+    (CustomerState.WALKING_OUT, CustomerEvent.FULL): (CustomerState.DRIVING_OUT, "turn_back"),
+    (CustomerState.WALKING_OUT, CustomerEvent.TIMER): (CustomerState.PARKED, "walk_away"),
+    (CustomerState.PARKED, CustomerEvent.FULL): (CustomerState.AWAITING_DOOR, "come_back"),
+    (CustomerState.PARKED, CustomerEvent.LEAVE): (CustomerState.AT_DESK, "insert_ticket"),
+    (CustomerState.PARKED, CustomerEvent.CANCEL): (CustomerState.AT_DESK, "cancel"),
+    (CustomerState.AT_DESK, CustomerEvent.TIMER): (CustomerState.AT_DESK, "insert_ticket"),
+    (CustomerState.AT_DESK, CustomerEvent.WAIT): (CustomerState.AT_DESK, "be_patient"),
+    (CustomerState.AT_DESK, CustomerEvent.UNKNOWN): (CustomerState.AT_DESK, "try_later"),
+    (CustomerState.AT_DESK, CustomerEvent.READY): (CustomerState.AWAITING_DOOR, "be_patient"),
+    (CustomerState.AWAITING_DOOR, CustomerEvent.DOOR_OPEN): (CustomerState.DRIVING_OUT, "fetch"),
+    (CustomerState.DRIVING_OUT, CustomerEvent.TIMER): (CustomerState.GONE, "drive_away"),
 }
 
 
 @dataclass
-class Visit:
+class CustomerVisit:
     """What is measured of one customer; times in us of loop time, None while not reached."""
 
-    outcome: Outcome = Outcome.STAYING
+    outcome: VisitOutcome = VisitOutcome.STAYING
     arrived_us: int | None = None
     parked_us: int | None = None
     asked_us: int | None = None
@@ -129,18 +129,18 @@ class Customer:
     def __init__(
         self,
         stay: Stay,
-        world: World,
+        world: CarParkWorld,
         oracle: Oracle,
         timers: Timers,
         seed: int,
-        choose: Callable[["Customer"], Compartment],
+        choose: Callable[["Customer"], CompartmentPlant],
         on_step: Callable[["Customer"], None],
     ) -> None:
         self.stay = stay
-        self.state = State.COMING
-        self.visit = Visit()
+        self.state = CustomerState.COMING
+        self.visit = CustomerVisit()
         self.ticket: Reference | None = None
-        self.compartment: Compartment | None = None
+        self.compartment: CompartmentPlant | None = None
         #: Dawdles so long in the compartment before driving out, us; set by faults.
         self.dawdle_us = 0
         #: Has nothing to put into the desk; set by faults.
@@ -154,15 +154,15 @@ class Customer:
         self._timer: Timer | None = None
         self._tries = 0
         self._leave_us: int | None = None
-        self._refusal = Outcome.SERVED
+        self._refusal = VisitOutcome.SERVED
 
     def begin(self, origin_us: int) -> None:
         """Take up the plan for the day; ``origin_us`` is the loop time of the demand's time zero."""
-        self._timers.call_at(origin_us + self.stay.arrival_us, lambda: self.on(Event.ARRIVE))
+        self._timers.call_at(origin_us + self.stay.arrival_us, lambda: self.on(CustomerEvent.ARRIVE))
         if self.stay.departure_us is not None:
             self._leave_us = origin_us + self.stay.departure_us
         if self.stay.cancel_us is not None:
-            self._timers.call_at(origin_us + self.stay.cancel_us, lambda: self.on(Event.CANCEL))
+            self._timers.call_at(origin_us + self.stay.cancel_us, lambda: self.on(CustomerEvent.CANCEL))
 
     @property
     def is_leaving(self) -> bool:
@@ -172,9 +172,9 @@ class Customer:
     def leave_now(self) -> None:
         """Come for the car now, or as soon as it is parked, whatever was planned."""
         self._leave_us = self._timers.now_us()
-        self.on(Event.LEAVE)
+        self.on(CustomerEvent.LEAVE)
 
-    def on(self, event: Event) -> None:
+    def on(self, event: CustomerEvent) -> None:
         """See something, or have something fall due."""
         following = TABLE.get((self.state, event))
         if following is None:
@@ -184,14 +184,14 @@ class Customer:
         self._on_step(self)
 
     @property
-    def _place(self) -> Compartment:
+    def _place(self) -> CompartmentPlant:
         if self.compartment is None:
             raise ValueError(f"{self.stay.car.name} is at no compartment")
         return self.compartment
 
     def _wait(self, delay_us: int) -> None:
         self._be_patient()
-        self._timer = self._timers.call_at(self._timers.now_us() + delay_us, lambda: self.on(Event.TIMER))
+        self._timer = self._timers.call_at(self._timers.now_us() + delay_us, lambda: self.on(CustomerEvent.TIMER))
 
     def _be_patient(self) -> None:
         if self._timer is not None:
@@ -229,27 +229,27 @@ class Customer:
         self._world.person_leaves(self._place.node_id)
         if self._leave_us is not None:
             when_us = max(self._leave_us, self._timers.now_us())
-            self._timers.call_at(when_us, lambda: self.on(Event.LEAVE))
+            self._timers.call_at(when_us, lambda: self.on(CustomerEvent.LEAVE))
 
     # --- refused -----------------------------------------------------------------------------------------------
 
     def _turn_back(self) -> None:
-        self._refusal = Outcome.FULL
+        self._refusal = VisitOutcome.FULL
         self._drive_out()
 
     def _turn_back_too_large(self) -> None:
-        self._refusal = Outcome.TOO_LARGE
+        self._refusal = VisitOutcome.TOO_LARGE
         self._drive_out()
 
     def _come_back(self) -> None:
         """Told FULL after walking away: the car is still in the bay."""
-        self._refusal = Outcome.FULL
+        self._refusal = VisitOutcome.FULL
 
     # --- going -------------------------------------------------------------------------------------------------
 
     def _insert_ticket(self) -> None:
         # Whoever pressed cancel in vain has become an ordinary customer.
-        self._refusal = Outcome.SERVED
+        self._refusal = VisitOutcome.SERVED
         if self.visit.asked_us is None:
             self.visit.asked_us = self._timers.now_us()
             self.compartment = self._choose(self)
@@ -262,7 +262,7 @@ class Customer:
         if self._place.car != self.stay.car or self.ticket is None:
             self._insert_ticket()
             return
-        self._refusal = Outcome.CANCELLED
+        self._refusal = VisitOutcome.CANCELLED
         self.visit.asked_us = self._timers.now_us()
         self._wait(PATIENCE_US)
         self._place.press_cancel(self.ticket)
@@ -273,15 +273,15 @@ class Customer:
             self._wait(UNKNOWN_RETRY_US)
             return
         self._be_patient()
-        self.state = State.GONE
-        self.visit.outcome = Outcome.TICKET_UNKNOWN
+        self.state = CustomerState.GONE
+        self.visit.outcome = VisitOutcome.TICKET_UNKNOWN
 
     def _fetch(self) -> None:
         if self._place.car != self.stay.car:
             there = self._place.car.name if self._place.car is not None else "no car"
-            self._oracle.report(Rule.OWN_CAR, f"{self.stay.car.name} is called, {there} stands in the bay")
-            self.state = State.GONE
-            self.visit.outcome = Outcome.WRONG_CAR
+            self._oracle.report(PlantRule.OWN_CAR, f"{self.stay.car.name} is called, {there} stands in the bay")
+            self.state = CustomerState.GONE
+            self.visit.outcome = VisitOutcome.WRONG_CAR
             return
         self._world.person_enters(self._place.node_id)
         self._drive_out()

@@ -1,11 +1,11 @@
 """A lift: the drive of its platform, which obeys orders as a carrier's does, and the platform's sensors."""
 
-from bus_sim.devices.link import DeviceLink
+from bus_sim.devices.link import DeviceBusLink
 from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.carrier import Carrier
 from bus_sim.systems.car_park.plant.motion import Motion
 from bus_sim.systems.car_park.plant.shaft import PlatformBody
-from bus_sim.systems.car_park.plant.world import Change, World, is_at_mark
+from bus_sim.systems.car_park.plant.world import CarParkWorld, WorldChange, is_at_mark
 from onboard.contract.messages import DriveOrder, PlatformState
 from onboard.ways.site import Axis, WaySite
 
@@ -23,7 +23,7 @@ class LiftDrive(Carrier):
     otherwise.
     """
 
-    def __init__(self, node_id: int, site: WaySite, world: World, timers: Timers, link: DeviceLink) -> None:
+    def __init__(self, node_id: int, site: WaySite, world: CarParkWorld, timers: Timers, link: DeviceBusLink) -> None:
         super().__init__(node_id, site, world, timers, link, lambda: True)
         self._told: PlatformState | None = None
         self._platform_timer: Timer | None = None
@@ -69,8 +69,8 @@ class LiftDrive(Carrier):
             return f"target {order.target_mm} mm is beyond the end of the shaft"
         return ""
 
-    def _on_change(self, change: Change, node_id: int, now_us: int) -> None:
-        if change in (Change.CARRIER, Change.CAR, Change.PLATFORM):
+    def _on_change(self, change: WorldChange, node_id: int, now_us: int) -> None:
+        if change in (WorldChange.CARRIER, WorldChange.CAR, WorldChange.PLATFORM):
             self._look()
 
     def _look(self) -> None:

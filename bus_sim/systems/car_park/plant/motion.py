@@ -13,7 +13,7 @@ from typing import NamedTuple
 EPSILON_MM = 1e-6
 
 
-class Phase(NamedTuple):
+class MotionPhase(NamedTuple):
     """Constant acceleration ``a`` (mm/s^2) for ``duration`` seconds from position ``x`` (mm) and speed ``v`` (mm/s).
 
     ``begin`` is in seconds after the motion's start.
@@ -50,7 +50,7 @@ class Motion:
     """What an axis does from ``start_us`` on unless it is ordered otherwise; it ends standing at ``final_mm``."""
 
     start_us: int
-    phases: tuple[Phase, ...]
+    phases: tuple[MotionPhase, ...]
     final_mm: float
 
     @property
@@ -162,7 +162,7 @@ class _Path:
 
     def __init__(self, x: float, v: float) -> None:
         self.x, self.v, self.t = x, v, 0.0
-        self.phases: list[Phase] = []
+        self.phases: list[MotionPhase] = []
 
     def to_speed(self, v: float, rate: float) -> None:
         self._append(abs(v - self.v) / rate, math.copysign(rate, v - self.v))
@@ -174,7 +174,7 @@ class _Path:
     def _append(self, duration: float, a: float) -> None:
         if duration <= 0:
             return
-        phase = Phase(self.t, duration, self.x, self.v, a)
+        phase = MotionPhase(self.t, duration, self.x, self.v, a)
         self.phases.append(phase)
         self.t = phase.end
         self.x = phase.position(phase.end)

@@ -10,10 +10,10 @@ from itertools import pairwise
 
 from bus_sim.systems.car_park.plant.bodies import Aboard, Location
 from bus_sim.systems.car_park.plant.motion import Motion
-from bus_sim.systems.car_park.plant.rules import OVERLAP_TOLERANCE_MM, Rule, Span, Violation
+from bus_sim.systems.car_park.plant.rules import OVERLAP_TOLERANCE_MM, MotionSpan, PlantRule, PlantViolation
 from bus_sim.systems.car_park.plant.shaft_rules import ShaftRules
 from bus_sim.systems.car_park.plant.spur_rules import SpurRules
-from bus_sim.systems.car_park.plant.world import BayBody, Change, RobotBody, World
+from bus_sim.systems.car_park.plant.world import BayBody, CarParkWorld, RobotBody, WorldChange
 from onboard.contract.codes import DoorName, DoorPosition
 from onboard.core.site import Station
 from onboard.ways.site import TrackKind
@@ -22,18 +22,18 @@ from onboard.ways.site import TrackKind
 class Oracle:
     """Watches one world; ``violations`` is what it found, each kind at each machine once until it ended."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: CarParkWorld) -> None:
         self.world = world
-        self.violations: list[Violation] = []
-        self._spans: dict[int, Span] = {}
+        self.violations: list[PlantViolation] = []
+        self._spans: dict[int, MotionSpan] = {}
         self._persons: dict[int, int] = {node: bay.persons for node, bay in world.bays.items()}
         self._where: dict[str, Location] = {}
         self.take_stock()
         self._overlapping: set[tuple[int, int]] = set()
-        self._present: set[tuple[Rule, str]] = set()
+        self._present: set[tuple[PlantRule, str]] = set()
         now_us = world.timers.now_us()
         for node_id, robot in world.robots.items():
-            self._spans[node_id] = Span(robot.track, robot.motion, now_us, robot.turning_to)
+            self._spans[node_id] = MotionSpan(robot.track, robot.motion, now_us, robot.turning_to)
         self._shafts = ShaftRules(world, self._spans)
         self._spurs = SpurRules(world.site)
         self._has_spurs = bool(world.site.spurs)
@@ -45,11 +45,11 @@ class Oracle:
         """Take the cars as they are now for the stock that the run began with."""
         self._where = dict(self.world.where)
 
-    def report(self, rule: Rule, text: str) -> None:
+    def report(self, rule: PlantRule, text: str) -> None:
         """Note a violation seen by someone else in the world (a customer before another's car)."""
-        self.violations.append(Violation(self.world.timers.now_us(), rule, text))
+        self.violations.append(PlantViolation(self.world.timers.now_us(), rule, text))
 
-    def finish(self) -> list[Violation]:
+    def finish(self) -> list[PlantViolation]:
         """Judge the motions up to now and the stock of cars; answers all violations of the run, in order of time."""
         now_us = self.world.timers.now_us()
         self._judge_pairs(now_us)
@@ -62,63 +62,63 @@ class Oracle:
 
     # --- after every change ------------------------------------------------------------------------------------
 
-    def _on_change(self, change: Change, node_id: int, now_us: int) -> None:
-        if change in (Change.CARRIER, Change.PLATFORM):
+    def _on_change(self, change: WorldChange, node_id: int, now_us: int) -> None:
+        if change in (WorldChange.CARRIER, WorldChange.PLATFORM):
             self.violations += self._shafts.judge(now_us)
-        if change is Change.CARRIER:
+        if change is WorldChange.CARRIER:
             self._judge_track(node_id, now_us)
             self._judge_pairs(now_us, node_id)
             robot = self.world.robots[node_id]
-            span = self._spans[node_id] = Span(robot.track, robot.motion, now_us, robot.turning_to)
+            span = self._spans[node_id] = MotionSpan(robot.track, robot.motion, now_us, robot.turning_to)
             self.violations += self._spurs.judge_turn(node_id, span)
-        if change is Change.PERSON:
+        if change is WorldChange.PERSON:
             self._judge_passage(node_id)
-        if change is Change.CAR:
+        if change is WorldChange.CAR:
             self._judge_cars()
         found = list(self._standing_violations(now_us))
         for rule, text in found:
             if (rule, text) not in self._present:
-                self.violations.append(Violation(now_us, rule, text))
+                self.violations.append(PlantViolation(now_us, rule, text))
         self._present = set(found)
 
-    def _standing_violations(self, now_us: int) -> Iterator[tuple[Rule, str]]:
+    def _standing_violations(self, now_us: int) -> Iterator[tuple[PlantRule, str]]:
         for node_id, robot in self.world.robots.items():
             yield from self._judge_robot(node_id, robot, now_us)
         for node_id, bay in self.world.bays.items():
             yield from self._judge_bay(node_id, bay)
 
-    def _judge_robot(self, node_id: int, robot: RobotBody, now_us: int) -> Iterator[tuple[Rule, str]]:
+    def _judge_robot(self, node_id: int, robot: RobotBody, now_us: int) -> Iterator[tuple[PlantRule, str]]:
         if not robot.is_out(now_us):
             return
         if now_us < robot.motion.end_us or robot.turning_to is not None:
-            yield Rule.SHUTTLE_HOME_TO_MOVE, f"robot {node_id}"
+            yield PlantRule.SHUTTLE_HOME_TO_MOVE, f"robot {node_id}"
             return
         station = self.world.station_beside(node_id, robot.side)
         if station is None:
             position_mm = robot.motion.at(now_us)[0]
-            yield Rule.NO_WALL, f"robot {node_id} at {position_mm:.0f} mm, side {robot.side.name}"
+            yield PlantRule.NO_WALL, f"robot {node_id} at {position_mm:.0f} mm, side {robot.side.name}"
             return
         compartment = self.world.bay_at(station)
         if compartment is not None:
             output = self.world.bays[compartment].doors[DoorName.OUTPUT]
             if output is not DoorPosition.OPEN:
-                yield Rule.BAY_BY_OPEN_DOOR, f"robot {node_id}, compartment {compartment}: {output.name}"
+                yield PlantRule.BAY_BY_OPEN_DOOR, f"robot {node_id}, compartment {compartment}: {output.name}"
         if self.world.car_aboard(node_id) is not None and self.world.cars_at(station):
-            yield Rule.ONE_CAR, f"robot {node_id} brings a car into {station}"
+            yield PlantRule.ONE_CAR, f"robot {node_id} brings a car into {station}"
 
-    def _judge_bay(self, node_id: int, bay: BayBody) -> Iterator[tuple[Rule, str]]:
+    def _judge_bay(self, node_id: int, bay: BayBody) -> Iterator[tuple[PlantRule, str]]:
         inner, outer = bay.doors[DoorName.OUTPUT], bay.doors[DoorName.INPUT]
         if inner is not DoorPosition.LOCKED and outer is not DoorPosition.LOCKED:
-            yield Rule.ONE_DOOR, f"compartment {node_id}: input {outer.name}, output {inner.name}"
+            yield PlantRule.ONE_DOOR, f"compartment {node_id}: input {outer.name}, output {inner.name}"
         if bay.persons and inner is not DoorPosition.LOCKED:
-            yield Rule.NO_PERSON_TO_MACHINES, f"compartment {node_id}"
+            yield PlantRule.NO_PERSON_TO_MACHINES, f"compartment {node_id}"
 
     def _judge_passage(self, node_id: int) -> None:
         bay = self.world.bays[node_id]
         if bay.doors[DoorName.INPUT] is not DoorPosition.OPEN:
             direction = "enters" if bay.persons > self._persons[node_id] else "leaves"
             position = bay.doors[DoorName.INPUT].name
-            self.report(Rule.PERSON_BY_OPEN_DOOR, f"{direction} compartment {node_id}: input {position}")
+            self.report(PlantRule.PERSON_BY_OPEN_DOOR, f"{direction} compartment {node_id}: input {position}")
         self._persons[node_id] = bay.persons
 
     def _judge_cars(self) -> None:
@@ -127,15 +127,15 @@ class Oracle:
         for name, where in self.world.where.items():
             before = self._where.get(name)
             if where != before and not self._is_a_step(before, where):
-                self.report(Rule.CARS_CONSERVED, f"{name} from {before or 'outside'} to {where or 'outside'}")
+                self.report(PlantRule.CARS_CONSERVED, f"{name} from {before or 'outside'} to {where or 'outside'}")
             if where is None:
                 continue
             if where in holders:
-                self._once(Rule.ONE_CAR, f"{name} and {holders[where]} at {where}")
+                self._once(PlantRule.ONE_CAR, f"{name} and {holders[where]} at {where}")
             holders[where] = name
         for name in self._where:
             if name not in self.world.where:
-                self._once(Rule.CARS_CONSERVED, f"{name} is nowhere")
+                self._once(PlantRule.CARS_CONSERVED, f"{name} is nowhere")
         self.take_stock()
 
     def _is_a_step(self, before: Location, after: Location) -> bool:
@@ -149,10 +149,10 @@ class Oracle:
             return self.world.shuttle_in(after) == before.node_id
         return False
 
-    def _once(self, rule: Rule, text: str) -> None:
-        self._note_once(Violation(self.world.timers.now_us(), rule, text))
+    def _once(self, rule: PlantRule, text: str) -> None:
+        self._note_once(PlantViolation(self.world.timers.now_us(), rule, text))
 
-    def _note_once(self, violation: Violation) -> None:
+    def _note_once(self, violation: PlantViolation) -> None:
         if not any(v.rule is violation.rule and v.text == violation.text for v in self.violations):
             self.violations.append(violation)
 
@@ -173,7 +173,7 @@ class Oracle:
                 low_mm, high_mm = min(low_mm, far_mm), max(high_mm, far_mm)
         lowest_mm, highest_mm = span.motion.extremes_mm(span.from_us, now_us)
         if lowest_mm < low_mm or highest_mm > high_mm:
-            self._once(Rule.ON_TRACK, f"robot {node_id} on track {span.track}")
+            self._once(PlantRule.ON_TRACK, f"robot {node_id} on track {span.track}")
 
     def _judge_pairs(self, now_us: int, node_id: int | None = None) -> None:
         """Least distance of every pair (with ``node_id``) since the last time one of them changed its motion."""
@@ -198,7 +198,7 @@ class Oracle:
             self._overlapping.add((first, second))
         if gap_mm < limit_mm and not known:
             text = f"robots {first} and {second} on track {one.track}, centres {gap_mm:.1f} mm apart"
-            self.violations.append(Violation(at_us, Rule.BODIES_APART, text))
+            self.violations.append(PlantViolation(at_us, PlantRule.BODIES_APART, text))
 
 
 def least_distance(one: Motion, two: Motion, from_us: int, to_us: int) -> tuple[float, int]:

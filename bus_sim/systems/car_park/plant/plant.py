@@ -3,13 +3,13 @@
 from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import Timers
 from bus_sim.systems.car_park.plant.carrier import Carrier
-from bus_sim.systems.car_park.plant.compartment import Compartment
-from bus_sim.systems.car_park.plant.customer import Customer, State
+from bus_sim.systems.car_park.plant.compartment import CompartmentPlant
+from bus_sim.systems.car_park.plant.customer import Customer, CustomerState
 from bus_sim.systems.car_park.plant.lift import LiftDrive
 from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.shuttle import Shuttle
 from bus_sim.systems.car_park.plant.street import Street
-from bus_sim.systems.car_park.plant.world import World
+from bus_sim.systems.car_park.plant.world import CarParkWorld
 from onboard.contract.codes import KindCode
 from onboard.ways.site import WaySite
 
@@ -19,11 +19,11 @@ class Plant:
 
     def __init__(self, site: WaySite, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> None:
         self.timers = timers
-        self.world = World(site, self.timers)
+        self.world = CarParkWorld(site, self.timers)
         self.oracle = Oracle(self.world)
         self.carriers: dict[int, Carrier] = {}
         self.shuttles: dict[int, Shuttle] = {}
-        self.compartments: dict[int, Compartment] = {}
+        self.compartments: dict[int, CompartmentPlant] = {}
         self.lifts: dict[int, LiftDrive] = {}
         for machine in site.machines.values():
             node_id, link = machine.node_id, links[machine.node_id]
@@ -34,7 +34,7 @@ class Plant:
             elif machine.kind is KindCode.LIFT:
                 self.lifts[node_id] = LiftDrive(node_id, site, self.world, self.timers, link)
             elif machine.kind is KindCode.COMPARTMENT:
-                self.compartments[node_id] = Compartment(node_id, site, self.world, self.timers, link)
+                self.compartments[node_id] = CompartmentPlant(node_id, site, self.world, self.timers, link)
         self.street = Street(self.compartments, self.world, self.oracle, self.timers, seed)
 
     def start(self) -> None:
@@ -52,8 +52,8 @@ class Plant:
     def is_over(self) -> bool:
         """Whether nobody waits for anything; whoever has lost the ticket is not waited for, as no machine can help."""
         return all(
-            customer.state is State.GONE
-            or (customer.state is State.PARKED and customer.stay.departure_us is None)
+            customer.state is CustomerState.GONE
+            or (customer.state is CustomerState.PARKED and customer.stay.departure_us is None)
             or looks_for_ticket(customer)
             for customer in self.street.customers
         )
@@ -61,4 +61,4 @@ class Plant:
 
 def looks_for_ticket(customer: Customer) -> bool:
     """Whether somebody stands at the desk without the ticket."""
-    return customer.state is State.AT_DESK and customer.has_lost_ticket
+    return customer.state is CustomerState.AT_DESK and customer.has_lost_ticket

@@ -9,7 +9,7 @@ from bus_sim.systems.car_park.plant.motion import Motion
 OVERLAP_TOLERANCE_MM = 1e-3
 
 
-class Rule(Enum):
+class PlantRule(Enum):
     """What must never happen in the plant, as the oracle reports it."""
 
     BODIES_APART = "two bodies overlap on a track"
@@ -31,18 +31,18 @@ class Rule(Enum):
     RIDE_AT_REST = "a carrier moves on a moving platform"
 
 
-class Violation(NamedTuple):
+class PlantViolation(NamedTuple):
     """One broken invariant: when (us of loop time), which, and what exactly."""
 
     time_us: int
-    rule: Rule
+    rule: PlantRule
     text: str
 
     def __str__(self) -> str:
         return f"{self.time_us / 1e6:.6f} s: {self.rule.value}: {self.text}"
 
 
-class Span(NamedTuple):
+class MotionSpan(NamedTuple):
     """A carrier's motion and from when on it holds; ``turning_to`` is the track towards which it turns."""
 
     track: int

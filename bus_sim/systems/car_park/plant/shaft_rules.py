@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 from bus_sim.systems.car_park.plant.motion import Motion
-from bus_sim.systems.car_park.plant.rules import OVERLAP_TOLERANCE_MM, Rule, Span, Violation
+from bus_sim.systems.car_park.plant.rules import OVERLAP_TOLERANCE_MM, MotionSpan, PlantRule, PlantViolation
 from bus_sim.systems.car_park.plant.shaft import Sill
-from bus_sim.systems.car_park.plant.world import World
+from bus_sim.systems.car_park.plant.world import CarParkWorld
 
 
 class ShaftRules:
@@ -19,17 +19,17 @@ class ShaftRules:
     A violation that lasts is told once, and again when it comes back.
     """
 
-    def __init__(self, world: World, spans: Mapping[int, Span]) -> None:
+    def __init__(self, world: CarParkWorld, spans: Mapping[int, MotionSpan]) -> None:
         self._world = world
         self._spans = spans
         self._length_mm = float(world.site.carrier_length_mm)
         self._since_us = dict.fromkeys(world.platforms, world.timers.now_us())
         self._floors = {lift: world.platform_floor(lift) for lift in world.platforms}
-        self._present: dict[int, set[tuple[Rule, str]]] = {lift: set() for lift in world.platforms}
+        self._present: dict[int, set[tuple[PlantRule, str]]] = {lift: set() for lift in world.platforms}
 
-    def judge(self, now_us: int) -> list[Violation]:
+    def judge(self, now_us: int) -> list[PlantViolation]:
         """What was broken since the last look. To be called while ``spans`` are still as they were before a change."""
-        found: list[Violation] = []
+        found: list[PlantViolation] = []
         for lift, before in self._floors.items():
             floor = self._world.platform_floor(lift)
             # A platform that nobody told to have come to its floor has been there since the end of its motion.
@@ -42,7 +42,7 @@ class ShaftRules:
                 found += self._judge_time(lift, now_us)
         return found
 
-    def _judge_time(self, lift: int, until_us: int) -> list[Violation]:
+    def _judge_time(self, lift: int, until_us: int) -> list[PlantViolation]:
         """The time since this lift's last look, in which its platform was at the same floor or at none."""
         from_us = self._since_us[lift]
         if until_us <= from_us:
@@ -52,29 +52,29 @@ class ShaftRules:
         present, self._present[lift] = self._present[lift], {(v.rule, v.text) for v in found}
         return [violation for violation in found if (violation.rule, violation.text) not in present]
 
-    def _violations(self, lift: int, from_us: int, until_us: int) -> Iterator[Violation]:
-        beyond: list[tuple[int, Span]] = []
+    def _violations(self, lift: int, from_us: int, until_us: int) -> Iterator[PlantViolation]:
+        beyond: list[tuple[int, MotionSpan]] = []
         for node, span in self._spans.items():
             begin_us = max(from_us, span.from_us)
             if begin_us >= until_us:
                 continue
             if span.track == self._world.platforms[lift].track and _has_moved(span.motion, begin_us, until_us):
-                yield Violation(begin_us, Rule.RIDE_AT_REST, f"robot {node}, lift {lift}")
+                yield PlantViolation(begin_us, PlantRule.RIDE_AT_REST, f"robot {node}, lift {lift}")
             elif span.track in self._world.sills[lift]:
                 time_us = self._first_beyond_us(lift, [span], begin_us, until_us)
                 if time_us is None:
                     continue
                 beyond.append((node, span))
                 if span.track != self._floors[lift]:
-                    yield Violation(time_us, Rule.FALL, f"robot {node} on track {span.track}, lift {lift}")
+                    yield PlantViolation(time_us, PlantRule.FALL, f"robot {node} on track {span.track}, lift {lift}")
         for (one, first), (other, second) in combinations(beyond, 2):
             begin_us = max(from_us, first.from_us, second.from_us)
             if first.track == second.track:
                 time_us = self._first_beyond_us(lift, [first, second], begin_us, until_us)
                 if time_us is not None:
-                    yield Violation(time_us, Rule.ONE_ABOARD, f"robots {one} and {other}, lift {lift}")
+                    yield PlantViolation(time_us, PlantRule.ONE_ABOARD, f"robots {one} and {other}, lift {lift}")
 
-    def _judge_departure(self, lift: int, now_us: int) -> Iterator[Violation]:
+    def _judge_departure(self, lift: int, now_us: int) -> Iterator[PlantViolation]:
         """A platform that leaves a floor must have nothing over its sill."""
         floor = self._floors[lift]
         if floor is None:
@@ -84,15 +84,15 @@ class ShaftRules:
             if span.track == floor:
                 beyond_mm = sill.beyond_mm(span.motion.at(now_us)[0], self._length_mm)
                 if OVERLAP_TOLERANCE_MM < beyond_mm < self._length_mm - OVERLAP_TOLERANCE_MM:
-                    yield Violation(now_us, Rule.LIFT_CRUSH, f"lift {lift} at floor {floor}, robot {node}")
+                    yield PlantViolation(now_us, PlantRule.LIFT_CRUSH, f"lift {lift} at floor {floor}, robot {node}")
 
-    def _first_beyond_us(self, lift: int, spans: list[Span], begin_us: int, until_us: int) -> int | None:
+    def _first_beyond_us(self, lift: int, spans: list[MotionSpan], begin_us: int, until_us: int) -> int | None:
         """When all these bodies of one alley are first in the shaft together: at the begin, or as one comes in."""
         sill = self._world.sills[lift][spans[0].track]
         times = {time for span in spans for time in _crossings(sill, span.motion, self._length_mm, begin_us, until_us)}
         return next((time for time in sorted(times) if all(self._is_beyond(sill, span, time) for span in spans)), None)
 
-    def _is_beyond(self, sill: Sill, span: Span, time_us: int) -> bool:
+    def _is_beyond(self, sill: Sill, span: MotionSpan, time_us: int) -> bool:
         return sill.beyond_mm(span.motion.at(time_us)[0], self._length_mm) > OVERLAP_TOLERANCE_MM
 
 

@@ -1,9 +1,9 @@
 """The telescopic shuttle: goes under a car, grips it by its wheels, takes it aboard or leaves it (rows P32, P33)."""
 
-from bus_sim.devices.link import DeviceLink
+from bus_sim.devices.link import DeviceBusLink
 from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.motion import driving
-from bus_sim.systems.car_park.plant.world import RobotBody, World
+from bus_sim.systems.car_park.plant.world import CarParkWorld, RobotBody
 from onboard.contract.codes import ShuttleAction, ShuttleMode, Side
 from onboard.contract.messages import Message, ShuttleOrder, ShuttleState
 from onboard.core.site import Station
@@ -36,7 +36,7 @@ class Shuttle:
     until RETRACT; ``fault`` says why in words. ``busy_refusals`` counts orders that came during an action.
     """
 
-    def __init__(self, node_id: int, site: WaySite, world: World, timers: Timers, link: DeviceLink) -> None:
+    def __init__(self, node_id: int, site: WaySite, world: CarParkWorld, timers: Timers, link: DeviceBusLink) -> None:
         self.node_id = node_id
         self.mode = ShuttleMode.HOME
         self.fault = ""

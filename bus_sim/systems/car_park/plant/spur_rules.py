@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from bus_sim.systems.car_park.plant.motion import Motion
-from bus_sim.systems.car_park.plant.rules import OVERLAP_TOLERANCE_MM, Rule, Span, Violation
+from bus_sim.systems.car_park.plant.rules import OVERLAP_TOLERANCE_MM, MotionSpan, PlantRule, PlantViolation
 from bus_sim.systems.car_park.plant.world import MARK_TOLERANCE_MM
 from onboard.core.site import Segment
 from onboard.ways.site import TrackKind, WaySite
@@ -21,7 +21,9 @@ class SpurRules:
     def __init__(self, site: WaySite) -> None:
         self._site = site
 
-    def judge_pair(self, nodes: tuple[int, int], one: Span, two: Span, now_us: int) -> Iterator[Violation]:
+    def judge_pair(
+        self, nodes: tuple[int, int], one: MotionSpan, two: MotionSpan, now_us: int
+    ) -> Iterator[PlantViolation]:
         """What two carriers broke from when both did what they do until now."""
         from_us = max(one.from_us, two.from_us)
         for (node, here), (other, there) in (((nodes[0], one), (nodes[1], two)), ((nodes[1], two), (nodes[0], one))):
@@ -30,13 +32,13 @@ class SpurRules:
                 continue
             text = f"robots {node} and {other} at spur {spur}"
             if here.turning_to is not None and there.track == spur:
-                yield Violation(from_us, Rule.BODIES_APART, text)
+                yield PlantViolation(from_us, PlantRule.BODIES_APART, text)
             elif here.track == spur and there.track == self._mouth(spur).track:
                 time_us = self._meeting_us(here.motion, there.motion, spur, from_us, now_us)
                 if time_us is not None:
-                    yield Violation(time_us, Rule.BODIES_APART, text)
+                    yield PlantViolation(time_us, PlantRule.BODIES_APART, text)
 
-    def judge_turn(self, node_id: int, span: Span) -> Iterator[Violation]:
+    def judge_turn(self, node_id: int, span: MotionSpan) -> Iterator[PlantViolation]:
         """A carrier turns only where it stands in the mouth of a spur, into it or out of it."""
         if span.turning_to is None:
             return
@@ -46,9 +48,11 @@ class SpurRules:
             here = Segment(spur, 0) if span.track == spur else self._mouth(spur)
             if not speed_mm_s and abs(position_mm - self._site.position_mm(here)) <= MARK_TOLERANCE_MM:
                 return
-        yield Violation(span.from_us, Rule.TURN_IN_MOUTH, f"robot {node_id} at {position_mm:.0f} mm of {span.track}")
+        yield PlantViolation(
+            span.from_us, PlantRule.TURN_IN_MOUTH, f"robot {node_id} at {position_mm:.0f} mm of {span.track}"
+        )
 
-    def _spur_of(self, span: Span) -> int | None:
+    def _spur_of(self, span: MotionSpan) -> int | None:
         """The spur on whose axis a carrier moves, or towards which it turns."""
         for track in (span.track, span.turning_to):
             if track is not None and self._site.tracks[track].kind is TrackKind.SPUR:

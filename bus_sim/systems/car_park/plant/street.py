@@ -5,28 +5,28 @@ from functools import partial
 
 from bus_sim.devices.timers import Timers
 from bus_sim.systems.car_park.demand import Demand, Stay
-from bus_sim.systems.car_park.plant.compartment import Compartment
-from bus_sim.systems.car_park.plant.customer import REACTION_US, Customer, Event, Outcome, State
+from bus_sim.systems.car_park.plant.compartment import CompartmentPlant
+from bus_sim.systems.car_park.plant.customer import REACTION_US, Customer, CustomerEvent, CustomerState, VisitOutcome
 from bus_sim.systems.car_park.plant.oracle import Oracle
-from bus_sim.systems.car_park.plant.world import World
+from bus_sim.systems.car_park.plant.world import CarParkWorld
 from onboard.contract.codes import DeskText
 from onboard.contract.messages import Reference
 
 #: What a text on the desk means to the customer whom it concerns.
-TEXTS: dict[DeskText, Event] = {
-    DeskText.TAKE_TICKET: Event.TICKET,
-    DeskText.FULL: Event.FULL,
+TEXTS: dict[DeskText, CustomerEvent] = {
+    DeskText.TAKE_TICKET: CustomerEvent.TICKET,
+    DeskText.FULL: CustomerEvent.FULL,
     # Turned away as well, if not for want of room.
-    DeskText.OUT_OF_ORDER: Event.FULL,
-    DeskText.CAR_TOO_LARGE: Event.TOO_LARGE,
-    DeskText.PLEASE_WAIT: Event.WAIT,
-    DeskText.UNKNOWN_TICKET: Event.UNKNOWN,
-    DeskText.CAR_READY: Event.READY,
+    DeskText.OUT_OF_ORDER: CustomerEvent.FULL,
+    DeskText.CAR_TOO_LARGE: CustomerEvent.TOO_LARGE,
+    DeskText.PLEASE_WAIT: CustomerEvent.WAIT,
+    DeskText.UNKNOWN_TICKET: CustomerEvent.UNKNOWN,
+    DeskText.CAR_READY: CustomerEvent.READY,
 }
 
 
 @dataclass(frozen=True, slots=True)
-class Summary:
+class StreetSummary:
     """The customers' day: how many, and waiting times in us in the order of the visits.
 
     ``parked`` came in and took a ticket; ``served`` of them drove out again; ``inside`` are parked now; ``queueing``
@@ -50,7 +50,7 @@ class Street:
     """All customers of a run. They go to the compartment with the fewest waiting, the lowest node-ID among equals."""
 
     def __init__(
-        self, compartments: dict[int, Compartment], world: World, oracle: Oracle, timers: Timers, seed: int
+        self, compartments: dict[int, CompartmentPlant], world: CarParkWorld, oracle: Oracle, timers: Timers, seed: int
     ) -> None:
         self.customers: list[Customer] = []
         self.tickets_uncollected = 0
@@ -81,29 +81,29 @@ class Street:
     @property
     def is_over(self) -> bool:
         """Whether everybody who had a time to leave has left, and nobody waits for anything."""
-        return all(c.state is State.GONE or self._stays_for_good(c) for c in self.customers)
+        return all(c.state is CustomerState.GONE or self._stays_for_good(c) for c in self.customers)
 
-    def summary(self, since_us: int = 0) -> Summary:
+    def summary(self, since_us: int = 0) -> StreetSummary:
         """What happened so far, or since a loop time; waiting of those who came, or asked, since then."""
         visits = [customer.visit for customer in self.customers]
         outcomes = [visit.outcome for visit in visits if _is_since(visit.gone_us, since_us)]
         states = [customer.state for customer in self.customers]
-        return Summary(
+        return StreetSummary(
             arrived=sum(_is_since(visit.arrived_us, since_us) for visit in visits),
             parked=sum(_is_since(visit.parked_us, since_us) for visit in visits),
-            served=outcomes.count(Outcome.SERVED),
-            inside=states.count(State.PARKED),
-            queueing=states.count(State.QUEUEING),
-            asking=states.count(State.AT_DESK) + states.count(State.AWAITING_DOOR),
-            refused_full=outcomes.count(Outcome.FULL),
-            refused_too_large=outcomes.count(Outcome.TOO_LARGE),
-            cancelled=outcomes.count(Outcome.CANCELLED),
+            served=outcomes.count(VisitOutcome.SERVED),
+            inside=states.count(CustomerState.PARKED),
+            queueing=states.count(CustomerState.QUEUEING),
+            asking=states.count(CustomerState.AT_DESK) + states.count(CustomerState.AWAITING_DOOR),
+            refused_full=outcomes.count(VisitOutcome.FULL),
+            refused_too_large=outcomes.count(VisitOutcome.TOO_LARGE),
+            cancelled=outcomes.count(VisitOutcome.CANCELLED),
             in_wait_us=self.in_waits_us(since_us),
             out_wait_us=tuple(
                 visit.out_wait_us
                 for visit in visits
                 if visit.out_wait_us is not None
-                and visit.outcome is Outcome.SERVED
+                and visit.outcome is VisitOutcome.SERVED
                 and _is_since(visit.asked_us, since_us)
             ),
         )
@@ -121,11 +121,11 @@ class Street:
         )
 
     def _stays_for_good(self, customer: Customer) -> bool:
-        return customer.state is State.PARKED and customer.stay.departure_us is None
+        return customer.state is CustomerState.PARKED and customer.stay.departure_us is None
 
     # --- who goes where ----------------------------------------------------------------------------------------
 
-    def _choose(self, customer: Customer) -> Compartment:
+    def _choose(self, customer: Customer) -> CompartmentPlant:
         node_id = min(self._waiting, key=lambda node: (len(self._waiting[node]), node))
         return self._compartments[node_id]
 
@@ -137,7 +137,7 @@ class Street:
         if customer.compartment is None:
             return
         node_id = customer.compartment.node_id
-        if customer.state not in (State.PARKED, State.GONE):
+        if customer.state not in (CustomerState.PARKED, CustomerState.GONE):
             self._waiting[node_id].append(customer)
             self._waiting[node_id].sort(key=_came_us)
         self._look(node_id)
@@ -154,16 +154,16 @@ class Street:
         if found is not None:
             found[0].on(found[1])
 
-    def _who_may_go(self, node_id: int) -> tuple[Customer, Event] | None:
+    def _who_may_go(self, node_id: int) -> tuple[Customer, CustomerEvent] | None:
         compartment = self._compartments[node_id]
         if not compartment.is_input_open:
             return None
         for customer in self._waiting[node_id]:
-            if customer.state is State.AWAITING_DOOR:
-                return customer, Event.DOOR_OPEN
+            if customer.state is CustomerState.AWAITING_DOOR:
+                return customer, CustomerEvent.DOOR_OPEN
         for customer in self._waiting[node_id]:
-            if customer.state is State.QUEUEING:
-                return (customer, Event.INVITED) if compartment.invites else None
+            if customer.state is CustomerState.QUEUEING:
+                return (customer, CustomerEvent.INVITED) if compartment.invites else None
         return None
 
     def _read(self, node_id: int, text: DeskText, car: Reference) -> None:
@@ -181,7 +181,7 @@ class Street:
 
     def _at_key(self, node_id: int) -> Customer | None:
         waiting = self._waiting[node_id]
-        return next((customer for customer in waiting if customer.state is State.AWAITING_TICKET), None)
+        return next((customer for customer in waiting if customer.state is CustomerState.AWAITING_TICKET), None)
 
     def _take(self, customer: Customer | None, car: Reference) -> None:
         if customer is None:

@@ -12,7 +12,7 @@ from enum import Enum
 from bus_sim.devices.timers import Timers
 from bus_sim.systems.car_park.plant.bodies import Aboard, CarBody, Location
 from bus_sim.systems.car_park.plant.motion import Motion, standing
-from bus_sim.systems.car_park.plant.rules import Rule
+from bus_sim.systems.car_park.plant.rules import PlantRule
 from bus_sim.systems.car_park.plant.shaft import PlatformBody, Sill, sills_of
 from onboard.contract.codes import DoorName, DoorPosition, KindCode, Side
 from onboard.core.site import Segment, Station
@@ -27,7 +27,7 @@ def is_at_mark(position_mm: float, pitch_mm: float) -> bool:
     return abs(position_mm - round(position_mm / pitch_mm) * pitch_mm) <= MARK_TOLERANCE_MM
 
 
-class Change(Enum):
+class WorldChange(Enum):
     """What kind of thing changed."""
 
     CARRIER = "carrier"
@@ -39,7 +39,7 @@ class Change(Enum):
 
 
 #: Called after a change with its kind, the node-ID of the machine it happened at, and the time in us.
-Watcher = Callable[[Change, int, int], None]
+Watcher = Callable[[WorldChange, int, int], None]
 
 
 @dataclass
@@ -73,7 +73,7 @@ class BayBody:
     crossing: bool = False
 
 
-class World:
+class CarParkWorld:
     """The site's bodies, cars, doors and people. Robots start standing at home, compartments empty and locked."""
 
     def __init__(self, site: WaySite, timers: Timers) -> None:
@@ -87,7 +87,7 @@ class World:
         self.where: dict[str, Location] = {}
         self._watchers: list[Watcher] = []
         #: Told of orders that would do harm, though the device that was given them refused: who judges is told why.
-        self.on_hazard: list[Callable[[Rule, str], None]] = []
+        self.on_hazard: list[Callable[[PlantRule, str], None]] = []
         now_us = timers.now_us()
         for machine in site.machines.values():
             if machine.kind is KindCode.ROBOT:
@@ -171,14 +171,14 @@ class World:
     def begin_turn(self, node_id: int, track: int) -> None:
         """A carrier begins to turn where it is, towards another track."""
         self.robots[node_id].turning_to = track
-        self._tell(Change.CARRIER, node_id)
+        self._tell(WorldChange.CARRIER, node_id)
 
     def end_turn(self, node_id: int, position: Segment) -> None:
         """A carrier has turned: it stands at a position of the other track."""
         robot = self.robots[node_id]
         robot.track, robot.turning_to = position.track, None
         robot.motion = standing(float(self.site.position_mm(position)), self.timers.now_us())
-        self._tell(Change.CARRIER, node_id)
+        self._tell(WorldChange.CARRIER, node_id)
 
     # --- lifts -------------------------------------------------------------------------------------------------
 
@@ -258,8 +258,8 @@ class World:
         platform.motion = motion
         if robot_id is not None:
             self._carry(platform, self.sills[node_id], robot_id, self.platform_floor(node_id))
-            self._tell(Change.CARRIER, robot_id)
-        self._tell(Change.PLATFORM, node_id)
+            self._tell(WorldChange.CARRIER, robot_id)
+        self._tell(WorldChange.PLATFORM, node_id)
 
     def _carry(self, platform: PlatformBody, sills: dict[int, Sill], robot_id: int, floor: int | None) -> None:
         robot = self.robots[robot_id]
@@ -301,13 +301,13 @@ class World:
     def move_carrier(self, node_id: int, motion: Motion) -> None:
         """A carrier's motion from now on; also called with the same motion when it has come to its end."""
         self.robots[node_id].motion = motion
-        self._tell(Change.CARRIER, node_id)
+        self._tell(WorldChange.CARRIER, node_id)
 
     def move_shuttle(self, node_id: int, extension: Motion, side: Side) -> None:
         """A shuttle's extension from now on."""
         self.robots[node_id].extension = extension
         self.robots[node_id].side = side
-        self._tell(Change.SHUTTLE, node_id)
+        self._tell(WorldChange.SHUTTLE, node_id)
 
     def grip(self, node_id: int, station: Station) -> CarBody | None:
         """A shuttle lifts the car at a station; None where there is none."""
@@ -315,7 +315,7 @@ class World:
         if not cars:
             return None
         self.where[cars[0].name] = Aboard(node_id)
-        self._tell(Change.CAR, node_id)
+        self._tell(WorldChange.CAR, node_id)
         return cars[0]
 
     def put_down(self, node_id: int, station: Station) -> CarBody | None:
@@ -324,50 +324,50 @@ class World:
         if car is None:
             return None
         self.where[car.name] = station
-        self._tell(Change.CAR, node_id)
+        self._tell(WorldChange.CAR, node_id)
         return car
 
     def set_door(self, node_id: int, door: DoorName, position: DoorPosition) -> None:
         """A compartment's door is in another position."""
         self.bays[node_id].doors[door] = position
-        self._tell(Change.DOOR, node_id)
+        self._tell(WorldChange.DOOR, node_id)
 
     def person_enters(self, node_id: int) -> None:
         """A person crosses the sill of a compartment inwards."""
         self.bays[node_id].persons += 1
-        self._tell(Change.PERSON, node_id)
+        self._tell(WorldChange.PERSON, node_id)
 
     def person_leaves(self, node_id: int) -> None:
         """A person crosses the sill outwards. Raises ``ValueError`` where nobody is inside."""
         if self.bays[node_id].persons == 0:
             raise ValueError(f"nobody is inside compartment {node_id}")
         self.bays[node_id].persons -= 1
-        self._tell(Change.PERSON, node_id)
+        self._tell(WorldChange.PERSON, node_id)
 
     def begin_crossing(self, node_id: int) -> None:
         """A car begins to roll over the sill of a compartment, in or out."""
         self.bays[node_id].crossing = True
-        self._tell(Change.CAR, node_id)
+        self._tell(WorldChange.CAR, node_id)
 
     def car_enters(self, node_id: int, car: CarBody) -> None:
         """A car stands in the bay, wholly inside."""
         self.bays[node_id].crossing = False
         self.cars[car.name] = car
         self.where[car.name] = self.bays[node_id].station
-        self._tell(Change.CAR, node_id)
+        self._tell(WorldChange.CAR, node_id)
 
     def car_leaves(self, node_id: int, car: CarBody) -> None:
         """A car has left the compartment for the street."""
         self.bays[node_id].crossing = False
         self.where[car.name] = None
-        self._tell(Change.CAR, node_id)
+        self._tell(WorldChange.CAR, node_id)
 
-    def hazard(self, rule: Rule, text: str) -> None:
+    def hazard(self, rule: PlantRule, text: str) -> None:
         """A device was given an order that only its interlock kept from breaking a rule."""
         for tell in self.on_hazard:
             tell(rule, text)
 
-    def _tell(self, change: Change, node_id: int) -> None:
+    def _tell(self, change: WorldChange, node_id: int) -> None:
         now_us = self.timers.now_us()
         for watcher in self._watchers:
             watcher(change, node_id, now_us)

@@ -26,7 +26,7 @@ def _silent_form(simulation: Simulation) -> None:
 
 
 def _takes_others_tasks(simulation: Simulation) -> None:
-    def ears(controller: Controller) -> Callable[[Message], Message]:
+    def make_filter(controller: Controller) -> Callable[[Message], Message]:
         def hear(message: Message) -> Message:
             if isinstance(message, Award) and _is_award(message):
                 return changed(message, winner=controller.holon.node_id)
@@ -34,7 +34,7 @@ def _takes_others_tasks(simulation: Simulation) -> None:
 
         return hear
 
-    hearing(simulation, KindCode.ROBOT, ears)
+    hearing(simulation, KindCode.ROBOT, make_filter)
     _deaf_to_bids(simulation)
 
 
@@ -66,10 +66,10 @@ def _awards_whom_it_likes(simulation: Simulation) -> None:
 
 
 def _deaf_to_bids(simulation: Simulation) -> None:
-    def ears(_: object) -> Callable[[Message], Message | None]:
+    def make_filter(_: object) -> Callable[[Message], Message | None]:
         return lambda message: None if isinstance(message, Bid) and message.initiator < 5 else message
 
-    hearing(simulation, KindCode.ROBOT, ears)
+    hearing(simulation, KindCode.ROBOT, make_filter)
 
 
 def _late_bids_count(simulation: Simulation) -> None:

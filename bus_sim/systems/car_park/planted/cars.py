@@ -13,7 +13,7 @@ from onboard.contract.codes import KindCode, ShuttleAction, TokenKind
 from onboard.contract.constants import ANY_STATION, OUTSIDE
 from onboard.contract.messages import CarAt, Message, ShuttleOrder, TokenGrant
 from onboard.core.effects import Send
-from onboard.systems.car_park.program import Phase
+from onboard.systems.car_park.program import HandlingPhase
 from onboard.systems.car_park.site import car_park
 from onboard.ways.tokens import car_token
 
@@ -96,7 +96,7 @@ def _drives_off(simulation: Simulation) -> None:
         def make(old: Callable[..., Any]) -> Callable[..., Any]:
             def advance(now_us: int) -> Any:
                 effects = old(now_us)
-                if shuttle.phase is Phase.RETRACT:
+                if shuttle.phase is HandlingPhase.RETRACT:
                     effects = [*effects, *shuttle._next(now_us)]
                 return effects
 

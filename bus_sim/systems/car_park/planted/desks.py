@@ -20,7 +20,7 @@ _TASK_WORDS = (DeskText.TAKE_TICKET, DeskText.FULL, DeskText.CAR_TOO_LARGE)
 def _closing_is_locked(simulation: Simulation) -> None:
     """The seed paper's order: the output door opens as soon as the input door begins to close."""
 
-    def ears(_: object) -> Callable[[Message], Message]:
+    def make_filter(_: object) -> Callable[[Message], Message]:
         def hear(message: Message) -> Message:
             if isinstance(message, DoorState) and message.input_door is DoorPosition.CLOSING:
                 return changed(message, input_door=DoorPosition.LOCKED)
@@ -28,7 +28,7 @@ def _closing_is_locked(simulation: Simulation) -> None:
 
         return hear
 
-    hearing(simulation, KindCode.COMPARTMENT, ears)
+    hearing(simulation, KindCode.COMPARTMENT, make_filter)
 
     def plant(compartment: Any) -> None:
         compartment._robot_waits = True
@@ -65,11 +65,11 @@ def _without_word(simulation: Simulation) -> None:
 
 
 def _tickets_lost(simulation: Simulation) -> None:
-    def ears(_: object) -> Callable[[Message], Message | None]:
+    def make_filter(_: object) -> Callable[[Message], Message | None]:
         lost = (DeskInput.TICKET, DeskInput.CANCEL)
         return lambda message: None if isinstance(message, DeskEvent) and message.event in lost else message
 
-    hearing(simulation, KindCode.COMPARTMENT, ears)
+    hearing(simulation, KindCode.COMPARTMENT, make_filter)
 
 
 def _full_too_soon(simulation: Simulation) -> None:
@@ -122,10 +122,10 @@ def _drives_dead(simulation: Simulation) -> None:
 def _refused_without_why(simulation: Simulation) -> None:
     """Nobody answers, and the refusal that follows has no reason."""
 
-    def ears(_: object) -> Callable[[Message], Message | None]:
+    def make_filter(_: object) -> Callable[[Message], Message | None]:
         return lambda message: None if type(message).__name__ == "CallForProposals" else message
 
-    hearing(simulation, KindCode.ROBOT, ears)
+    hearing(simulation, KindCode.ROBOT, make_filter)
 
     def say(message: Message) -> list[Message]:
         if isinstance(message, TaskReport) and message.phase is TaskPhase.REFUSED:
@@ -138,13 +138,13 @@ def _refused_without_why(simulation: Simulation) -> None:
 def _forgets_its_award(simulation: Simulation) -> None:
     """A robot forgets what it won, and no desk tells that its task came to nothing."""
 
-    def ears(_: object) -> Callable[[Message], Message | None]:
+    def make_filter(_: object) -> Callable[[Message], Message | None]:
         def hear(message: Message) -> Message | None:
             return None if isinstance(message, Award) and message.result is CallResult.AWARDED else message
 
         return hear
 
-    hearing(simulation, KindCode.ROBOT, ears)
+    hearing(simulation, KindCode.ROBOT, make_filter)
     saying(simulation, KindCode.COMPARTMENT, lambda message: [] if _is_an_end(message) else [message])
 
 
@@ -161,13 +161,13 @@ def _blind_to_persons(simulation: Simulation) -> None:
             replace(door, "_is_clear", lambda _: lambda: True)
             replace(door, "_may_open", lambda _: lambda: True)
 
-    def ears(_: object) -> Callable[[Message], Message]:
+    def make_filter(_: object) -> Callable[[Message], Message]:
         def hear(message: Message) -> Message:
             return changed(message, person_inside=False) if isinstance(message, BayState) else message
 
         return hear
 
-    hearing(simulation, KindCode.COMPARTMENT, ears)
+    hearing(simulation, KindCode.COMPARTMENT, make_filter)
 
 
 BUGS = (

@@ -59,7 +59,7 @@ def _sees_everybody_aboard(simulation: Simulation) -> None:
     """The lift takes whoever has its gate for aboard, and moves while its robot comes over the sill."""
     _gate_forgotten(simulation)
 
-    def ears(_: object) -> Callable[[Message], Message]:
+    def make_filter(_: object) -> Callable[[Message], Message]:
         def hear(message: Message) -> Message:
             if isinstance(message, PlatformState):
                 return changed(message, carrier_aboard=message.carrier_aboard or message.crossing, crossing=False)
@@ -67,7 +67,7 @@ def _sees_everybody_aboard(simulation: Simulation) -> None:
 
         return hear
 
-    hearing(simulation, KindCode.LIFT, ears)
+    hearing(simulation, KindCode.LIFT, make_filter)
 
 
 def _and_no_curtain(simulation: Simulation) -> None:

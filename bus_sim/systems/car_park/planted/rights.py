@@ -47,7 +47,7 @@ def _grants_segments(simulation: Simulation) -> None:
 def _alone(simulation: Simulation) -> None:
     """Robots plan as if they were alone, and those with even node-IDs answer no call: they stand in the way."""
 
-    def ears(controller: Controller) -> Callable[[Message], Message | None]:
+    def make_filter(controller: Controller) -> Callable[[Message], Message | None]:
         stands = controller.holon.node_id % 2 == 0
 
         def hear(message: Message) -> Message | None:
@@ -58,7 +58,7 @@ def _alone(simulation: Simulation) -> None:
 
         return hear
 
-    hearing(simulation, KindCode.ROBOT, ears)
+    hearing(simulation, KindCode.ROBOT, make_filter)
 
 
 def _sees_nobody(simulation: Simulation) -> None:

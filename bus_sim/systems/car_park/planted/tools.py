@@ -79,11 +79,11 @@ def hearing(simulation: Simulation, kind: KindCode | None, heard: Callable[[Cont
     """Change what controllers of a kind hear, on the fleet bus and from their devices."""
 
     def plant(controller: Controller) -> None:
-        ears = heard(controller)
+        message_filter = heard(controller)
 
         def changed(old: Callable[[Message, int], list[Effect]]) -> Callable[[Message, int], list[Effect]]:
             def hear(message: Message, now_us: int) -> list[Effect]:
-                other = ears(message)
+                other = message_filter(message)
                 return [] if other is None else old(other, now_us)
 
             return hear

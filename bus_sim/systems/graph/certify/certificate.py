@@ -4,8 +4,8 @@ import random
 from dataclasses import dataclass
 from itertools import islice
 
-from bus_sim.systems.graph.certify.model import ARRIVED, Model, State
-from bus_sim.systems.graph.certify.search import Search, Stuck, Tasks, TooLargeError, task_sets
+from bus_sim.systems.graph.certify.model import ARRIVED, GraphModel, State
+from bus_sim.systems.graph.certify.search import DeadlockSearch, Stuck, TaskSet, TooLargeError, task_sets
 from onboard.systems.graph.network import Graph, complete, grid, ring
 from onboard.systems.graph.rules import Rules
 
@@ -32,7 +32,7 @@ def certify(graph: Graph, robots: int, rules: Rules, capacity: int, limit: int =
         return Certificate(False, f"{robots} robots do not find {len(graph.nodes)} nodes to start from")
     if rules is Rules.EDGE_AND_NODE and capacity >= robots:
         return Certificate(True, "who waits holds no edge, and every node has room for all robots")
-    search = Search(Model(graph, rules, capacity), limit)
+    search = DeadlockSearch(GraphModel(graph, rules, capacity), limit)
     number = 0
     try:
         for number, tasks in enumerate(task_sets(graph, robots), start=1):
@@ -43,7 +43,7 @@ def certify(graph: Graph, robots: int, rules: Rules, capacity: int, limit: int =
     return Certificate(True, f"no timing of any of {number} task sets sticks", number)
 
 
-def told(stuck: Stuck) -> list[str]:
+def stuck_lines(stuck: Stuck) -> list[str]:
     """A counterexample in words, one line a step."""
     lines = [f"task set: {stuck.tasks}"]
     lines += [f"{n:3}. R{move.robot + 1} {move.word} N{move.node}" for n, move in enumerate(stuck.moves, start=1)]
@@ -63,7 +63,7 @@ def _where(state: State) -> str:
 
 
 @dataclass(frozen=True)
-class Row:
+class CertificateRow:
     """A row of SYSTEMS 2.4: a graph and a number of robots; ``sample`` is how many task sets are drawn, and a seed."""
 
     name: str
@@ -72,21 +72,21 @@ class Row:
     sample: tuple[int, int] | None = None
 
 
-ROWS: tuple[Row, ...] = (
-    Row("3x3 grid", grid(3, 3), 2),
-    Row("3x3 grid", grid(3, 3), 3),
-    Row("3x3 grid", grid(3, 3), 4, (4000, 7)),
-    Row("ring C5", ring(5), 2),
-    Row("ring C6", ring(6), 2),
-    Row("ring C8", ring(8), 2),
-    Row("ring C6", ring(6), 3),
-    Row("K4", complete(4), 2),
-    Row("K4", complete(4), 3),
-    Row("K5", complete(5), 3),
+ROWS: tuple[CertificateRow, ...] = (
+    CertificateRow("3x3 grid", grid(3, 3), 2),
+    CertificateRow("3x3 grid", grid(3, 3), 3),
+    CertificateRow("3x3 grid", grid(3, 3), 4, (4000, 7)),
+    CertificateRow("ring C5", ring(5), 2),
+    CertificateRow("ring C6", ring(6), 2),
+    CertificateRow("ring C8", ring(8), 2),
+    CertificateRow("ring C6", ring(6), 3),
+    CertificateRow("K4", complete(4), 2),
+    CertificateRow("K4", complete(4), 3),
+    CertificateRow("K5", complete(5), 3),
 )
 
 
-def sampled(graph: Graph, robots: int, count: int, seed: int) -> list[Tasks]:
+def sampled(graph: Graph, robots: int, count: int, seed: int) -> list[TaskSet]:
     """Task sets drawn evenly and without repetition from all of them."""
     return random.Random(seed).sample(list(task_sets(graph, robots)), count)
 
@@ -103,7 +103,7 @@ def count_stuck(
 
     Of the first ``most`` only where that is given, or of those drawn by ``sample``, (count, seed).
     """
-    search = Search(Model(graph, rules, capacity))
+    search = DeadlockSearch(GraphModel(graph, rules, capacity))
     every = sampled(graph, robots, *sample) if sample is not None else task_sets(graph, robots)
     judged = [search.can_stick(tasks) for tasks in islice(every, most)]
     return len(judged), sum(judged)

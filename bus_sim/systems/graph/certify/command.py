@@ -9,9 +9,9 @@ from pathlib import Path
 from bus_sim.options import RunOptions
 from bus_sim.sites import SiteNotFoundError, find_site
 from bus_sim.systems.graph.against_optimum import compare
-from bus_sim.systems.graph.certify.certificate import ROWS, Certificate, certify, count_stuck, told
+from bus_sim.systems.graph.certify.certificate import ROWS, Certificate, certify, count_stuck, stuck_lines
 from bus_sim.systems.graph.certify.counterexample import play_file, play_on_bus, write_counterexample
-from bus_sim.systems.graph.certify.model import Model
+from bus_sim.systems.graph.certify.model import GraphModel
 from bus_sim.systems.graph.certify.throughput import Pace, measure
 from onboard.systems.graph.network import Graph, complete, grid, ring
 from onboard.systems.graph.rules import Rules
@@ -109,7 +109,7 @@ def _say(found: Certificate, what: str, file: Path | None, graph: Graph, rules: 
     verdict = {True: "deadlock-free under these rules", False: "not certified", None: "undecided"}[found.certified]
     print(f"{what}: {verdict}\n{found.reason}")
     if found.stuck is not None:
-        print("\n".join(told(found.stuck)))
+        print("\n".join(stuck_lines(found.stuck)))
         if file is not None:
             write_counterexample(file, graph, rules, capacity, found.stuck)
             print(f"written to {file}; play it: bus-sim certify --play {file} [--bus [--rules edge-and-node]]")
@@ -122,7 +122,7 @@ def _propose(graph: Graph, rules: Rules, capacity: int | None, most: int) -> Non
     for robots in range(1, most + 1):
         room = capacity or robots
         certified = certify(graph, robots, rules, room, limit=300_000).certified
-        result = measure(Model(graph, rules, room), robots, _pace(graph))
+        result = measure(GraphModel(graph, rules, room), robots, _pace(graph))
         words = {True: "yes", False: "no", None: "?"}[certified]
         stuck = f"  stuck after {result.stuck_at_s:.0f} s" if result.stuck_at_s is not None else ""
         print(f"{robots:6}  {words:9}  {result.per_hour:7.1f}  {result.per_hour / robots:7.1f}{stuck}")

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from bus_sim.options import RunOptions
 from bus_sim.sites import SiteNotFoundError
-from bus_sim.systems.graph.certify.model import Model, Move, State
-from bus_sim.systems.graph.certify.on_the_bus import STILL_US, Scene, play_scene
+from bus_sim.systems.graph.certify.model import GraphModel, ModelMove, State
+from bus_sim.systems.graph.certify.on_the_bus import STILL_US, TimedTaskSet, play_scene
 from bus_sim.systems.graph.certify.search import Stuck
 from onboard.systems.graph.network import Graph, edge
 from onboard.systems.graph.rules import Rules
@@ -25,13 +25,13 @@ def write_counterexample(file: Path, graph: Graph, rules: Rules, capacity: int, 
     file.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
-def read_counterexample(file: Path) -> Scene:
+def read_counterexample(file: Path) -> TimedTaskSet:
     """What a file holds. Raises ``SiteNotFoundError`` with one line for a file that cannot be read."""
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         graph = Graph({edge(one, other): length for one, other, length in content["edges"]})
-        moves = tuple(Move(int(robot), str(word), int(node)) for robot, word, node in content["moves"])
-        scene = Scene(
+        moves = tuple(ModelMove(int(robot), str(word), int(node)) for robot, word, node in content["moves"])
+        scene = TimedTaskSet(
             graph,
             Rules(content["rules"]),
             int(content["capacity"]),
@@ -40,7 +40,7 @@ def read_counterexample(file: Path) -> Scene:
             moves,
         )
         # A node, start or goal that is none shows here.
-        Model(graph, scene.rules, scene.capacity).start(scene.starts, scene.goals)
+        GraphModel(graph, scene.rules, scene.capacity).start(scene.starts, scene.goals)
         if not {*scene.starts, *scene.goals} <= {*graph.nodes} or any(
             not 0 <= m.robot < len(scene.starts) for m in moves
         ):
@@ -56,7 +56,7 @@ def play_file(file: Path) -> int:
     Raises ``SiteNotFoundError`` with one line for a file that cannot be read.
     """
     scene = read_counterexample(file)
-    model = Model(scene.graph, scene.rules, scene.capacity)
+    model = GraphModel(scene.graph, scene.rules, scene.capacity)
     after = replay(model, model.start(scene.starts, scene.goals), list(scene.moves))
     if after is None or model.moves(after) or model.is_over(after):
         print("the file does not end where all are stuck")
@@ -90,7 +90,7 @@ def play_on_bus(file: Path, rules: Rules | None, options: RunOptions) -> int:
     return 0 if is_good else 1
 
 
-def replay(model: Model, state: State, moves: list[Move]) -> State | None:
+def replay(model: GraphModel, state: State, moves: list[ModelMove]) -> State | None:
     """The state after these moves, each printed; None where the rules do not allow one of them."""
     for number, move in enumerate(moves, start=1):
         allowed = dict(model.moves(state))

@@ -17,7 +17,7 @@ ARRIVED = -2
 _STANDS = -10
 
 
-class Robot(NamedTuple):
+class ModelRobot(NamedTuple):
     """``start`` is the node behind it while it is on an edge, ``NOWHERE``, ``ARRIVED``, or in a node."""
 
     start: int
@@ -31,10 +31,10 @@ class Robot(NamedTuple):
 
 
 #: One robot each. Where names do not matter the robots are sorted.
-State = tuple[Robot, ...]
+State = tuple[ModelRobot, ...]
 
 
-class Move(NamedTuple):
+class ModelMove(NamedTuple):
     """One thing that can happen: robot number ``robot`` goes on to ``node``; ``word`` says how."""
 
     robot: int
@@ -43,7 +43,7 @@ class Move(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Model:
+class GraphModel:
     """The rules on one graph. ``capacity`` of every node, for ``EDGE_AND_NODE`` only."""
 
     graph: Graph
@@ -52,16 +52,16 @@ class Model:
 
     def start(self, starts: tuple[int, ...], goals: tuple[int, ...]) -> State:
         """All robots in their first nodes."""
-        return tuple(Robot(NOWHERE, *ends) for ends in zip(starts, goals, strict=True))
+        return tuple(ModelRobot(NOWHERE, *ends) for ends in zip(starts, goals, strict=True))
 
     def is_over(self, state: State) -> bool:
         """Whether all have come to their goals."""
         return all(robot.start == ARRIVED for robot in state)
 
-    def moves(self, state: State) -> list[tuple[Move, State]]:
+    def moves(self, state: State) -> list[tuple[ModelMove, State]]:
         """Everything that can happen next, each with the state after it; no robot changes its place in the tuple."""
         on_edges = {edge(robot.start, robot.node): robot for robot in state if robot.start >= 0}
-        found: list[tuple[Move, State]] = []
+        found: list[tuple[ModelMove, State]] = []
         for number, robot in enumerate(state):
             if robot.start != ARRIVED:
                 step = self._of_edge_and_node if self.rules is Rules.EDGE_AND_NODE else self._of_paper
@@ -72,47 +72,47 @@ class Model:
     # --- robots that wait on edges -----------------------------------------------------------------------------
 
     def _of_paper(
-        self, number: int, robot: Robot, state: State, on_edges: dict[Edge, Robot]
-    ) -> list[tuple[Move, Robot]]:
+        self, number: int, robot: ModelRobot, state: State, on_edges: dict[Edge, ModelRobot]
+    ) -> list[tuple[ModelMove, ModelRobot]]:
         start, node, goal = robot
         if node == goal:
-            return [(Move(number, "arrives at", goal), Robot(ARRIVED, goal, goal))]
+            return [(ModelMove(number, "arrives at", goal), ModelRobot(ARRIVED, goal, goal))]
         wants = self.graph.next_node(start, node, goal)
         if wants is None:
             return []
         if may_enter(self.graph, on_edges, node, wants, self.rules):
-            return [(Move(number, "goes to", wants), Robot(node, wants, goal))]
+            return [(ModelMove(number, "goes to", wants), ModelRobot(node, wants, goal))]
         other = on_edges.get(edge(node, wants))
         if other is None or start < 0 or not are_head_on(Heading(start, node, wants), self._heading(other)):
             return []
         return [
-            (Move(number, "is sent to", after), Robot(node, after, goal))
+            (ModelMove(number, "is sent to", after), ModelRobot(node, after, goal))
             for after in other_edges(self.graph, on_edges, node, start, self.rules)
         ]
 
-    def _heading(self, robot: Robot) -> Heading:
+    def _heading(self, robot: ModelRobot) -> Heading:
         return Heading(robot.start, robot.node, self.graph.next_node(*robot))
 
     # --- robots that wait in nodes -----------------------------------------------------------------------------
 
     def _of_edge_and_node(
-        self, number: int, robot: Robot, state: State, on_edges: dict[Edge, Robot]
-    ) -> list[tuple[Move, Robot]]:
+        self, number: int, robot: ModelRobot, state: State, on_edges: dict[Edge, ModelRobot]
+    ) -> list[tuple[ModelMove, ModelRobot]]:
         start, node, goal = robot
         if start >= 0:
             if node == goal:
-                return [(Move(number, "arrives at", goal), Robot(ARRIVED, goal, goal))]
-            return [(Move(number, "enters", node), Robot(_STANDS - start, node, goal))]
+                return [(ModelMove(number, "arrives at", goal), ModelRobot(ARRIVED, goal, goal))]
+            return [(ModelMove(number, "enters", node), ModelRobot(_STANDS - start, node, goal))]
         came_from = robot.came_from
         wants = self.graph.next_node(came_from, node, goal)
         if wants is None:
             return []
         if self._has_room(state, wants) and edge(node, wants) not in on_edges:
-            return [(Move(number, "goes to", wants), Robot(node, wants, goal))]
+            return [(ModelMove(number, "goes to", wants), ModelRobot(node, wants, goal))]
         if self._has_room(state, wants) or not any(self._wants_back(one, wants, node) for one in state):
             return []
         return [
-            (Move(number, "is sent to", after), Robot(node, after, goal))
+            (ModelMove(number, "is sent to", after), ModelRobot(node, after, goal))
             for after in other_edges(self.graph, on_edges, node, came_from, self.rules)
             if self._has_room(state, after)
         ]
@@ -120,7 +120,7 @@ class Model:
     def _has_room(self, state: State, node: int) -> bool:
         return sum(one.node == node for one in state) < self.capacity
 
-    def _wants_back(self, robot: Robot, node: int, other: int) -> bool:
+    def _wants_back(self, robot: ModelRobot, node: int, other: int) -> bool:
         """Whether a robot in ``node`` wants to go to ``other``."""
         if robot.node != node or robot.start in (ARRIVED, NOWHERE) or robot.start >= 0:
             return robot.node == node and robot.start == NOWHERE and self.graph.next_node(*robot) == other

@@ -12,11 +12,11 @@ from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import Timers
 from bus_sim.options import RunOptions
 from bus_sim.session import play
-from bus_sim.systems.graph.body import Body
-from bus_sim.systems.graph.certify.model import Move
+from bus_sim.systems.graph.body import GraphRobotBody
+from bus_sim.systems.graph.certify.model import ModelMove
 from bus_sim.systems.graph.plant import GraphPlant
 from bus_sim.systems.graph.simulated import SIMULATED
-from bus_sim.systems.stage import Stage
+from bus_sim.systems.stage import SystemStage
 from onboard.config.site import parse_site
 from onboard.contract.graph import BodyPlace
 from onboard.systems.graph.network import Graph
@@ -36,7 +36,7 @@ _HOST, _DESK, _FIRST_ROBOT = 1, 9, 21
 
 
 @dataclass(frozen=True)
-class Scene:
+class TimedTaskSet:
     """A task set on a graph and a timing of it, under the rules that it is to be played with."""
 
     graph: Graph
@@ -44,9 +44,9 @@ class Scene:
     capacity: int
     starts: tuple[int, ...]
     goals: tuple[int, ...]
-    moves: tuple[Move, ...]
+    moves: tuple[ModelMove, ...]
 
-    def under(self, rules: Rules, capacity: int) -> "Scene":
+    def under(self, rules: Rules, capacity: int) -> "TimedTaskSet":
         """The same scene under other rules."""
         return replace(self, rules=rules, capacity=capacity)
 
@@ -76,7 +76,7 @@ class TimedPlant(GraphPlant):
     """A graph's plant that lets robots pass their sensors in the order of ``moves`` only, then all of them."""
 
     def __init__(
-        self, site: FactoryGraph, timers: Timers, links: dict[int, BusDeviceLink], moves: Sequence[Move]
+        self, site: FactoryGraph, timers: Timers, links: dict[int, BusDeviceLink], moves: Sequence[ModelMove]
     ) -> None:
         super().__init__(site, timers, links)
         self._moves = list(moves)
@@ -104,27 +104,27 @@ class TimedPlant(GraphPlant):
         still_us = self.timers.now_us() - max(self.moved_us, self._since_us)
         return self.is_free and still_us >= STILL_US and not super().is_over
 
-    def holds(self, body: Body) -> bool:
+    def holds(self, body: GraphRobotBody) -> bool:
         """It is not this robot's turn."""
         return not self.is_free and not (self._moves and self._robot(self._moves[0]) == body.machine.node_id)
 
-    def check_onto(self, body: Body, start: int, end: int) -> None:
+    def check_onto(self, body: GraphRobotBody, start: int, end: int) -> None:
         """As ever; and this is a move."""
         super().check_onto(body, start, end)
         self.moved_us = self.timers.now_us()
         self._came_about(body, end)
 
-    def check_into(self, body: Body) -> None:
+    def check_into(self, body: GraphRobotBody) -> None:
         """As ever; at the goal this is a move."""
         super().check_into(body)
         self.moved_us = self.timers.now_us()
         if self._moves and self._moves[0].word == "arrives at":
             self._came_about(body, body.node)
 
-    def _robot(self, move: Move) -> int:
+    def _robot(self, move: ModelMove) -> int:
         return _FIRST_ROBOT + move.robot
 
-    def _came_about(self, body: Body, node: int) -> None:
+    def _came_about(self, body: GraphRobotBody, node: int) -> None:
         if self.is_free:
             return
         if self._moves and (self._robot(self._moves[0]), self._moves[0].node) == (body.machine.node_id, node):
@@ -163,28 +163,28 @@ class TimedPlant(GraphPlant):
 
 
 @dataclass(frozen=True)
-class Ending:
+class PlayEnding:
     """How it ended: ``played_moves`` of the timing came about; ``where`` is each robot's place in words, by name."""
 
-    played: Stage[TimedPlant]
+    played: SystemStage[TimedPlant]
     played_moves: int
     is_stuck: bool
     where: dict[str, str] = field(default_factory=dict)
 
 
-def play_scene(scene: Scene, options: RunOptions) -> Ending:
+def play_scene(scene: TimedTaskSet, options: RunOptions) -> PlayEnding:
     """Play it on the virtual bus until it is over. Raises ``ConfigError`` for a graph that no site can have."""
 
     def make_plant(site: FactoryGraph, timers: Timers, links: dict[int, BusDeviceLink], _: int) -> TimedPlant:
         return TimedPlant(site, timers, links, scene.moves)
 
-    played: Stage[TimedPlant] = play(scene.site(), options, system=replace(SIMULATED, plant=make_plant))
+    played: SystemStage[TimedPlant] = play(scene.site(), options, system=replace(SIMULATED, plant=make_plant))
     plant = played.plant
     where = {body.machine.name: _place(body) for body in plant.bodies.values()}
-    return Ending(played, plant.played_moves, plant.is_stuck, where)
+    return PlayEnding(played, plant.played_moves, plant.is_stuck, where)
 
 
-def _place(body: Body) -> str:
+def _place(body: GraphRobotBody) -> str:
     if body.place is BodyPlace.IN_NODE:
         return f"in N{body.node}"
     return f"between N{body.behind} and N{body.node}"

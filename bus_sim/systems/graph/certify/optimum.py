@@ -9,14 +9,14 @@ import random
 from collections import deque
 from itertools import product
 
-from bus_sim.systems.graph.certify.search import Tasks
+from bus_sim.systems.graph.certify.search import TaskSet
 from onboard.systems.graph.network import NOWHERE, Graph, edge
 
 #: Where a robot is and whence it came.
 _Place = tuple[int, int]
 
 
-def least_steps(graph: Graph, tasks: Tasks) -> int | None:
+def least_steps(graph: Graph, tasks: TaskSet) -> int | None:
     """The exact optimum in steps, by breadth-first search; None where the goals cannot be reached."""
     first: tuple[_Place, ...] = tuple((NOWHERE, start) for start in tasks.starts)
     queue, seen = deque([(first, 0)]), {first}
@@ -36,12 +36,12 @@ def least_steps(graph: Graph, tasks: Tasks) -> int | None:
     return None
 
 
-def some_tasks(graph: Graph, robots: int, cases: int, seed: int) -> list[Tasks]:
+def some_tasks(graph: Graph, robots: int, cases: int, seed: int) -> list[TaskSet]:
     """Task sets drawn by chance; all starts differ, all goals, and each goal from its start."""
     chance = random.Random(f"optimum {seed} {robots}")
-    found: list[Tasks] = []
+    found: list[TaskSet] = []
     while len(found) < cases:
-        tasks = Tasks(tuple(chance.sample(graph.nodes, robots)), tuple(chance.sample(graph.nodes, robots)))
+        tasks = TaskSet(tuple(chance.sample(graph.nodes, robots)), tuple(chance.sample(graph.nodes, robots)))
         if all(start != goal for start, goal in zip(*tasks, strict=True)):
             found.append(tasks)
     return found

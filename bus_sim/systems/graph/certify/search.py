@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from itertools import combinations, permutations
 from typing import NamedTuple
 
-from bus_sim.systems.graph.certify.model import Model, Move, State
+from bus_sim.systems.graph.certify.model import GraphModel, ModelMove, State
 from onboard.systems.graph.network import Graph
 
 
-class Tasks(NamedTuple):
+class TaskSet(NamedTuple):
     """Where robots stand at first and where they are to go: all starts differ, all goals, and each from its start."""
 
     starts: tuple[int, ...]
@@ -20,19 +20,19 @@ class Tasks(NamedTuple):
         return ", ".join(f"R{n} N{a} to N{b}" for n, (a, b) in enumerate(zip(*self, strict=True), start=1))
 
 
-def task_sets(graph: Graph, robots: int) -> Iterator[Tasks]:
+def task_sets(graph: Graph, robots: int) -> Iterator[TaskSet]:
     """Every task set; which robot of the set has which task does not matter."""
     for starts in combinations(graph.nodes, robots):
         for goals in permutations(graph.nodes, robots):
             if all(one != other for one, other in zip(starts, goals, strict=True)):
-                yield Tasks(starts, goals)
+                yield TaskSet(starts, goals)
 
 
 class Stuck(NamedTuple):
     """A timing of a task set after which nobody can move: the moves, and the state at the end."""
 
-    tasks: Tasks
-    moves: tuple[Move, ...]
+    tasks: TaskSet
+    moves: tuple[ModelMove, ...]
     state: State
 
 
@@ -41,17 +41,17 @@ class TooLargeError(Exception):
 
 
 @dataclass
-class Search:
+class DeadlockSearch:
     """Remembers of every state that it saw whether it can stick, so that task sets share their futures.
 
     ``limit`` is the most states that are remembered. Raises ``TooLargeError`` beyond.
     """
 
-    model: Model
+    model: GraphModel
     limit: int = 20_000_000
     known: dict[State, bool] = field(default_factory=dict)
 
-    def can_stick(self, tasks: Tasks) -> bool:
+    def can_stick(self, tasks: TaskSet) -> bool:
         """Whether some interleaving of a task set ends where nobody can move and not all have arrived."""
         first: State = tuple(sorted(self.model.start(*tasks)))
         if first in self.known:
@@ -82,10 +82,10 @@ class Search:
             self.known[state] = True
             state = before[state]
 
-    def counterexample(self, tasks: Tasks) -> Stuck | None:
+    def counterexample(self, tasks: TaskSet) -> Stuck | None:
         """A shortest timing that sticks, robots by their numbers; None where there is none."""
         first = self.model.start(*tasks)
-        before: dict[State, tuple[State, Move] | None] = {first: None}
+        before: dict[State, tuple[State, ModelMove] | None] = {first: None}
         queue = deque([first])
         while queue:
             state = queue.popleft()
@@ -98,8 +98,8 @@ class Search:
                     queue.append(following)
         return None
 
-    def _moves_to(self, state: State, before: dict[State, tuple[State, Move] | None]) -> tuple[Move, ...]:
-        moves: list[Move] = []
+    def _moves_to(self, state: State, before: dict[State, tuple[State, ModelMove] | None]) -> tuple[ModelMove, ...]:
+        moves: list[ModelMove] = []
         while (step := before[state]) is not None:
             state, move = step
             moves.append(move)

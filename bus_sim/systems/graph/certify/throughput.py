@@ -7,7 +7,7 @@ the same rules on the bus.
 import random
 from dataclasses import dataclass
 
-from bus_sim.systems.graph.certify.model import Model, Move, Robot, State
+from bus_sim.systems.graph.certify.model import GraphModel, ModelMove, ModelRobot, State
 from onboard.systems.graph.network import NOWHERE
 
 
@@ -33,11 +33,11 @@ class Throughput:
         return self.tasks / self.hours
 
 
-def measure(model: Model, robots: int, pace: Pace, hours: float = 4.0, seed: int = 1) -> Throughput:
+def measure(model: GraphModel, robots: int, pace: Pace, hours: float = 4.0, seed: int = 1) -> Throughput:
     """Let robots work for so many hours, or until they stick. Raises ``ValueError`` for more robots than nodes."""
     chance = random.Random(f"throughput {seed} {robots}")
     nodes = model.graph.nodes
-    state: State = tuple(Robot(NOWHERE, node, _goal(chance, nodes, node)) for node in chance.sample(nodes, robots))
+    state: State = tuple(ModelRobot(NOWHERE, node, _goal(chance, nodes, node)) for node in chance.sample(nodes, robots))
     ready_s = [0.0] * robots
     now_s, done = 0.0, 0
     while now_s < hours * 3600:
@@ -49,7 +49,7 @@ def measure(model: Model, robots: int, pace: Pace, hours: float = 4.0, seed: int
             ready_s[move.robot] = now_s + _lasts_s(model, move, state[move.robot], pace)
             if move.word == "arrives at":
                 done += 1
-                robot = Robot(NOWHERE, move.node, _goal(chance, nodes, move.node))
+                robot = ModelRobot(NOWHERE, move.node, _goal(chance, nodes, move.node))
                 state = (*state[: move.robot], robot, *state[move.robot + 1 :])
             continue
         later = [time for time in ready_s if time > now_s]
@@ -63,7 +63,7 @@ def _goal(chance: random.Random, nodes: tuple[int, ...], here: int) -> int:
     return chance.choice([node for node in nodes if node != here])
 
 
-def _lasts_s(model: Model, move: Move, robot: Robot, pace: Pace) -> float:
+def _lasts_s(model: GraphModel, move: ModelMove, robot: ModelRobot, pace: Pace) -> float:
     if move.word == "arrives at":
         return pace.load_s
     return 0.0 if move.word == "enters" else model.graph.length_mm(robot.start, robot.node) / pace.speed_mm_s

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from bus_sim.systems.mapd.importers.draft import Draft, site_text
-from bus_sim.systems.mapd.importers.mapf import Wanted, import_map
+from bus_sim.systems.mapd.importers.mapf import DrawnDemand, import_map
 from bus_sim.systems.mapd.importers.opentcs import import_opentcs
 from onboard.config.files import read_text
 from onboard.config.problems import ConfigError, Problems
@@ -34,7 +34,7 @@ def _positive(text: str) -> int:
 
 def run_import(args: argparse.Namespace) -> int:
     """Import, check by reading the result as any site file is read, then write. Raises ``ConfigError``."""
-    draft = import_files(args.files, Wanted(args.robots, args.tasks, args.every, args.seed))
+    draft = import_files(args.files, DrawnDemand(args.robots, args.tasks, args.every, args.seed))
     text = site_text(draft)
     site = parse_site(text, str(args.output))
     problems = Problems(str(args.output))
@@ -53,7 +53,7 @@ def run_import(args: argparse.Namespace) -> int:
     return 0
 
 
-def import_files(files: list[Path], wanted: Wanted) -> Draft:
+def import_files(files: list[Path], wanted: DrawnDemand) -> Draft:
     """The draft of one file, or of a map and its tasks. Raises ``ConfigError``."""
     first, *others = sorted(files, key=lambda path: path.suffix == ".task")
     problems = Problems(str(first))
@@ -70,14 +70,14 @@ def import_files(files: list[Path], wanted: Wanted) -> Draft:
     return _IMPORTERS[first.suffix](first, text, wanted)
 
 
-def _building(path: Path, text: str, wanted: Wanted) -> Draft:
+def _building(path: Path, text: str, wanted: DrawnDemand) -> Draft:
     # Not before it is needed: PyYAML is in an extra, and boards do not carry it.
     from bus_sim.systems.mapd.importers.rmf import import_building  # noqa: PLC0415  # see above
 
     return import_building(path, text, wanted)
 
 
-def _map(path: Path, text: str, wanted: Wanted) -> Draft:
+def _map(path: Path, text: str, wanted: DrawnDemand) -> Draft:
     return import_map(path, text, None, wanted)
 
 

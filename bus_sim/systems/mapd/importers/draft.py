@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.config.problems import quoted
-from onboard.systems.mapd.floor import Line
+from onboard.systems.mapd.floor import NetworkLine
 
 _UNFIT = re.compile(r"[^A-Za-z0-9]+")
 #: A machine's name goes into a DBC: 16 characters.
@@ -40,7 +40,7 @@ class Draft:
     sources: list[str]
     rows: list[str] = field(default_factory=list)
     points: list[str] = field(default_factory=list)
-    lines: list[Line] = field(default_factory=list)
+    lines: list[NetworkLine] = field(default_factory=list)
     zones: list[list[str]] = field(default_factory=list)
     robots: list[tuple[str, str]] = field(default_factory=list)
     endpoints: list[str] = field(default_factory=list)

@@ -20,7 +20,7 @@ _COLUMNS = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class DrawnDemand:
     """What is to be drawn where the file has none; ``robots`` None means four, or all homes that a MAPD map marks."""
 
     robots: int | None = None
@@ -91,7 +91,7 @@ def read_tasks(text: str, endpoints: list[str], problems: Problems) -> list[Task
     return found
 
 
-def import_map(path: Path, text: str, tasks: tuple[Path, str] | None, wanted: Wanted) -> Draft:
+def import_map(path: Path, text: str, tasks: tuple[Path, str] | None, wanted: DrawnDemand) -> Draft:
     """A site of a map and, where the map marks endpoints, of a task file. Raises ``ConfigError`` with every mistake."""
     problems = Problems(str(path))
     rows = read_map(text, problems)
@@ -129,7 +129,7 @@ def import_map(path: Path, text: str, tasks: tuple[Path, str] | None, wanted: Wa
     return draft
 
 
-def _draw(floor: Floor, wanted: Wanted, problems: Problems) -> tuple[list[str], list[str]]:
+def _draw(floor: Floor, wanted: DrawnDemand, problems: Problems) -> tuple[list[str], list[str]]:
     """Homes that shut nobody in, and endpoints that all reach, in the largest part of the map."""
     rng = random.Random(wanted.seed)
     part = _largest_part(floor)

@@ -7,19 +7,19 @@ long as two vehicles, so that robots in neighbouring cells keep a vehicle's leng
 from pathlib import Path
 
 from bus_sim.systems.mapd.importers.draft import Draft, Loss, draw_tasks, machine_name
-from bus_sim.systems.mapd.importers.mapf import Wanted
-from bus_sim.systems.mapd.importers.xml_tree import Element, parse_xml
+from bus_sim.systems.mapd.importers.mapf import DrawnDemand
+from bus_sim.systems.mapd.importers.xml_tree import XmlElement, parse_xml
 from onboard.config.problems import Problems, nearest
-from onboard.systems.mapd.floor import Line, lasting_rests, network_floor
+from onboard.systems.mapd.floor import NetworkLine, lasting_rests, network_floor
 from onboard.systems.mapd.reader import MAX_STEPS
 
 _LONGEST_MM = 10_000_000
 
 
-class Model:
+class OpenTcsModel:
     """The elements of a model that are well formed; every mistake is noted."""
 
-    def __init__(self, root: Element, problems: Problems) -> None:
+    def __init__(self, root: XmlElement, problems: Problems) -> None:
         self.problems = problems
         self.points = self._named(root, "point")
         self.paths = self._named(root, "path")
@@ -38,14 +38,14 @@ class Model:
             for link in location.all("link"):
                 self.refer(link, "point", self.points)
 
-    def text(self, element: Element, name: str) -> str:
+    def text(self, element: XmlElement, name: str) -> str:
         """An attribute that must be there."""
         value = element.attributes.get(name, "")
         if not value:
             self.problems.add(element.line, f"{element.name} {name}", None, "missing", "export the model again")
         return value
 
-    def integer(self, element: Element, name: str, low: int) -> int:
+    def integer(self, element: XmlElement, name: str, low: int) -> int:
         """A whole number of an attribute from ``low`` on; ``low`` where it is none."""
         value = self.text(element, name)
         try:
@@ -57,15 +57,15 @@ class Model:
             self.problems.add(element.line, f"{element.name} {name}", value, "out of range", words)
         return max(number, low)
 
-    def refer(self, element: Element, name: str, known: dict[str, Element]) -> None:
+    def refer(self, element: XmlElement, name: str, known: dict[str, XmlElement]) -> None:
         """Note an attribute that names nothing known."""
         value = self.text(element, name)
         if value and value not in known:
             remedy = nearest(value, sorted(known)[:12])
             self.problems.add(element.line, f"{element.name} {name}", value, "names nothing in the model", remedy)
 
-    def _named(self, root: Element, kind: str) -> dict[str, Element]:
-        found: dict[str, Element] = {}
+    def _named(self, root: XmlElement, kind: str) -> dict[str, XmlElement]:
+        found: dict[str, XmlElement] = {}
         for element in root.all(kind):
             name = self.text(element, "name")
             if name in found:
@@ -75,7 +75,7 @@ class Model:
         return found
 
 
-def import_opentcs(path: Path, text: str, wanted: Wanted) -> Draft:
+def import_opentcs(path: Path, text: str, wanted: DrawnDemand) -> Draft:
     """A site of a plant model. Raises ``ConfigError`` with every mistake."""
     problems = Problems(str(path))
     root = parse_xml(text, problems)
@@ -83,7 +83,7 @@ def import_opentcs(path: Path, text: str, wanted: Wanted) -> Draft:
         problems.add(root.line, root.name, None, "not a plant model", "give an XML file whose root is <model>")
     problems.raise_if_any()
     assert root is not None
-    model = Model(root, problems)
+    model = OpenTcsModel(root, problems)
     for kind, what in (("vehicle", model.vehicles), ("path", model.paths)):
         if not what:
             problems.add(root.line, kind, None, f"no {kind}", f"a site needs at least one <{kind}>")
@@ -106,12 +106,12 @@ def import_opentcs(path: Path, text: str, wanted: Wanted) -> Draft:
     return draft
 
 
-def _vehicle_length(model: Model, vehicle: Element) -> int:
+def _vehicle_length(model: OpenTcsModel, vehicle: XmlElement) -> int:
     boxes = vehicle.all("boundingBox")
     return model.integer(boxes[0] if boxes else vehicle, "length", 1)
 
 
-def _add_lines(model: Model, draft: Draft, speed_mm_s: int) -> None:
+def _add_lines(model: OpenTcsModel, draft: Draft, speed_mm_s: int) -> None:
     """A line for each path that is not locked, as long as the slower of path and vehicle takes on it."""
     for name, path in model.paths.items():
         start, end = path.attributes["sourcePoint"], path.attributes["destinationPoint"]
@@ -128,12 +128,12 @@ def _add_lines(model: Model, draft: Draft, speed_mm_s: int) -> None:
             model.problems.add(path.line, "path length", path.attributes["length"], "too long", "cut the path in two")
             steps = MAX_STEPS
         if forward:
-            draft.lines.append(Line(start, end, steps, one_way=not reverse))
+            draft.lines.append(NetworkLine(start, end, steps, one_way=not reverse))
         elif reverse:
-            draft.lines.append(Line(end, start, steps, one_way=True))
+            draft.lines.append(NetworkLine(end, start, steps, one_way=True))
 
 
-def _add_zones(model: Model, draft: Draft) -> None:
+def _add_zones(model: OpenTcsModel, draft: Draft) -> None:
     lines = {f"{one.start}>{one.end}" for one in draft.lines}
     for name, block in model.blocks.items():
         kind = block.attributes.get("type", "")
@@ -155,7 +155,7 @@ def _add_zones(model: Model, draft: Draft) -> None:
             draft.zones.append(members)
 
 
-def _add_endpoints(model: Model, draft: Draft) -> None:
+def _add_endpoints(model: OpenTcsModel, draft: Draft) -> None:
     """The points of locations at which something other than charging can be done."""
     for name, location in model.locations.items():
         kind = location.attributes["type"]
@@ -173,7 +173,7 @@ def _add_endpoints(model: Model, draft: Draft) -> None:
                 draft.endpoints.append(link)
 
 
-def _add_robots(model: Model, draft: Draft, wanted: Wanted) -> None:
+def _add_robots(model: OpenTcsModel, draft: Draft, wanted: DrawnDemand) -> None:
     """Homes at parking positions, then at other points in which a vehicle shuts nobody in."""
     floor = network_floor(draft.points, draft.lines, draft.zones)
     number = {name: cell for cell, name in enumerate(floor.names)}
@@ -196,7 +196,7 @@ def _add_robots(model: Model, draft: Draft, wanted: Wanted) -> None:
             draft.losses.append(Loss(f"parking position {name}", "who stays there for ever shuts others in"))
 
 
-def _note_losses(model: Model, root: Element, draft: Draft) -> None:
+def _note_losses(model: OpenTcsModel, root: XmlElement, draft: Draft) -> None:
     for name, vehicle in model.vehicles.items():
         if "energyLevelCritical" in vehicle.attributes:
             draft.losses.append(Loss(f"energy levels of vehicle {name}", "robots do not run empty"))

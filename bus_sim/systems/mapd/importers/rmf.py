@@ -9,10 +9,10 @@ from math import hypot
 from pathlib import Path
 
 from bus_sim.systems.mapd.importers.draft import Draft, Loss, draw_tasks, machine_name
-from bus_sim.systems.mapd.importers.mapf import Wanted
+from bus_sim.systems.mapd.importers.mapf import DrawnDemand
 from bus_sim.systems.mapd.importers.yaml_tree import Value, parse_yaml
 from onboard.config.problems import Problems
-from onboard.systems.mapd.floor import Line, lasting_rests, network_floor
+from onboard.systems.mapd.floor import NetworkLine, lasting_rests, network_floor
 from onboard.systems.mapd.reader import MAX_STEPS
 
 #: A robot's step, mm, and how long it takes, ms: tinyRobot and deliveryRobot of the demos go at half a metre a second.
@@ -42,7 +42,7 @@ class Level:
     at_mm: dict[int, tuple[float, float]] = field(default_factory=dict)
 
 
-def import_building(path: Path, text: str, wanted: Wanted) -> Draft:
+def import_building(path: Path, text: str, wanted: DrawnDemand) -> Draft:
     """A site of a building. Raises ``ConfigError`` with every mistake."""
     problems = Problems(str(path))
     root = parse_yaml(text, problems)
@@ -51,7 +51,7 @@ def import_building(path: Path, text: str, wanted: Wanted) -> Draft:
     problems.raise_if_any()
     name = root.get("name").of
     draft = Draft(machine_name(str(name or path.stem), ()), [path.name], step_ms=STEP_MS)
-    reader = _Reader(draft, problems)
+    reader = _RmfReader(draft, problems)
     for level, value in root.get("levels").items():
         reader.read_level(level, value)
     for lift, value in root.get("lifts").items():
@@ -65,7 +65,7 @@ def import_building(path: Path, text: str, wanted: Wanted) -> Draft:
     return draft
 
 
-class _Reader:
+class _RmfReader:
     def __init__(self, draft: Draft, problems: Problems) -> None:
         self.draft, self.problems = draft, problems
         self.levels: dict[str, Level] = {}
@@ -124,9 +124,9 @@ class _Reader:
         both = lane.values()[2].get("bidirectional").values() if len(lane.values()) > 2 else []
         one_way = not (len(both) > 1 and both[1].of is True)
         (x, y), (x2, y2) = (level.at_mm[one] for one in ends if one is not None)
-        self._add_line(lane, Line(start, end, max(1, round(hypot(x - x2, y - y2) / STEP_MM)), one_way))
+        self._add_line(lane, NetworkLine(start, end, max(1, round(hypot(x - x2, y - y2) / STEP_MM)), one_way))
 
-    def _add_line(self, at: Value, line: Line) -> None:
+    def _add_line(self, at: Value, line: NetworkLine) -> None:
         if line.steps > MAX_STEPS:
             self._bad(at, "lane", f"{line.steps} steps long", "cut it in two")
             return
@@ -136,7 +136,7 @@ class _Reader:
             self.draft.lines.append(line)
         elif back is not None and back.one_way:
             # The other way of one that went one way only makes it go both ways.
-            self.draft.lines[self.draft.lines.index(back)] = Line(back.start, back.end, back.steps)
+            self.draft.lines[self.draft.lines.index(back)] = NetworkLine(back.start, back.end, back.steps)
 
     def _point(self, level: Level, number: int, vertex: tuple[float, float, str, Value]) -> str:
         if number in level.points:
@@ -180,14 +180,14 @@ class _Reader:
         zone = list(names)
         for (low, _), (high, _), start, end in zip(cabins, cabins[1:], names, names[1:], strict=False):
             steps = max(1, round((high.elevation_mm - low.elevation_mm) / LIFT_MM_S * 1000 / STEP_MS))
-            self._add_line(value, Line(start, end, steps))
+            self._add_line(value, NetworkLine(start, end, steps))
             if steps > 1:
                 zone.append(f"{start}>{end}")
         self.draft.zones.append(zone)
         self.draft.meanings.append(f"Lift {lift}: {', '.join(names)}; one robot at a time")
         self.draft.losses.append(Loss(f"empty travel and doors of lift {lift}", "the cabin is where one boards"))
 
-    def choose(self, root: Value, wanted: Wanted) -> None:
+    def choose(self, root: Value, wanted: DrawnDemand) -> None:
         """Robots where the building puts them, endpoints at named places; what cannot be reached is left out."""
         if len(self.robots[: wanted.robots]) == 0 or not self.draft.lines:
             self._bad(root, "levels", "no robot (spawn_robot_name) or no lane", "add a robot's charger and its lanes")

@@ -10,32 +10,32 @@ _MOST_DEPTH = 50
 
 
 @dataclass
-class Element:
+class XmlElement:
     """One element: its name, attributes, the line of its start tag, and what is within."""
 
     name: str
     attributes: dict[str, str]
     line: int
-    children: "list[Element]" = field(default_factory=list)
+    children: "list[XmlElement]" = field(default_factory=list)
 
-    def all(self, name: str) -> "list[Element]":
+    def all(self, name: str) -> "list[XmlElement]":
         """Its direct children of one name."""
         return [one for one in self.children if one.name == name]
 
 
-def parse_xml(text: str, problems: Problems) -> Element | None:
+def parse_xml(text: str, problems: Problems) -> XmlElement | None:
     """The root element; None, with a problem noted, where the text is not well formed or declares a document type.
 
     A document type is refused as its entities could grow without bound.
     """
     parser = expat.ParserCreate()
-    top = Element("", {}, 0)
+    top = XmlElement("", {}, 0)
     stack = [top]
 
     def start(name: str, attributes: dict[str, str]) -> None:
         if len(stack) > _MOST_DEPTH:
             raise ValueError("nested too deeply")
-        element = Element(name, attributes, parser.CurrentLineNumber)
+        element = XmlElement(name, attributes, parser.CurrentLineNumber)
         stack[-1].children.append(element)
         stack.append(element)
 

@@ -9,8 +9,8 @@ from onboard.contract.constants import ANY_STATION, OUTSIDE
 from onboard.contract.messages import CarAt, Reference, TaskReport
 from onboard.core.serial import is_newer
 from onboard.core.site import Station
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.trace.check.tokens_seen import Token
 from onboard.ways.site import way_site
@@ -42,7 +42,7 @@ class CarsConserved(Rule):
     title = "cars conserved, one in a place"
     source = "issue 4, point 1"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._cars: OrderedDict[Reference, CarSeen] = OrderedDict()
         self._at: dict[int, Reference] = {}
@@ -52,62 +52,62 @@ class CarsConserved(Rule):
         """Reads where cars are said to stand."""
         return {CarAt: self._on_car}
 
-    def _on_car(self, event: Event[CarAt]) -> None:
-        said = event.message
-        before = self._cars.get(said.car)
-        if before is not None and is_newer(before.version, said.version, VERSION_BITS):
+    def _on_car(self, event: LogEvent[CarAt]) -> None:
+        claim = event.message
+        before = self._cars.get(claim.car)
+        if before is not None and is_newer(before.version, claim.version, VERSION_BITS):
             return
-        wrong = self._judge_new(said) if before is None else self._judge_step(said, before)
-        wrong = wrong or self._judge_place(said)
+        wrong = self._judge_new(claim) if before is None else self._judge_step(claim, before)
+        wrong = wrong or self._judge_place(claim)
         if wrong:
-            self.find(event, (said.sender,), f"car {said.car.origin}.{said.car.number} {wrong}")
-        self._take_up(said)
+            self.find(event, (claim.sender,), f"car {claim.car.origin}.{claim.car.number} {wrong}")
+        self._take_up(claim)
 
-    def _judge_new(self, said: CarAt) -> str:
+    def _judge_new(self, claim: CarAt) -> str:
         if not self.picture.tokens.from_start:
             return ""
         if not self.picture.has_site:
             return ""
-        bay = way_site(self.picture.site).compartments.get(said.sender)
-        if bay is None or said.station != bay.number or said.car.origin != said.sender:
-            return f"is {_where(said.station)} and never came in"
+        bay = way_site(self.picture.site).compartments.get(claim.sender)
+        if bay is None or claim.station != bay.number or claim.car.origin != claim.sender:
+            return f"is {_where(claim.station)} and never came in"
         return ""
 
-    def _judge_step(self, said: CarAt, before: CarSeen) -> str:
-        step = f"from {_where(before.station)} to {_where(said.station)}"
-        if before.station == said.station:
-            same = said.station != ANY_STATION or said.sender == before.by
-            return "" if same else f"from shuttle {before.by} to shuttle {said.sender}"
+    def _judge_step(self, claim: CarAt, before: CarSeen) -> str:
+        step = f"from {_where(before.station)} to {_where(claim.station)}"
+        if before.station == claim.station:
+            same = claim.station != ANY_STATION or claim.sender == before.by
+            return "" if same else f"from shuttle {before.by} to shuttle {claim.sender}"
         if before.station == OUTSIDE:
             return f"goes {step}"
-        if said.station == OUTSIDE:
+        if claim.station == OUTSIDE:
             return "" if self._is_bay(before.station) else f"goes {step}"
-        if ANY_STATION not in (before.station, said.station):
+        if ANY_STATION not in (before.station, claim.station):
             return f"goes {step} on no shuttle"
-        if before.station == ANY_STATION and said.sender != before.by:
-            handed = self.picture.tokens.under(Token(TokenKind.CAR, _number(said.car)), said.version)
+        if before.station == ANY_STATION and claim.sender != before.by:
+            handed = self.picture.tokens.under(Token(TokenKind.CAR, _number(claim.car)), claim.version)
             if handed is None or handed.giver != before.by:
-                return f"goes {step}, by the word of {said.sender}, from the shuttle of {before.by}"
+                return f"goes {step}, by the word of {claim.sender}, from the shuttle of {before.by}"
         return ""
 
-    def _judge_place(self, said: CarAt) -> str:
-        if said.station == OUTSIDE:
+    def _judge_place(self, claim: CarAt) -> str:
+        if claim.station == OUTSIDE:
             return ""
-        other = self._aboard.get(said.sender) if said.station == ANY_STATION else self._at.get(said.station)
-        if other is None or other == said.car:
+        other = self._aboard.get(claim.sender) if claim.station == ANY_STATION else self._at.get(claim.station)
+        if other is None or other == claim.car:
             return ""
-        return f"is {_where(said.station)}, where car {other.origin}.{other.number} is"
+        return f"is {_where(claim.station)}, where car {other.origin}.{other.number} is"
 
-    def _take_up(self, said: CarAt) -> None:
+    def _take_up(self, claim: CarAt) -> None:
         for places in (self._at, self._aboard):
-            for place in [place for place, car in places.items() if car == said.car]:
+            for place in [place for place, car in places.items() if car == claim.car]:
                 del places[place]
-        if said.station == ANY_STATION:
-            self._aboard[said.sender] = said.car
-        elif said.station != OUTSIDE:
-            self._at[said.station] = said.car
-        self._cars[said.car] = CarSeen(said.station, said.sender, said.version)
-        self._cars.move_to_end(said.car)
+        if claim.station == ANY_STATION:
+            self._aboard[claim.sender] = claim.car
+        elif claim.station != OUTSIDE:
+            self._at[claim.station] = claim.car
+        self._cars[claim.car] = CarSeen(claim.station, claim.sender, claim.version)
+        self._cars.move_to_end(claim.car)
         if len(self._cars) > MOST_CARS:
             oldest = next((car for car, seen in self._cars.items() if seen.station == OUTSIDE), None)
             if oldest is not None:
@@ -126,10 +126,10 @@ class OneCustodian(Rule):
     title = "one custodian a car"
     source = "dbc/fleet.dbc, CarAt; design 5"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._stated: OrderedDict[tuple[int, int], int] = OrderedDict()
-        self._open: list[tuple[Event[TaskReport], int]] = []
+        self._open: list[tuple[LogEvent[TaskReport], int]] = []
         #: The place that each machine named last: a report may be long held up, while nobody acknowledges frames.
         self._named: dict[int, int] = {}
         #: What each machine has told itself to have taken: a report may be said again after the whole site was off.
@@ -151,30 +151,30 @@ class OneCustodian(Rule):
                 what = f"put a car down {_where(report.station)} and does not say which"
                 self.find(event, (report.sender,), what)
 
-    def _on_car(self, event: Event[CarAt]) -> None:
-        said = event.message
+    def _on_car(self, event: LogEvent[CarAt]) -> None:
+        claim = event.message
         if self.picture.tokens.is_frozen(event.time_us):
             # Whoever remembers where a lost machine's car stands says so in its place.
             return
-        self._stated[said.sender, said.station] = event.time_us
-        self._named[said.sender] = said.station
-        self._stated.move_to_end((said.sender, said.station))
+        self._stated[claim.sender, claim.station] = event.time_us
+        self._named[claim.sender] = claim.station
+        self._stated.move_to_end((claim.sender, claim.station))
         if len(self._stated) > MOST_CARS:
             self._stated.popitem(last=False)
-        token = Token(TokenKind.CAR, _number(said.car))
-        handover = self.picture.tokens.under(token, said.version)
-        custodian = handover.holder if handover is not None else said.car.origin if said.version == 1 else None
+        token = Token(TokenKind.CAR, _number(claim.car))
+        handover = self.picture.tokens.under(token, claim.version)
+        custodian = handover.holder if handover is not None else claim.car.origin if claim.version == 1 else None
         last = self.picture.tokens.last(token)
-        if custodian is None and last is not None and is_newer(said.version, last.version, VERSION_BITS):
-            what = f"states car {said.car.origin}.{said.car.number} under version {said.version}, which nobody gave"
-            self.find(event, (said.sender, last.holder), what)
+        if custodian is None and last is not None and is_newer(claim.version, last.version, VERSION_BITS):
+            what = f"states car {claim.car.origin}.{claim.car.number} under version {claim.version}, which nobody gave"
+            self.find(event, (claim.sender, last.holder), what)
         self.picture.unjudged += custodian is None
-        if custodian not in (None, said.sender):
-            car = f"car {said.car.origin}.{said.car.number}"
-            what = f"states {car} under version {said.version}, whose custodian is {custodian}"
-            self.find(event, (said.sender, custodian or 0), what)
+        if custodian not in (None, claim.sender):
+            car = f"car {claim.car.origin}.{claim.car.number}"
+            what = f"states {car} under version {claim.version}, whose custodian is {custodian}"
+            self.find(event, (claim.sender, custodian or 0), what)
 
-    def _on_report(self, event: Event[TaskReport]) -> None:
+    def _on_report(self, event: LogEvent[TaskReport]) -> None:
         report = event.message
         if report.phase is TaskPhase.LOADED:
             self._loaded[report.sender, report.task] = None

@@ -15,8 +15,8 @@ from onboard.contract.messages import (
     Reference,
     TaskReport,
 )
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.ways.site import way_site
 
@@ -37,28 +37,28 @@ class TasksServed(Rule):
     title = "every task is done, or refused with a reason"
     source = "issue 4, point 1"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
-        self._open: OrderedDict[Reference, Event[CallForProposals]] = OrderedDict()
+        self._open: OrderedDict[Reference, LogEvent[CallForProposals]] = OrderedDict()
         self._told: set[Reference] = set()
 
     def handlers(self) -> Handlers:
         """Reads calls, awards and reports of tasks."""
         return {CallForProposals: self._on_call, TaskReport: self._on_report, Award: self._on_award}
 
-    def _on_call(self, event: Event[CallForProposals]) -> None:
+    def _on_call(self, event: LogEvent[CallForProposals]) -> None:
         call = event.message
         if call.depth == 0 and call.operation in (Operation.PARK, Operation.RETRIEVE):
             self._open.setdefault(call.task, event)
 
-    def _on_report(self, event: Event[TaskReport]) -> None:
+    def _on_report(self, event: LogEvent[TaskReport]) -> None:
         report = event.message
         if report.phase is TaskPhase.REFUSED and not report.reason:
             self.find(event, (report.sender,), f"task {report.task.origin}.{report.task.number} is refused without why")
         if report.phase in (TaskPhase.DONE, TaskPhase.REFUSED):
             self._close(report.task)
 
-    def _on_award(self, event: Event[Award]) -> None:
+    def _on_award(self, event: LogEvent[Award]) -> None:
         award = event.message
         opened = self._open.get(award.task)
         if award.result is CallResult.WITHDRAWN and opened is not None and opened.message.sender == award.sender:
@@ -88,33 +88,33 @@ class CustomersServed(Rule):
     source = "issue 4, point 1; docs/decisions.md, flag 6"
     on_devices = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._loads_kg: dict[int, int] = {}
-        self._asked: dict[int, Event[DeskEvent]] = {}
+        self._asked: dict[int, LogEvent[DeskEvent]] = {}
         self._answered: set[int] = set()
-        self._tickets: dict[tuple[int, Reference], Event[DeskEvent]] = {}
+        self._tickets: dict[tuple[int, Reference], LogEvent[DeskEvent]] = {}
         self._told: set[tuple[int, Reference]] = set()
 
     def handlers(self) -> Handlers:
         """Reads what desks are asked and show, and what bays sense."""
         return {DeskEvent: self._on_event, DeskOrder: self._on_word, BayState: self._on_bay}
 
-    def _on_bay(self, event: Event[BayState]) -> None:
+    def _on_bay(self, event: LogEvent[BayState]) -> None:
         node = event.message.sender
         self._loads_kg[node] = event.message.load_kg
         if not event.message.load_kg:
             self._asked.pop(node, None)
             self._answered.discard(node)
 
-    def _on_event(self, event: Event[DeskEvent]) -> None:
-        node, said = event.message.sender, event.message
-        if said.event is not DeskInput.KEY:
-            self._tickets.setdefault((node, said.car), event)
+    def _on_event(self, event: LogEvent[DeskEvent]) -> None:
+        node, desk_event = event.message.sender, event.message
+        if desk_event.event is not DeskInput.KEY:
+            self._tickets.setdefault((node, desk_event.car), event)
         elif self._loads_kg.get(node) and node not in self._answered:
             self._asked.setdefault(node, event)
 
-    def _on_word(self, event: Event[DeskOrder]) -> None:
+    def _on_word(self, event: LogEvent[DeskOrder]) -> None:
         node, word = event.message.sender, event.message
         if word.text in _ANSWERS_TO_KEY:
             self._asked.pop(node, None)
@@ -145,7 +145,7 @@ class FullMeansFull(Rule):
     undisturbed = True
     on_devices = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._inside: set[Reference] = set()
 
@@ -153,10 +153,10 @@ class FullMeansFull(Rule):
         """Cars, and what desks say."""
         return {CarAt: self._on_car, DeskOrder: self._on_word}
 
-    def _on_car(self, event: Event[CarAt]) -> None:
+    def _on_car(self, event: LogEvent[CarAt]) -> None:
         (self._inside.discard if event.message.station == OUTSIDE else self._inside.add)(event.message.car)
 
-    def _on_word(self, event: Event[DeskOrder]) -> None:
+    def _on_word(self, event: LogEvent[DeskOrder]) -> None:
         places = len(way_site(self.picture.site).places)
         if event.message.text is not DeskText.FULL or not self.picture.tokens.from_start:
             return

@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 from onboard.contract.codes import DoorAction, DoorName, DoorPosition, ShuttleMode
 from onboard.contract.messages import BayState, DoorOrder, DoorState, ShuttleState
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.ways.site import way_site
 
-_Seen = Event[DoorState] | Event[BayState] | Event[ShuttleState]
+_Seen = LogEvent[DoorState] | LogEvent[BayState] | LogEvent[ShuttleState]
 
 
 class Doors(Rule):
@@ -23,7 +23,7 @@ class Doors(Rule):
     source = "docs/decisions.md, flag 5; issue 4, point 1"
     on_devices = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._doors: dict[int, DoorState] = {}
         self._inside: dict[int, bool] = {}
@@ -39,7 +39,7 @@ class Doors(Rule):
             ShuttleState: self._on_shuttle,
         }
 
-    def _on_order(self, event: Event[DoorOrder]) -> None:
+    def _on_order(self, event: LogEvent[DoorOrder]) -> None:
         """A door is told to open only while the other one is locked, and the inner one with nobody inside."""
         order = event.message
         doors = self._doors.get(order.sender)
@@ -52,7 +52,7 @@ class Doors(Rule):
         elif inner and self._inside.get(order.sender):
             self.find(event, (order.sender,), "the output door is told to open with a person inside")
 
-    def _on_doors(self, event: Event[DoorState]) -> None:
+    def _on_doors(self, event: LogEvent[DoorState]) -> None:
         state = event.message
         self._doors[state.sender] = state
         locked = DoorPosition.LOCKED
@@ -61,7 +61,7 @@ class Doors(Rule):
         self._judge_person(event, state.sender)
         self._judge_shuttles(event, state.sender)
 
-    def _on_bay(self, event: Event[BayState]) -> None:
+    def _on_bay(self, event: LogEvent[BayState]) -> None:
         node, inside = event.message.sender, event.message.person_inside
         doors, before = self._doors.get(node), self._inside.get(node, inside)
         if doors is not None and inside is not before and doors.input_door is not DoorPosition.OPEN:
@@ -74,7 +74,7 @@ class Doors(Rule):
         holds = doors is not None and self._inside.get(node, False) and doors.output_door is not DoorPosition.LOCKED
         self._state(event, node, "a person is inside while the output door is not locked", holds=holds)
 
-    def _on_shuttle(self, event: Event[ShuttleState]) -> None:
+    def _on_shuttle(self, event: LogEvent[ShuttleState]) -> None:
         self._shuttles[event.message.sender] = event.message
         if self.picture.has_site:
             for node in way_site(self.picture.site).compartments:

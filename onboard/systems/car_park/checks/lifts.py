@@ -10,9 +10,18 @@ from collections.abc import Callable
 from onboard.contract.codes import DriveMode, KindCode
 from onboard.contract.messages import DriveOrder, DriveState, Message, PlatformState, Progress
 from onboard.core.site import Segment
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.geometry import GATE_INDEX, Body, body_of, floor_of, lifts_under, occupied, swept, token_of
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.geometry import (
+    GATE_INDEX,
+    ReportedPosition,
+    body_of,
+    floor_of,
+    lifts_under,
+    occupied,
+    swept,
+    token_of,
+)
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 
 
@@ -25,7 +34,7 @@ class _LiftRule(Rule):
         """Where lifts are, and with device buses what their drives do and are told."""
         return {Progress: self._on_progress, DriveState: self._on_state, DriveOrder: self._on_order}
 
-    def _on_progress(self, event: Event[Progress]) -> None:
+    def _on_progress(self, event: LogEvent[Progress]) -> None:
         track = self._track(event.message.sender)
         body = body_of(self.picture.site, event.message, event.time_us)
         if track is None or body is None:
@@ -34,18 +43,18 @@ class _LiftRule(Rule):
         if body.speed_mm_s or (before is not None and before.position_mm != body.position_mm):
             self._moves(event, track, body.node, "moves")
 
-    def _on_state(self, event: Event[DriveState]) -> None:
+    def _on_state(self, event: LogEvent[DriveState]) -> None:
         track = self._track(event.message.sender)
         if track is not None and event.message.mode is DriveMode.MOVING and event.message.speed_mm_s:
             self._moves(event, track, event.message.sender, "moves")
 
-    def _on_order(self, event: Event[DriveOrder]) -> None:
+    def _on_order(self, event: LogEvent[DriveOrder]) -> None:
         track = self._track(event.message.sender)
         if track is not None:
             self._moves(event, track, event.message.sender, "is sent")
 
     @abstractmethod
-    def _moves(self, event: Event[Message], track: int, node: int, how: str) -> None:
+    def _moves(self, event: LogEvent[Message], track: int, node: int, how: str) -> None:
         """A lift moves, or is about to."""
 
     def _track(self, node: int) -> int | None:
@@ -61,11 +70,11 @@ class LiftByGate(_LiftRule):
     title = "a lift moves only with its gate"
     source = "docs/decisions.md, A lift's platform and its gate are two tokens"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._told: set[int] = set()
 
-    def _moves(self, event: Event[Message], track: int, node: int, how: str) -> None:
+    def _moves(self, event: LogEvent[Message], track: int, node: int, how: str) -> None:
         gate = token_of(Segment(track, GATE_INDEX))
         holder = self.picture.tokens.holder(gate)
         self.picture.unjudged += holder is None
@@ -83,7 +92,7 @@ class LiftCrush(_LiftRule):
     title = "a lift crushing what overhangs its sill"
     source = "issue 4, point 1: found possible in a verified garage model"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._crossing: set[int] = set()
         self._told: set[int] = set()
@@ -92,10 +101,10 @@ class LiftCrush(_LiftRule):
         """Beside the lifts' motions, what their curtains see."""
         return {**super().handlers(), PlatformState: self._on_platform}
 
-    def _on_platform(self, event: Event[PlatformState]) -> None:
+    def _on_platform(self, event: LogEvent[PlatformState]) -> None:
         (self._crossing.add if event.message.crossing else self._crossing.discard)(event.message.sender)
 
-    def _moves(self, event: Event[Message], track: int, node: int, how: str) -> None:
+    def _moves(self, event: LogEvent[Message], track: int, node: int, how: str) -> None:
         site, gate = self.picture.site, Segment(track, GATE_INDEX)
         over = [
             body.node for body in self._robots() if gate in occupied(site, body) and track in lifts_under(site, body)
@@ -107,7 +116,7 @@ class LiftCrush(_LiftRule):
             who = "its curtain sees a body" if node in self._crossing else f"{over[0]} is"
             self.find(event, (node, *over), f"{how} while {who} over its sill")
 
-    def _robots(self) -> list[Body]:
+    def _robots(self) -> list[ReportedPosition]:
         return [body for body in self.picture.bodies.values() if self.picture.kind(body.node) is KindCode.ROBOT]
 
 
@@ -119,7 +128,7 @@ class PlatformThere(Rule):
     source = "docs/decisions.md, A lift's platform and its gate are two tokens"
     needs_site = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._told: set[int] = set()
 
@@ -127,19 +136,19 @@ class PlatformThere(Rule):
         """Where robots are, and with device buses where they are sent."""
         return {Progress: self._on_progress, DriveOrder: self._on_order}
 
-    def _on_progress(self, event: Event[Progress]) -> None:
+    def _on_progress(self, event: LogEvent[Progress]) -> None:
         body = body_of(self.picture.site, event.message, event.time_us)
         if body is not None and self.picture.kind(body.node) is KindCode.ROBOT:
             self._judge(event, body, occupied(self.picture.site, body), "is over")
 
-    def _on_order(self, event: Event[DriveOrder]) -> None:
+    def _on_order(self, event: LogEvent[DriveOrder]) -> None:
         body = self.picture.bodies.get(event.message.sender)
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
         body = self.picture.on_floor(body)
         self._judge(event, body, swept(self.picture.site, body, event.message.target_mm), "is sent over")
 
-    def _judge(self, event: Event[Message], body: Body, slots: list[Segment], how: str) -> None:
+    def _judge(self, event: LogEvent[Message], body: ReportedPosition, slots: list[Segment], how: str) -> None:
         site, wrong = self.picture.site, False
         for slot in slots:
             lift = self.picture.bodies.get(site.stewards.get(slot.track, 0))

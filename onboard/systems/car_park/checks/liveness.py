@@ -7,9 +7,9 @@ from onboard.contract.codes import CallResult, KindCode, Operation, TaskPhase
 from onboard.contract.messages import Award, CallForProposals, CarAt, Message, Progress, Reference, TaskReport, Waiting
 from onboard.core.site import Site
 from onboard.systems.car_park.site import car_park
-from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.geometry import body_of
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.ways.site import Axis
 
@@ -63,7 +63,7 @@ class _OpenTasks(Rule):
 
     needs_site = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self.open: dict[Reference, int] = {}
 
@@ -71,17 +71,17 @@ class _OpenTasks(Rule):
         """Calls, awards and reports."""
         return {CallForProposals: self._on_call, TaskReport: self.on_report, Award: self.on_award}
 
-    def _on_call(self, event: Event[CallForProposals]) -> None:
+    def _on_call(self, event: LogEvent[CallForProposals]) -> None:
         call = event.message
         if call.depth == 0 and call.operation in (Operation.PARK, Operation.RETRIEVE):
             self.open.setdefault(call.task, event.time_us)
 
-    def on_report(self, event: Event[TaskReport]) -> None:
+    def on_report(self, event: LogEvent[TaskReport]) -> None:
         """Ends tasks."""
         if event.message.phase in (TaskPhase.DONE, TaskPhase.REFUSED):
             self.open.pop(event.message.task, None)
 
-    def on_award(self, event: Event[Award]) -> None:
+    def on_award(self, event: LogEvent[Award]) -> None:
         """Ends tasks that nobody wants any more."""
         if event.message.result is CallResult.WITHDRAWN and event.message.sender == event.message.task.origin:
             self.open.pop(event.message.task, None)
@@ -95,9 +95,9 @@ class SomethingHappens(_OpenTasks):
     title = "progress within 60 s while there is work"
     source = "issue 4, point 1"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
-        self._last: Event[Message] | None = None
+        self._last: LogEvent[Message] | None = None
         self._told = False
         self._award: tuple[int, int] | None = None
         self._limit_us = IDLE_WITHIN_US + longest_motion_us(picture.site)
@@ -106,26 +106,26 @@ class SomethingHappens(_OpenTasks):
         """Beside calls and reports, all that moves."""
         return {**super().handlers(), Progress: self._on_progress, CarAt: self._on_event}
 
-    def _on_call(self, event: Event[CallForProposals]) -> None:
+    def _on_call(self, event: LogEvent[CallForProposals]) -> None:
         if not self.open:
             self._happened(event)
         super()._on_call(event)
 
-    def _on_progress(self, event: Event[Progress]) -> None:
+    def _on_progress(self, event: LogEvent[Progress]) -> None:
         before = self.picture.bodies.get(event.message.sender)
         body = body_of(self.picture.site, event.message, event.time_us)
         if before is None or body is None or (body.place, body.speed_mm_s) != (before.place, before.speed_mm_s):
             self._happened(event)
 
-    def _on_event(self, event: Event[CarAt]) -> None:
+    def _on_event(self, event: LogEvent[CarAt]) -> None:
         self._happened(event)
 
-    def on_report(self, event: Event[TaskReport]) -> None:
+    def on_report(self, event: LogEvent[TaskReport]) -> None:
         """A report of a task counts as something that happens."""
         super().on_report(event)
         self._happened(event)
 
-    def on_award(self, event: Event[Award]) -> None:
+    def on_award(self, event: LogEvent[Award]) -> None:
         """A task finds its machine."""
         super().on_award(event)
         award = event.message
@@ -134,7 +134,7 @@ class SomethingHappens(_OpenTasks):
             self._award = (award.sender, award.call)
             self._happened(event)
 
-    def _happened(self, event: Event[Message]) -> None:
+    def _happened(self, event: LogEvent[Message]) -> None:
         self._last, self._told = event, False
 
     def tick(self, now_us: int) -> None:
@@ -161,11 +161,11 @@ class NoRounds(_OpenTasks):
     title = "no task awarded again and again"
     source = "issue 13, point 5"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._calls: dict[Reference, dict[int, set[int]]] = {}
 
-    def on_award(self, event: Event[Award]) -> None:
+    def on_award(self, event: LogEvent[Award]) -> None:
         """One more round, unless it is only said again."""
         super().on_award(event)
         award = event.message
@@ -182,7 +182,7 @@ class NoRounds(_OpenTasks):
             what += f", to {award.winner} for the {len(calls[award.winner])}th"
             self.find(event, (award.sender, award.winner), what)
 
-    def on_report(self, event: Event[TaskReport]) -> None:
+    def on_report(self, event: LogEvent[TaskReport]) -> None:
         """A car that is loaded, or a task that is over, ends the rounds."""
         super().on_report(event)
         if event.message.phase is TaskPhase.LOADED or event.message.task not in self.open:
@@ -201,26 +201,26 @@ class NobodyStarves(Rule):
     source = "issue 3, point 3; issue 4, point 1"
     needs_site = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self.limit_us = patience_us(picture.site)
-        self._waiting: dict[int, Event[Waiting]] = {}
+        self._waiting: dict[int, LogEvent[Waiting]] = {}
         self._told: set[int] = set()
 
     def handlers(self) -> Handlers:
         """Waits, and what ends them."""
         return {Waiting: self._on_waiting, Progress: self._on_progress, TaskReport: self._on_report}
 
-    def _on_waiting(self, event: Event[Waiting]) -> None:
+    def _on_waiting(self, event: LogEvent[Waiting]) -> None:
         self._waiting.setdefault(event.message.sender, event)
 
-    def _on_progress(self, event: Event[Progress]) -> None:
+    def _on_progress(self, event: LogEvent[Progress]) -> None:
         before = self.picture.bodies.get(event.message.sender)
         body = body_of(self.picture.site, event.message, event.time_us)
         if before is None or body is None or body.place != before.place or body.speed_mm_s:
             self._ended(event.message.sender, event.time_us)
 
-    def _on_report(self, event: Event[TaskReport]) -> None:
+    def _on_report(self, event: LogEvent[TaskReport]) -> None:
         self._ended(event.message.sender, event.time_us)
 
     def _ended(self, node: int, now_us: int) -> None:

@@ -7,10 +7,10 @@ from dataclasses import replace
 from onboard.contract.codes import KindCode
 from onboard.contract.messages import DriveOrder, DriveState, Progress
 from onboard.core.site import Segment
-from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.geometry import (
     TOLERANCE_MM,
-    Body,
+    ReportedPosition,
     body_of,
     lifts_under,
     occupied,
@@ -18,7 +18,7 @@ from onboard.trace.check.geometry import (
     swept,
     token_of,
 )
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.ways.site import TrackKind, way_site
 
@@ -39,17 +39,17 @@ class InsideAuthority(Rule):
     source = "design 5: authorised() before each movement order and again while it runs"
     needs_site = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._told: set[tuple[int, Segment]] = set()
         self._sensed_mm: dict[int, int] = {}
-        self._pushed: dict[int, tuple[Event[Progress], Body, int]] = {}
+        self._pushed: dict[int, tuple[LogEvent[Progress], ReportedPosition, int]] = {}
 
     def handlers(self) -> Handlers:
         """Where bodies are, and with device buses where drives are sent."""
         return {Progress: self._on_progress, DriveState: self._on_state, DriveOrder: self._on_order}
 
-    def _on_progress(self, event: Event[Progress]) -> None:
+    def _on_progress(self, event: LogEvent[Progress]) -> None:
         body = body_of(self.picture.site, event.message, event.time_us)
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
@@ -65,7 +65,7 @@ class InsideAuthority(Rule):
         self._judge(event, body, here, "is in")
         self._judge(event, body, ahead, "cannot stop before")
 
-    def _was_pushed(self, body: Body) -> bool:
+    def _was_pushed(self, body: ReportedPosition) -> bool:
         before = self.picture.bodies.get(body.node)
         if before is None or before.track != body.track or before.speed_mm_s or body.speed_mm_s:
             return False
@@ -78,10 +78,10 @@ class InsideAuthority(Rule):
                 del self._pushed[node]
                 self._judge(event, body, occupied(self.picture.site, body), "was pushed, and stays in", now_us)
 
-    def _on_state(self, event: Event[DriveState]) -> None:
+    def _on_state(self, event: LogEvent[DriveState]) -> None:
         self._sensed_mm[event.message.sender] = event.message.position_mm
 
-    def _on_order(self, event: Event[DriveOrder]) -> None:
+    def _on_order(self, event: LogEvent[DriveOrder]) -> None:
         body = self.picture.bodies.get(event.message.sender)
         sensed_mm = self._sensed_mm.get(event.message.sender)
         if body is None or sensed_mm is None or self.picture.kind(body.node) is not KindCode.ROBOT:
@@ -101,8 +101,8 @@ class InsideAuthority(Rule):
 
     def _judge(
         self,
-        event: Event[Progress] | Event[DriveOrder],
-        body: Body,
+        event: LogEvent[Progress] | LogEvent[DriveOrder],
+        body: ReportedPosition,
         slots: list[Segment],
         how: str,
         now_us: int | None = None,
@@ -130,7 +130,7 @@ class OneBody(Rule):
         """Reads where bodies say that they are."""
         return {Progress: self._on_progress}
 
-    def _on_progress(self, event: Event[Progress]) -> None:
+    def _on_progress(self, event: LogEvent[Progress]) -> None:
         site = self.picture.site
         body = body_of(site, event.message, event.time_us)
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
@@ -148,7 +148,7 @@ class OneBody(Rule):
                 if self._is_in_mouth_of(one, two):
                     self.find(event, (body.node, other.node), f"{one.node} in the mouth of spur {two.track}")
 
-    def _is_in_mouth_of(self, one: Body, two: Body) -> bool:
+    def _is_in_mouth_of(self, one: ReportedPosition, two: ReportedPosition) -> bool:
         """Whether a body on an alley is where another turns into a spur, or comes out of it."""
         site = self.picture.site
         if way_site(site).tracks[two.track].kind is not TrackKind.SPUR or len(occupied(site, two)) < 2:

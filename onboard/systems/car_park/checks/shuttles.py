@@ -11,8 +11,8 @@ from onboard.contract.codes import DriveMode, KindCode, ShuttleAction, ShuttleMo
 from onboard.contract.constants import OUTSIDE
 from onboard.contract.messages import CarAt, DriveOrder, DriveState, Reference, ShuttleOrder, ShuttleState
 from onboard.core.site import Segment, Station
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.ways.site import way_site
 
@@ -28,7 +28,7 @@ class ShuttleSeen:
 
     state: ShuttleState
     position_mm: int | None = None
-    told: bool = False
+    is_reported: bool = False
 
     @property
     def is_out(self) -> bool:
@@ -49,7 +49,7 @@ class TornCar(Rule):
     needs_site = True
     on_devices = True
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._shuttles: dict[int, ShuttleSeen] = {}
         self._positions_mm: dict[int, int] = {}
@@ -65,13 +65,13 @@ class TornCar(Rule):
             CarAt: self._on_car,
         }
 
-    def _on_car(self, event: Event[CarAt]) -> None:
+    def _on_car(self, event: LogEvent[CarAt]) -> None:
         if event.message.station == OUTSIDE:
             self._cars.pop(event.message.car, None)
         else:
             self._cars[event.message.car] = event.message
 
-    def _on_shuttle(self, event: Event[ShuttleState]) -> None:
+    def _on_shuttle(self, event: LogEvent[ShuttleState]) -> None:
         state = event.message
         known = self._shuttles.get(state.sender)
         was_out = known is not None and known.is_out
@@ -84,7 +84,7 @@ class TornCar(Rule):
             if node != state.sender and other.is_out and self._station(node, other.state) == station:
                 self.find(event, (state.sender, node), f"two shuttles at {station}")
 
-    def _on_shuttle_order(self, event: Event[ShuttleOrder]) -> None:
+    def _on_shuttle_order(self, event: LogEvent[ShuttleOrder]) -> None:
         order = event.message
         seen = self._shuttles.get(order.sender)
         if seen is None:
@@ -97,7 +97,7 @@ class TornCar(Rule):
         if order.action is ShuttleAction.GRIP:
             self._judge_grip(event, self._station(order.sender, seen.state))
 
-    def _judge_grip(self, event: Event[ShuttleOrder], station: Station | None) -> None:
+    def _judge_grip(self, event: LogEvent[ShuttleOrder], station: Station | None) -> None:
         if station is None:
             self.picture.unjudged += 1
             return
@@ -110,25 +110,25 @@ class TornCar(Rule):
             what = f"grips a car of wheelbase {cars[0].wheelbase_mm} mm at {wheelbase_mm} mm"
             self.find(event, (node,), what)
 
-    def _on_drive(self, event: Event[DriveState]) -> None:
+    def _on_drive(self, event: LogEvent[DriveState]) -> None:
         state = event.message
         self._positions_mm[state.sender] = state.position_mm
         seen = self._shuttles.get(state.sender)
         if seen is None:
             return
         if not seen.is_out or state.mode is DriveMode.STANDING:
-            seen.told = False
-        elif state.speed_mm_s and not seen.told:
-            seen.told = True
+            seen.is_reported = False
+        elif state.speed_mm_s and not seen.is_reported:
+            seen.is_reported = True
             self.find(event, (state.sender,), f"the carrier moves while its shuttle is {seen.state.mode.name}")
 
-    def _on_drive_order(self, event: Event[DriveOrder]) -> None:
+    def _on_drive_order(self, event: LogEvent[DriveOrder]) -> None:
         order = event.message
         seen, position_mm = self._shuttles.get(order.sender), self._positions_mm.get(order.sender)
-        if seen is None or position_mm is None or not seen.is_out or seen.told:
+        if seen is None or position_mm is None or not seen.is_out or seen.is_reported:
             return
         if abs(order.target_mm - position_mm) > STAYS_MM:
-            seen.told = True
+            seen.is_reported = True
             self.find(event, (order.sender,), f"the carrier is sent away while its shuttle is {seen.state.mode.name}")
 
     def _station(self, node: int, state: ShuttleState) -> Station | None:

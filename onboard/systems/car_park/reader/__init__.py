@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from onboard.config.fleet import Fleet
-from onboard.config.reader import Common, Table
+from onboard.config.fleet import FleetReader
+from onboard.config.reader import Common, TomlTable
 from onboard.config.timing import read_timing
 from onboard.contract.codes import KindCode
 from onboard.systems.car_park.reader.alleys import read_layout
@@ -18,7 +18,7 @@ from onboard.systems.car_park.site import CarPark, RideCalls
 from onboard.ways.site import BayUse, charted
 
 
-def read(root: Table, common: Common) -> CarPark:
+def read(root: TomlTable, common: Common) -> CarPark:
     """A car park; every mistake is noted in ``root.problems``, and raised as ``ConfigError`` before room is counted."""
     problems, lift, bitrate = root.problems, root.table("lift"), common.bitrate
     floor_height_mm = lift.integer("floor_height_mm", 1000, 10_000, 2_500)
@@ -68,7 +68,7 @@ def read(root: Table, common: Common) -> CarPark:
     return site
 
 
-def _check_whole(root: Table, layout: Layout, fleet: Fleet, uses: dict[int, BayUse]) -> None:
+def _check_whole(root: TomlTable, layout: Layout, fleet: FleetReader, uses: dict[int, BayUse]) -> None:
     """What no single key tells: that cars can come in and be carried to every place."""
     for kind, table in ((KindCode.COMPARTMENT, "compartments"), (KindCode.ROBOT, "robots")):
         if not root.values.get(table):
@@ -87,7 +87,7 @@ def _check_whole(root: Table, layout: Layout, fleet: Fleet, uses: dict[int, BayU
     _check_joined(root, layout, fleet)
 
 
-def _check_joined(root: Table, layout: Layout, fleet: Fleet) -> None:
+def _check_joined(root: TomlTable, layout: Layout, fleet: FleetReader) -> None:
     """That every alley can be reached from every other, so from every compartment and by every robot."""
     groups = _joined_tracks(layout)
     told = set()

@@ -1,6 +1,6 @@
 """Floors, their alleys, what these are joined by at their ends, and spurs (rows P30, P31)."""
 
-from onboard.config.reader import Table
+from onboard.config.reader import TomlTable
 from onboard.config.toml_lines import path_text
 from onboard.contract.codes import Side
 from onboard.core.site import Segment, Station
@@ -26,7 +26,7 @@ _ONE_WAY = {"both": 0, "rising": 1, "falling": -1}
 _JOINED = 'a position such as "p(*,4)", beside which the alley ends'
 
 
-def read_layout(root: Table, floor_height_mm: int) -> Layout:
+def read_layout(root: TomlTable, floor_height_mm: int) -> Layout:
     """Floors, alleys, lifts and spurs of a site file; ``floor_height_mm`` is the usual one."""
     layout = Layout()
     floors = root.table("floors", required=True)
@@ -44,7 +44,7 @@ def read_layout(root: Table, floor_height_mm: int) -> Layout:
     return layout
 
 
-def _read_floors(layout: Layout, floors: Table, floor_height_mm: int) -> None:
+def _read_floors(layout: Layout, floors: TomlTable, floor_height_mm: int) -> None:
     """The alley that each floor has by itself."""
     count = floors.integer("count", 1, _MOST_ALLEYS)
     positions = floors.integer("positions", 2, _MOST_POSITIONS)
@@ -70,7 +70,7 @@ def _read_floors(layout: Layout, floors: Table, floor_height_mm: int) -> None:
         above_mm += height_mm
 
 
-def _read_sides(table: Table, default: frozenset[Side]) -> frozenset[Side]:
+def _read_sides(table: TomlTable, default: frozenset[Side]) -> frozenset[Side]:
     words = table.items("sides", 'a list such as ["near", "far"]')
     if words is None:
         return default
@@ -83,11 +83,11 @@ def _read_sides(table: Table, default: frozenset[Side]) -> frozenset[Side]:
     return frozenset(sides)
 
 
-def _read_one_way(table: Table, default: int) -> int:
+def _read_one_way(table: TomlTable, default: int) -> int:
     return _ONE_WAY[table.choice("one_way", list(_ONE_WAY), "both")] if table.has("one_way") else default
 
 
-def _read_alley(layout: Layout, table: Table) -> list[Joined]:
+def _read_alley(layout: Layout, table: TomlTable) -> list[Joined]:
     """An alley, on each of its floors one."""
     name = table.text("name")
     if name and ALLEY_NAME.fullmatch(name) is None:
@@ -123,7 +123,7 @@ def _beside(text: str) -> Written | None:
     return written if fits else None
 
 
-def _read_without(layout: Layout, floors: Table) -> None:
+def _read_without(layout: Layout, floors: TomlTable) -> None:
     """Positions without a place: ``p(1,3)N``, both sides ``p(1,3)``, on all floors ``p(*,3)``, a range ``p(1,3-5)``."""
     for number, text in enumerate(floors.items("without", 'a list of places such as ["p(1,3)N"]') or ()):
         written = read_written(text)
@@ -137,7 +137,7 @@ def _read_without(layout: Layout, floors: Table) -> None:
             layout.without |= gone
 
 
-def _read_spurs(layout: Layout, tables: list[Table]) -> None:
+def _read_spurs(layout: Layout, tables: list[TomlTable]) -> None:
     number = FIRST_SPUR
     for table in tables:
         side = table.choice("side", list(SIDES), "far")
@@ -159,7 +159,7 @@ def _read_spurs(layout: Layout, tables: list[Table]) -> None:
             number += 1
 
 
-def _mouths(layout: Layout, table: Table, side: str) -> list[Station | None]:
+def _mouths(layout: Layout, table: TomlTable, side: str) -> list[Station | None]:
     """Where a spur goes off: one, or one on each floor of ``p(*,4)``; None for each that is mistaken."""
     written = table.parsed("at", _beside, "a position", 'a position such as "p(1,4)", which is floor 1, index 4')
     if written is None:

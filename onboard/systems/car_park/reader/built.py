@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
 
-from onboard.config.reader import Table
+from onboard.config.reader import TomlTable
 from onboard.core.site import Station
 from onboard.systems.car_park.outlines import Box, Outlines
 from onboard.systems.car_park.reader.layout import Layout
@@ -23,7 +23,7 @@ _TRACK = re.compile(r"track (\d+)")
 _NAMED = 3
 
 
-def check_built(root: Table, site: CarPark, layout: Layout) -> CarPark:
+def check_built(root: TomlTable, site: CarPark, layout: Layout) -> CarPark:
     """Note what cannot be built or reached; the site without the places that would lie on a way or on each other.
 
     Of two such places that of the alley stays which was read first. A floor with one alley needs no such proof.
@@ -43,7 +43,7 @@ def check_built(root: Table, site: CarPark, layout: Layout) -> CarPark:
     return site
 
 
-def _tell_mismatches(root: Table, layout: Layout, outlines: Outlines) -> None:
+def _tell_mismatches(root: TomlTable, layout: Layout, outlines: Outlines) -> None:
     """Each alley that does not end where it is written to, on the first floor where it does not."""
     told = set()
     for words in outlines.plan.mismatches:
@@ -62,7 +62,7 @@ def _is_more(track: Track) -> bool:
     return (bool(track.ends) and track.kind is TrackKind.ALLEY) or (track.kind is TrackKind.SPUR and track.length > 1)
 
 
-def _check_ways(root: Table, layout: Layout, outlines: Outlines) -> None:
+def _check_ways(root: TomlTable, layout: Layout, outlines: Outlines) -> None:
     """No way lies on another, or on a compartment; where tracks are joined they only touch."""
     site = outlines.site
     told = set()
@@ -103,7 +103,7 @@ def _apart(outlines: Outlines) -> Iterator[Station]:
             yield place
 
 
-def _check_reached(root: Table, site: CarPark) -> None:
+def _check_reached(root: TomlTable, site: CarPark) -> None:
     """Every place from an entry, and from every place to an exit."""
     reach = reachable(site)
     remedy = "join its alley by a lift or another end, or turn one_way"

@@ -1,6 +1,6 @@
 """Classes of places: how long, high and heavy a car may be that is put there, and where one can charge."""
 
-from onboard.config.reader import Table
+from onboard.config.reader import TomlTable
 from onboard.systems.car_park.reader.layout import Layout
 from onboard.systems.car_park.reader.positions import read_written
 from onboard.systems.car_park.site import CarLimits, SizeClass
@@ -9,7 +9,7 @@ from onboard.systems.car_park.site import CarLimits, SizeClass
 _MOST_CLASSES = 15
 
 
-def read_classes(root: Table, layout: Layout, cars: CarLimits) -> tuple[tuple[SizeClass, ...], dict[int, int]]:
+def read_classes(root: TomlTable, layout: Layout, cars: CarLimits) -> tuple[tuple[SizeClass, ...], dict[int, int]]:
     """``[[classes]]`` in the file's order, and the class of each place that has one: its number from 1 by station."""
     tables = root.tables("classes")
     if len(tables) > _MOST_CLASSES:
@@ -38,7 +38,9 @@ def read_classes(root: Table, layout: Layout, cars: CarLimits) -> tuple[tuple[Si
     return tuple(classes), of_place
 
 
-def _read_places(layout: Layout, table: Table, number: int, of_place: dict[int, int], classes: list[SizeClass]) -> None:
+def _read_places(
+    layout: Layout, table: TomlTable, number: int, of_place: dict[int, int], classes: list[SizeClass]
+) -> None:
     """Give the places of one class its number; each place has one at most."""
     there = set(layout.places())
     found = 0

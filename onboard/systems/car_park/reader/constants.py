@@ -7,7 +7,7 @@ are plausible, and measured nowhere.
 
 from dataclasses import dataclass
 
-from onboard.config.reader import Table
+from onboard.config.reader import TomlTable
 from onboard.systems.car_park.site import CarLimits
 from onboard.ways.site import Axis
 
@@ -26,7 +26,7 @@ class Constants:
     cars: CarLimits
 
 
-def read_constants(root: Table, lift: Table, pitch_mm: int) -> Constants:
+def read_constants(root: TomlTable, lift: TomlTable, pitch_mm: int) -> Constants:
     """``[carrier]``, ``[shuttle]``, ``[cars]``, and the speeds of ``[lift]``."""
     carrier, shuttle, cars = (root.table(name) for name in ("carrier", "shuttle", "cars"))
     length_mm = carrier.integer("length_mm", 100, 10_000, min(2_300, pitch_mm - 100))
@@ -44,14 +44,14 @@ def read_constants(root: Table, lift: Table, pitch_mm: int) -> Constants:
     )
 
 
-def _read_axis(table: Table, speed_mm_s: int, acceleration_mm_s2: int) -> Axis:
+def _read_axis(table: TomlTable, speed_mm_s: int, acceleration_mm_s2: int) -> Axis:
     return Axis(
         table.integer("speed_mm_s", 10, 20_000, speed_mm_s),
         table.integer("acceleration_mm_s2", 10, 20_000, acceleration_mm_s2),
     )
 
 
-def _read_cars(table: Table) -> CarLimits:
+def _read_cars(table: TomlTable) -> CarLimits:
     """The wheelbases that the bus can carry (8 bits of 10 mm from 1500 mm) bound what a site can take."""
     limits = CarLimits(
         table.integer("min_wheelbase_mm", 1510, 4050, 1_800),

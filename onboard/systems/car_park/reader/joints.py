@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from onboard.config.reader import Table
+from onboard.config.reader import TomlTable
 from onboard.config.toml_lines import path_text
 from onboard.contract.codes import Side
 from onboard.core.site import Segment
@@ -17,7 +17,7 @@ ENDS = ("from", "to")
 class Joined:
     """An alley on one floor, and what its ends are written to be beside, by their keys."""
 
-    table: Table
+    table: TomlTable
     number: int
     side: str
     ends: dict[str, Written | None]

@@ -7,7 +7,7 @@ the numbers behind, in the order of the file. The model itself is ``onboard/ways
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from onboard.config.reader import Table, type_name
+from onboard.config.reader import TomlTable, type_name
 from onboard.config.toml_lines import path_text
 from onboard.contract.codes import Side
 from onboard.core.site import Segment, Station
@@ -46,11 +46,11 @@ class Layout:
     taken: dict[Station, str] = field(default_factory=dict)
     kept: dict[Segment, str] = field(default_factory=dict)
     without: set[Station] = field(default_factory=set)
-    lifts: list[Table] = field(default_factory=list)
+    lifts: list[TomlTable] = field(default_factory=list)
     floor_mm: dict[int, int] = field(default_factory=dict)
-    low: dict[int, Table] = field(default_factory=dict)
+    low: dict[int, TomlTable] = field(default_factory=dict)
     heading: dict[int, int] = field(default_factory=dict)
-    tables: dict[int, Table] = field(default_factory=dict)
+    tables: dict[int, TomlTable] = field(default_factory=dict)
     pitch_mm: int = 2_400
     known: bool = True
 
@@ -76,13 +76,13 @@ class Layout:
         """The lowest number that no alley has."""
         return 1 + max((number for number in self.tracks if number < FIRST_LIFT), default=0)
 
-    def find(self, table: Table, name: str, *, spurs: bool = False) -> Segment | None:
+    def find(self, table: TomlTable, name: str, *, spurs: bool = False) -> Segment | None:
         """The segment named at a key; None, and a problem noted, where the site has no such alley or spur segment."""
         written = table.parsed(name, one_position, "a position", _FORM)
         return None if written is None else self.judged(table, name, written, spurs=spurs)
 
     def judged(
-        self, table: Table, name: str, written: Written, *, item: int | None = None, spurs: bool = False
+        self, table: TomlTable, name: str, written: Written, *, item: int | None = None, spurs: bool = False
     ) -> Segment | None:
         """The one segment that is meant at a key, or at one ``item`` of the list there; else None, and a problem."""
         if not self.known:
@@ -148,7 +148,7 @@ class Layout:
             if written.side in ("", "NF"[side])
         }
 
-    def take(self, table: Table, front: Segment | None, side: str, *, name: str = "at") -> Station | None:
+    def take(self, table: TomlTable, front: Segment | None, side: str, *, name: str = "at") -> Station | None:
         """Put something other than a place beside a segment, unless something else is there."""
         if front is None:
             return None
@@ -178,7 +178,7 @@ class Layout:
         return f"floors here: 1 to {self.floors}, positions 1 to {longest}"
 
 
-def read_floor_list(layout: Layout, table: Table) -> list[int] | None:
+def read_floor_list(layout: Layout, table: TomlTable) -> list[int] | None:
     """Floors at the key ``floors``, rising, each once; all where it is missing, None where it is mistaken."""
     here = list(range(1, layout.floors + 1))
     written = table.items("floors", "a list of floors such as [1, 2, 3]")

@@ -1,7 +1,7 @@
 """The machines of a car park's site file, and who is steward of what."""
 
-from onboard.config.fleet import Fleet
-from onboard.config.reader import Table
+from onboard.config.fleet import FleetReader
+from onboard.config.reader import TomlTable
 from onboard.config.toml_lines import path_text
 from onboard.contract.codes import KindCode
 from onboard.core.site import Machine, Segment
@@ -11,9 +11,9 @@ from onboard.ways.site import BayUse, Track
 _NOWHERE = Segment(0, 0)
 
 
-def read_fleet(root: Table, layout: Layout) -> tuple[Fleet, dict[int, BayUse]]:
+def read_fleet(root: TomlTable, layout: Layout) -> tuple[FleetReader, dict[int, BayUse]]:
     """Lifts, compartments and robots of a site file, and the compartments that are for one use only, by node-ID."""
-    fleet = Fleet()
+    fleet = FleetReader()
     uses: dict[int, BayUse] = {}
     for number, table in enumerate(layout.lifts, start=FIRST_LIFT):
         fleet.add(table, KindCode.LIFT, Segment(number, 1))
@@ -33,7 +33,7 @@ def read_fleet(root: Table, layout: Layout) -> tuple[Fleet, dict[int, BayUse]]:
     return fleet, uses
 
 
-def _read_home(table: Table, layout: Layout, fleet: Fleet) -> Segment:
+def _read_home(table: TomlTable, layout: Layout, fleet: FleetReader) -> Segment:
     """Where a robot stands at first, as it may stand there for ever: on no sill, front or mouth, and by itself."""
     home = layout.find(table, "home", spurs=True)
     if home is None:
@@ -48,7 +48,7 @@ def _read_home(table: Table, layout: Layout, fleet: Fleet) -> Segment:
     return home
 
 
-def read_stewards(table: Table, layout: Layout, fleet: Fleet) -> dict[int, int]:
+def read_stewards(table: TomlTable, layout: Layout, fleet: FleetReader) -> dict[int, int]:
     """Node-ID of the steward of each track: the one named, else the nearest fixed machine.
 
     Nearest is the lift for its own shaft, and otherwise by floors away, then by node-ID.

@@ -6,7 +6,7 @@ turns towards the lift. The machines in the shafts are read with the others.
 
 from typing import NamedTuple
 
-from onboard.config.reader import Table
+from onboard.config.reader import TomlTable
 from onboard.config.toml_lines import path_text
 from onboard.core.site import Segment
 from onboard.systems.car_park.reader.layout import FIRST_LIFT, FIRST_SPUR, SIDES, Layout, read_floor_list
@@ -42,7 +42,7 @@ def read_lifts(layout: Layout, floor_height_mm: int) -> None:
         layout.kept |= dict.fromkeys(sills, f"the sill of {path_text(table.path)} is")
 
 
-def _read_end(layout: Layout, table: Table) -> list[Segment]:
+def _read_end(layout: Layout, table: TomlTable) -> list[Segment]:
     """Sills at the left or the right end of the alleys that floors have by themselves."""
     end = table.choice("end", ["left", "right"])
     floors = read_floor_list(layout, table) or list(range(1, layout.floors + 1))
@@ -58,11 +58,11 @@ def _read_end(layout: Layout, table: Table) -> list[Segment]:
     return sills
 
 
-def _refuse_one_stop(table: Table, name: str, where: str) -> None:
+def _refuse_one_stop(table: TomlTable, name: str, where: str) -> None:
     table.bad(name, table.values[name], f"this lift would stop at {where}", "a lift joins two floors or more")
 
 
-def _read_doors(layout: Layout, table: Table) -> list[Segment]:
+def _read_doors(layout: Layout, table: TomlTable) -> list[Segment]:
     """Sills behind written doors, floor by floor, in the order of the list on each."""
     if table.has("end"):
         table.bad("end", table.values["end"], "beside doors", "write one of both")
@@ -85,7 +85,7 @@ def _read_doors(layout: Layout, table: Table) -> list[Segment]:
     return sills if not table.wrong else []
 
 
-def _sills_on(layout: Layout, table: Table, doors: list[_Door], floor: int) -> list[Segment]:
+def _sills_on(layout: Layout, table: TomlTable, doors: list[_Door], floor: int) -> list[Segment]:
     here = [door for door in doors if floor in door.written.floors]
     if len(here) > _MOST_DOORS:
         table.bad("doors", table.values["doors"], f"{len(here)} doors on floor {floor}", "a lift has one or two")
@@ -93,7 +93,7 @@ def _sills_on(layout: Layout, table: Table, doors: list[_Door], floor: int) -> l
     return [sill for door in here if (sill := _sill(layout, table, door, floor)) is not None]
 
 
-def _check_stops(layout: Layout, table: Table, sills: list[Segment]) -> None:
+def _check_stops(layout: Layout, table: TomlTable, sills: list[Segment]) -> None:
     written = table.values["doors"]
     stops = {layout.level[sill.track] for sill in sills}
     if len(stops) < _FEWEST_STOPS:
@@ -105,7 +105,7 @@ def _check_stops(layout: Layout, table: Table, sills: list[Segment]) -> None:
         table.bad("doors", written, what, "choose doors of alleys in one direction")
 
 
-def _sill(layout: Layout, table: Table, door: _Door, floor: int) -> Segment | None:
+def _sill(layout: Layout, table: TomlTable, door: _Door, floor: int) -> Segment | None:
     """The segment before the lift: an alley's free end, or the lobby beside it."""
     written = door.written.on(floor)
     before = layout.judged(table, "doors", written, item=door.item)
@@ -145,7 +145,7 @@ def _taken_by(layout: Layout, sill: Segment) -> str:
     return f"{layout.kept[sill]} at {sill}"
 
 
-def _lobby(layout: Layout, table: Table, mouth: Segment, side: str) -> Segment | None:
+def _lobby(layout: Layout, table: TomlTable, mouth: Segment, side: str) -> Segment | None:
     """One segment that goes off an alley, with the lift's door at its far end."""
     station = layout.take(table, mouth, side, name="doors")
     number = layout.next_alley()

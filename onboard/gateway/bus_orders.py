@@ -6,7 +6,7 @@ from typing import Any, Protocol
 from onboard.contract.codes import KindCode
 from onboard.contract.messages import Message, Reference, SyncRequest
 from onboard.core.site import Site
-from onboard.gateway.order import Order, Wish
+from onboard.gateway.order import GatewayOrder, OrderRequest
 
 #: After its start a gateway asks all what they vouch for, and knows the cars so much later, us: answers to one question
 #: come in less.
@@ -22,14 +22,14 @@ class RefusedError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class OrderMessages:
     """What is said for an order now, and when again, us from now; None for never."""
 
     messages: tuple[Message, ...]
     again_us: int | None
 
 
-class Wishes(Protocol):
+class BusOrders(Protocol):
     """One system's way. ``no_pause`` tells why its machines cannot be held; empty where they can."""
 
     no_pause: str
@@ -37,23 +37,23 @@ class Wishes(Protocol):
     def ask_all(self, sender: int) -> tuple[Message, ...]:
         """What is asked of all machines at the start."""
 
-    def transport(self, told: dict[str, Any]) -> Wish:
-        """A transport's wish. Raises ``RefusedError``."""
+    def transport(self, body: dict[str, Any]) -> OrderRequest:
+        """What a transport asks of the bus. Raises ``RefusedError``."""
 
-    def visit(self, node: int, told: dict[str, Any], since: tuple[str, int] | None = None) -> Wish:
-        """A VDA 5050 order's wish to a robot; an update's from ``since`` on. Raises ``RefusedError``."""
+    def visit(self, node: int, body: dict[str, Any], since: tuple[str, int] | None = None) -> OrderRequest:
+        """What a VDA 5050 order asks of a robot; an update's from ``since`` on. Raises ``RefusedError``."""
 
-    def say(self, order: Order, sender: int, wall_us: int) -> Said:
+    def say(self, order: GatewayOrder, sender: int, wall_us: int) -> OrderMessages:
         """Say an order, for the first time or again, at a wall time. Raises ``RefusedError``."""
 
-    def task_of(self, order: Order, message: Message) -> Reference | None:
+    def task_of(self, order: GatewayOrder, message: Message) -> Reference | None:
         """The task that an order has become, where this message tells."""
 
-    def is_done(self, order: Order, message: Message) -> bool:
+    def is_done(self, order: GatewayOrder, message: Message) -> bool:
         """Whether this message tells that what the order asks for is so, whoever did it."""
 
 
-class NoWishes:
+class NoBusOrders:
     """A system that orders cannot be given to in this way."""
 
     def __init__(self, site: Site) -> None:
@@ -64,23 +64,23 @@ class NoWishes:
         """What they vouch for, and who is held."""
         return (SyncRequest(sender, 0),)
 
-    def transport(self, told: dict[str, Any]) -> Wish:
+    def transport(self, body: dict[str, Any]) -> OrderRequest:
         """Raises ``RefusedError``: this system takes no transports from outside."""
         raise RefusedError("UNSUPPORTED", f"a {self._site.system} takes no transports from outside its desks")
 
-    def visit(self, node: int, told: dict[str, Any], since: tuple[str, int] | None = None) -> Wish:
+    def visit(self, node: int, body: dict[str, Any], since: tuple[str, int] | None = None) -> OrderRequest:
         """Raises ``RefusedError``: machines of this system take no orders by name."""
         raise RefusedError("UNSUPPORTED", f"machines of a {self._site.system} take no orders by name")
 
-    def say(self, order: Order, sender: int, wall_us: int) -> Said:
+    def say(self, order: GatewayOrder, sender: int, wall_us: int) -> OrderMessages:
         """Raises ``RefusedError``: no order can have been taken before."""
         raise RefusedError("UNSUPPORTED", "not of this site")
 
-    def task_of(self, order: Order, message: Message) -> Reference | None:
+    def task_of(self, order: GatewayOrder, message: Message) -> Reference | None:
         """None: no message is about an order from outside."""
         return None
 
-    def is_done(self, order: Order, message: Message) -> bool:
+    def is_done(self, order: GatewayOrder, message: Message) -> bool:
         """False: only a report of the task can say so."""
         return False
 
@@ -91,7 +91,7 @@ def is_robot(site: Site, node: int) -> bool:
     return machine is not None and machine.kind in (KindCode.ROBOT, KindCode.VEHICLE)
 
 
-def refuse_load(told: dict[str, Any]) -> None:
+def refuse_load(body: dict[str, Any]) -> None:
     """Where loads have no names of their own. Raises ``RefusedError`` for a transport that names one."""
-    if "load" in told:
+    if "load" in body:
         raise RefusedError("UNSUPPORTED", "loads have no names here", "$.load")

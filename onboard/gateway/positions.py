@@ -16,7 +16,7 @@ from onboard.ways.site import TrackKind, way_site
 
 
 @dataclass(frozen=True, slots=True)
-class Whereabouts:
+class MachinePosition:
     """One machine. ``ahead`` are the nodes still to come, in turn; ``passed`` counts nodes left behind.
 
     ``x_m`` and ``theta`` (rad) are on map ``map_id``, None where the site has no coordinates. ``away_m`` is the way
@@ -38,9 +38,9 @@ class Tracker(Protocol):
     """A fold over the fleet bus."""
 
     def feed(self, message: Message) -> bool:
-        """Take up one message; whether the sender's whereabouts may have changed."""
+        """Take up one message; whether the sender's position may have changed."""
 
-    def where(self, node_id: int) -> Whereabouts:
+    def where(self, node_id: int) -> MachinePosition:
         """What is known of a mobile machine of the site."""
 
 
@@ -49,7 +49,7 @@ class TrackTracker:
 
     def __init__(self, site: Site) -> None:
         self._site = site
-        self._at: dict[int, Whereabouts] = {}
+        self._at: dict[int, MachinePosition] = {}
         self._plans: dict[int, Itinerary] = {}
         self._legs: dict[int, int] = {}
         for machine in site.machines.values():
@@ -75,7 +75,7 @@ class TrackTracker:
                 return True
         return False
 
-    def where(self, node_id: int) -> Whereabouts:
+    def where(self, node_id: int) -> MachinePosition:
         """The segment where the machine is, and those of its plan that lie ahead."""
         at, plan = self._at[node_id], self._plans.get(node_id)
         if plan is None:
@@ -87,12 +87,12 @@ class TrackTracker:
                 ahead.append(node)
         return replace(at, ahead=tuple(ahead))
 
-    def _place(self, segment: Segment, offset_mm: int, speed_mm_s: int, passed: int) -> Whereabouts:
+    def _place(self, segment: Segment, offset_mm: int, speed_mm_s: int, passed: int) -> MachinePosition:
         track = way_site(self._site).tracks.get(segment.track)
         node, driving = str(segment), speed_mm_s != 0
         if track is None:
-            return Whereabouts(node, (), passed, driving)
-        return Whereabouts(
+            return MachinePosition(node, (), passed, driving)
+        return MachinePosition(
             node,
             (),
             passed,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from onboard.contract.codes import CallResult, Grade, LegAction, Operation, TaskPhase
 from onboard.contract.messages import CallForProposals, Itinerary, Leg, Message, Stamp, Waiting
 from onboard.core.serial import ms_after
-from onboard.history.calls import BidMade, Call, CallAnswered, CallOpened
+from onboard.history.calls import BidMade, CallAnswered, CallHistory, CallOpened
 from onboard.history.history import Fact, History
 from onboard.history.tasks import TaskTold
 
@@ -23,7 +23,7 @@ ANSWER = "another's plan"
 
 
 @dataclass
-class Plan:
+class FirmPlan:
     """The last firm itinerary of one machine, and what was heard since that may change it."""
 
     version: int
@@ -33,7 +33,7 @@ class Plan:
 
 
 @dataclass
-class Counts:
+class NegotiationCounts:
     """Everything counted since the last ``begin``; times in us of the log, slack in ms."""
 
     messages: Counter[str] = field(default_factory=Counter)
@@ -53,13 +53,13 @@ class Counts:
     unasked_moves: int = 0
 
 
-class Dealings:
+class NegotiationFold:
     """A view of a history: give it every message of the fleet bus in the order of the log, and what was told by it."""
 
     def __init__(self, history: History) -> None:
-        self.counts = Counts()
+        self.counts = NegotiationCounts()
         self._tasks = history.tasks
-        self._plans: dict[int, Plan] = {}
+        self._plans: dict[int, FirmPlan] = {}
         #: Stamps of awards whose winner has not told its plan yet.
         self._fresh: set[tuple[int, int, int]] = set()
         self._told_us: tuple[int, int] = (0, -ANSWER_US)
@@ -67,7 +67,7 @@ class Dealings:
 
     def begin(self) -> None:
         """Count from now on; open calls and tasks are kept."""
-        self.counts = Counts()
+        self.counts = NegotiationCounts()
 
     def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Take up one message."""
@@ -98,19 +98,19 @@ class Dealings:
         counts.opened_again += call.attempt > 1
         counts.give_way_calls += call.operation is Operation.GIVE_WAY
 
-    def _on_end(self, call: Call, end: CallAnswered) -> None:
+    def _on_end(self, call: CallHistory, end: CallAnswered) -> None:
         award = end.award
         self.counts.refused += award.result is CallResult.REFUSED
         if award.result is CallResult.AWARDED and not call.terms.depth and call.terms.operation in TASKS:
             self._fresh.add((award.winner, award.sender, award.call & 0xFF))
 
-    def _on_done(self, told: TaskTold, time_us: int) -> None:
-        task = told.task
+    def _on_done(self, statement: TaskTold, time_us: int) -> None:
+        task = statement.task
         if task.operation not in TASKS:
             return
         done = self.counts.parked_us if task.operation is Operation.PARK else self.counts.fetched_us
         done.append(time_us)
-        if task.promised_ms is not None and task.owner == told.report.sender:
+        if task.promised_ms is not None and task.owner == statement.report.sender:
             self.counts.slack_ms.append(-ms_after((time_us - (self._clock.offset_us or 0)) // 1000, task.promised_ms))
 
     # --- plans -------------------------------------------------------------------------------------------------
@@ -119,7 +119,7 @@ class Dealings:
         old = self._plans.get(itinerary.sender)
         if old is not None and old.version == itinerary.version:
             return
-        self._plans[itinerary.sender] = Plan(itinerary.version, itinerary.stamp, itinerary.legs)
+        self._plans[itinerary.sender] = FirmPlan(itinerary.version, itinerary.stamp, itinerary.legs)
         teller, told_us = self._told_us
         self._told_us = (itinerary.sender, time_us)
         award = (itinerary.sender, itinerary.stamp.initiator, itinerary.stamp.call)
