@@ -22,7 +22,7 @@ help: ## this list
 run: $(VENV)/.run ## set up, then show an hour of a real day on the standard site in about a minute
 	@$(BIN)/bus-sim run $(ARGS)
 
-check: lint ## set up, lint and types, then the quick tests: under a minute on two quiet processors, no test above a second
+check: lint ## set up, lint and types (of the tests too), then the quick tests: under a minute on two quiet processors, no test above a second
 	@quick=$$($(BIN)/python -m tests.quick) && \
 		$(BIN)/python -m pytest --numprocesses 2 -p tests.quick $(PYTEST_ARGS) $$quick
 

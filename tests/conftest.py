@@ -1,10 +1,11 @@
-"""What holds for every test: repeatable properties, and skips that fail where nothing may be missing.
+"""What holds for every test: repeatable properties, signals that end, and skips that fail where nothing may be missing.
 
 ``pytest --hypothesis-profile explore`` looks for new counterexamples; what it finds becomes an ``@example``.
 """
 
 import hypothesis
 
+from tests.dispositions import give_children_the_default
 from tests.skips import pytest_make_collect_report, pytest_runtest_makereport
 
 __all__ = ["pytest_make_collect_report", "pytest_runtest_makereport"]
@@ -19,3 +20,5 @@ hypothesis.settings.register_profile(
     "explore", max_examples=2_000, deadline=None, database=None, print_blob=True, suppress_health_check=_PATIENT
 )
 hypothesis.settings.load_profile("repeatable")
+
+give_children_the_default()

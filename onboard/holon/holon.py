@@ -39,7 +39,7 @@ from onboard.core.negotiation import EVENT_TYPES, NegotiationEvent, negotiation_
 from onboard.core.records import BootRecord
 from onboard.core.site import Machine, Site
 from onboard.holon.admission import Admission
-from onboard.holon.drops import ToldDrops
+from onboard.holon.fixed_times import FixedTimes
 from onboard.holon.holding import HoldState, MachineHolds
 from onboard.holon.holds import Holds, without_rights
 from onboard.holon.own_number import OwnNumber
@@ -79,7 +79,6 @@ class Holon:
         #: Input dropped here, by reason, and the counts of the shell's decoders and queues below; summed when told.
         self.drops: Counter[Reason] = Counter()
         self.wire_drops: tuple[Counter[Reason], ...] = ()
-        self._told = ToldDrops()
         self.admission = Admission(site)
         self.tokens = TokenBook(site, machine.node_id)
         entries = still_counting(journal, entries)
@@ -112,10 +111,12 @@ class Holon:
         self.rights.is_frozen = self.mirror.is_frozen = lambda: self.regeneration.is_frozen
         if self.holding.why.reason in RIGHTS_LOST:
             self.fleet.has_no_rights, self.witness.doubt = True, Doubt(self.holding.why.reason, NOBODY, journal.why)
-        self._heartbeat_due_us: int | None = None
+        self.fixed = FixedTimes(self.time, self.presence, self.holds, self.fleet, self._all_drops)
         #: When ``wake`` is due, bus time in us; not known after any event but a heartbeat that says nothing new.
         self._due_us: int | None = None
         self.is_due_known = False
+        #: The same of all but what is said at fixed times.
+        self._work_due_us: int | None = None
         self._bus_time_lost = False
         self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
@@ -145,11 +146,11 @@ class Holon:
         # Bus time starts somewhere; the lowest fixed node's start is as good as any.
         self.time.elect(local_us)
         now_us = self.clock.bus_us(local_us)
-        self._heartbeat_due_us = now_us
+        self.fixed.heartbeat_due_us = now_us
         self.presence.begins(now_us)
         if self.journal.is_foreign:
-            return [Report(self.journal.line), *self._beat(now_us)]
-        effects = self._first_entries(self.journal) + self.behaviour.start(now_us) + self._beat(now_us)
+            return [Report(self.journal.line), *self.fixed.words(now_us)]
+        effects = self._first_entries(self.journal) + self.behaviour.start(now_us) + self.fixed.words(now_us)
         return self._settle(effects + self.witness.begin(now_us), now_us)
 
     def _first_entries(self, journal: JournalCondition) -> list[Effect]:
@@ -213,6 +214,8 @@ class Holon:
     def wake(self, local_us: int) -> list[Effect]:
         """Do what has fallen due."""
         local_us = self.time.steady(local_us)
+        if self._only_speaks(local_us):
+            return self._speak(local_us)
         self.is_due_known = False
         # Who has slept counts nobody as silent, so that it does not take itself for the time source.
         effects = self._awake(self.clock.bus_us(local_us))
@@ -229,10 +232,10 @@ class Holon:
             # What was planned before is old; the first word is that of a machine that takes part.
             self.fleet.admissions += 1
             self.fleet.winners.begin_anew(now_us)
-            self._heartbeat_due_us = now_us
+            self.fixed.heartbeat_due_us = now_us
         if not self._bus_time_lost and self.part.begins:
             effects += self._carry_out(self.negotiation.wake(now_us), now_us)
-        effects += self._beat(now_us)
+        effects += self.fixed.words(now_us)
         return self._settle(effects, now_us)
 
     def next_wake(self) -> int | None:
@@ -245,20 +248,39 @@ class Holon:
 
     def _earliest_due(self) -> int | None:
         """When the first of all parts has something to do, bus time in us: a matter of what they know, not of when."""
-        times = [
-            self._heartbeat_due_us,
-            self.time.due_us,
-            self.holding.next_wake(),
-            self.regeneration.next_wake(),
-            self.presence.held_until_us,
-        ]
+        times = [self.holding.next_wake(), self.regeneration.next_wake(), self.presence.held_until_us]
         if not self.holding.is_apart:
             times.append(self.witness.next_wake())
         if self.part.deals:
             times += (self.tokens.next_wake(), self.rights.petition_due())
         if self.part.begins:
             times += (self._negotiation_due(), self.behaviour.next_wake())
-        return min((time for time in times if time is not None), default=None)
+        self._work_due_us = min((time for time in times if time is not None), default=None)
+        return self.fixed.due_us(self._work_due_us)
+
+    def _only_speaks(self, local_us: int) -> bool:
+        """Whether nothing but a word that is said at fixed times is due, and nobody looks for anything."""
+        if self._attentive is None or not self.is_due_known or not self.part.begins:
+            return False
+        now_us = self.clock.bus_us(local_us)
+        if self._work_due_us is not None and self._work_due_us <= now_us:
+            return False
+        if self.clock.is_lost(local_us) != self._bus_time_lost or self.presence.slept(now_us):
+            return False
+        return not self._attentive.watches(now_us)
+
+    def _speak(self, local_us: int) -> list[Effect]:
+        """Say what is said at fixed times; go on with the work only where somebody fell silent, or came back."""
+        self.time.elect(local_us)
+        now_us = self.clock.bus_us(local_us)
+        self.presence.begins(now_us)
+        aside = dict(self.mirror.aside)
+        effects = self.fixed.words(now_us)
+        if aside != self.mirror.aside:
+            self.is_due_known = False
+            return self._settle(effects, now_us)
+        self._due_us = self.fixed.due_us(self._work_due_us)
+        return self._approve(effects)
 
     def _only_waits(self, now_us: int) -> bool:
         """Whether nothing is to be done here unless something happens: nothing is due, and nobody looks for it."""
@@ -268,9 +290,9 @@ class Holon:
 
     def _awake(self, now_us: int) -> list[Effect]:
         """Whoever finds that it has slept is an obstacle first, says so, and asks what it has missed."""
-        if self._heartbeat_due_us is None or not self.presence.awake(now_us):
+        if self.fixed.heartbeat_due_us is None or not self.presence.awake(now_us):
             return []
-        self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
+        self.fixed.heartbeat_due_us = now_us + self.site.timing.heartbeat_us
         self.holding.slept(now_us)
         self.witness.slept(now_us)
         # One by one: all are asked at power-up only.
@@ -290,7 +312,7 @@ class Holon:
         self._bus_time_lost &= heard in (TimeHeard.NOTHING, TimeHeard.REFUTED)
         match heard:
             case TimeHeard.REFUTED:
-                return [self._bus_time(now_us)]
+                return [self.fixed.bus_time(now_us)]
             case TimeHeard.FIRST:
                 return self._begin(now_us)
             case TimeHeard.SET_ANEW:
@@ -300,7 +322,7 @@ class Holon:
     def _begin(self, now_us: int) -> list[Effect]:
         """Bus time is known: the first word, and what was sensed before."""
         self.presence.begins(now_us)
-        self._heartbeat_due_us = now_us
+        self.fixed.heartbeat_due_us = now_us
         effects: list[Effect] = []
         for early in self._sensed_early.values():
             effects += self._settle(self.behaviour.sense(early, now_us), now_us)
@@ -359,7 +381,7 @@ class Holon:
         effects = self.witness.on_request(request, now_us)
         if self.clock.is_source:
             # Who asks may just have joined: it need not wait for the next period.
-            effects = [self._bus_time(now_us), *effects]
+            effects = [self.fixed.bus_time(now_us), *effects]
         return effects
 
     def _statements(self, now_us: int) -> list[Effect]:
@@ -413,6 +435,10 @@ class Holon:
         else:
             if self.part.begins:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
+        return self._approve(effects)
+
+    def _approve(self, effects: list[Effect]) -> list[Effect]:
+        """What of all effects may leave this machine: nothing moves without authority, nor is a right said without."""
         fault = self.fleet.motion.fault(effects, self.site.moved_by)
         if fault is not None:
             return self._halt(fault, Reason.NOT_AUTHORISED)
@@ -446,22 +472,8 @@ class Holon:
                 effects.append(item)
         return effects
 
-    def _beat(self, now_us: int) -> list[Effect]:
-        effects: list[Effect] = []
-        if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
-            self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
-            self.presence.review(now_us)
-            effects += self.holds.words() + self.mirror.forgotten()
-            effects += self._told.words(self.node_id, sum(self.wire_drops, Counter(self.drops)))
-            effects += [Send(word) for word in self.presence.halted_ones(now_us)]
-            effects += [Send(self.presence.standing_word(node)) for node in self.fleet.winners.stuck(now_us)]
-        if self.time.due_us is not None and self.time.due_us <= now_us:
-            self.time.due_us = now_us + self.site.timing.bus_time_us
-            effects.append(self._bus_time(now_us))
-        return effects
-
-    def _bus_time(self, now_us: int) -> Effect:
-        return Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS))
+    def _all_drops(self) -> Counter[Reason]:
+        return sum(self.wire_drops, Counter(self.drops))
 
     def _heartbeat(self) -> Heartbeat:
         return Heartbeat(

@@ -58,21 +58,26 @@ class Presence:
 
         It then waits until the others have said what they plan by now.
         """
-        before_us, self._active_us = self._active_us, now_us
-        slept = before_us is not None and now_us - before_us > SLEPT_BEATS * self.site.timing.heartbeat_us
+        slept = self.slept(now_us)
+        self._active_us = now_us
         if slept:
             self.listen_anew(now_us)
         return slept
+
+    def slept(self, now_us: int) -> bool:
+        """Whether this machine has done nothing for so long that others may have missed its word."""
+        before_us = self._active_us
+        return before_us is not None and now_us - before_us > SLEPT_BEATS * self.site.timing.heartbeat_us
 
     def lives_on(self, beat: Heartbeat, now_us: int) -> bool:
         """Note a heartbeat that says nothing new: its sender's last word again, of a machine that takes part.
 
         False, and nothing is noted, where it may be news: the sender or I was not heard for long, or it is an obstacle.
         """
-        peer, before_us = self.mirror.peers.get(beat.sender), self._active_us
+        peer = self.mirror.peers.get(beat.sender)
         if peer is None or peer.beat != beat or now_us - peer.heard_at_us >= self.patience_us:
             return False
-        if before_us is None or now_us - before_us > SLEPT_BEATS * self.site.timing.heartbeat_us:
+        if self._active_us is None or self.slept(now_us):
             return False
         if beat.sender in self.mirror.aside or beat.sender in self.foreign or beat.sender in self.halts:
             return False

@@ -100,7 +100,7 @@ class MqttBroker:
 
 
 class MqttSession:
-    """``ports.Session``: one aiomqtt client that is connected."""
+    """``BrokerSession``: one aiomqtt client that is connected."""
 
     def __init__(self, client: aiomqtt.Client) -> None:
         self.client = client

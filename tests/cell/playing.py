@@ -24,7 +24,10 @@ M = TypeVar("M", bound=Message)
 
 
 def cell(
-    *goals: GoalDemand, arms: tuple[Arm, ...] = ARMS, obstacles: tuple[Area, ...] = (), desks: tuple[int, ...] = (DESK,)
+    *goals: GoalDemand,
+    arms: tuple[Arm, ...] = ARMS,
+    obstacles: tuple[Area, ...] = (),
+    desks: tuple[int, ...] = (DESK,),
 ) -> Cell:
     """A cell with these goals; by default the paper's robots, and nothing in the way."""
     site = find_site("cell")

@@ -24,7 +24,7 @@ def test_a_short_journal_begins_anew_before_what_follows_is_said(renews: bool) -
     site, loop, said = find_site("level1"), VirtualTimeLoop(), list[Message]()
     simulation = build(site, RunOptions(), loop)
 
-    def start(_: int) -> list[Effect]:
+    def start(local_us: int) -> list[Effect]:
         first = Renew(ENTRIES) if renews else Record(BootRecord(9))
         return [first, Send(SyncRequest(ROBOT, 0))]
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from deploy.image.disk import FAT32_LBA, LINUX, SIGNATURE, DiskPartition, boot_record, starts, write_disk
+from deploy.image.disk import FAT32_LBA, LINUX, DiskPartition, boot_record, starts, write_disk
+from deploy.update.board import SIGNATURE
 from deploy.wheels import DeployError
 
 

@@ -3,7 +3,8 @@
 import pytest
 
 from bus_sim.campaign.points import reference
-from bus_sim.campaign.trial import RunVerdict, play
+from bus_sim.campaign.report import RunVerdict
+from bus_sim.campaign.trial import play
 from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from tests.faults.world import watch

@@ -16,7 +16,7 @@ def shortest(edges: Edges, start: Way, goal: int) -> Way | None:
         done = sorted(way for way in frontier if way[-1] == goal)
         if done:
             return done[0]
-        grown = {}
+        grown: dict[tuple[int, int], Way] = {}
         for way in sorted(frontier):
             for one in edges:
                 if way[-1] in one:

@@ -1,6 +1,7 @@
 """Graph sites made for tests."""
 
 import random
+from collections.abc import Sequence
 from typing import Any
 
 from bus_sim.options import RunOptions
@@ -16,7 +17,7 @@ Wanted = tuple[int, str, tuple[int, ...]]
 
 
 def site_text(
-    graph: Graph, homes: tuple[int, ...], orders: list[Wanted], rules: Rules, capacity: int = 4, hosts: int = 2
+    graph: Graph, homes: tuple[int, ...], orders: Sequence[Wanted], rules: Rules, capacity: int = 4, hosts: int = 2
 ) -> str:
     """A site file: ``hosts`` machines share the nodes, robots R1, R2, ... stand in ``homes`` at first."""
     edges = ", ".join(f"[{one}, {other}, {length}]" for (one, other), length in sorted(graph.lengths_mm.items()))
@@ -34,7 +35,11 @@ def site_text(
 
 
 def made(
-    graph: Graph, homes: tuple[int, ...], orders: list[Wanted], rules: Rules = Rules.EDGE_AND_NODE, capacity: int = 4
+    graph: Graph,
+    homes: tuple[int, ...],
+    orders: Sequence[Wanted],
+    rules: Rules = Rules.EDGE_AND_NODE,
+    capacity: int = 4,
 ) -> FactoryGraph:
     """The site of such a file."""
     site = parse_site(site_text(graph, homes, orders, rules, capacity), "made.toml")

@@ -35,7 +35,7 @@ def _least(lengths: dict[tuple[int, int], int], behind: int, node: int, goal: in
     """Every way without reversing that is not longer than ``room``."""
     if node == goal:
         return 0
-    found = []
+    found: list[int] = []
     for ends, length in lengths.items():
         if node in ends and behind not in ends and length <= room:
             rest = _least(lengths, node, sum(ends) - node, goal, min([room - length, *found]))

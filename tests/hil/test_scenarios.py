@@ -130,7 +130,7 @@ def test_a_device_that_forgets_its_life_is_found_out(tmp_path: Path) -> None:
 
 
 def test_input_that_is_dropped_for_no_good_reason_is_a_fault(tmp_path: Path) -> None:
-    told = []
+    told: list[Effect] = []
 
     def complains(controller: Controller, effect: Effect) -> Effect | None:
         if isinstance(effect, Send) and isinstance(effect.message, Heartbeat) and not told:

@@ -111,7 +111,7 @@ def test_gone_and_back_it_goes_on_with_its_subscribers() -> None:
             board.why_not = BusOpenError("no such device", may_come=True)
             board.opened[-1].lost.set_result("network is down")
             await asyncio.sleep(5 * RETRY_S)
-            assert bus.is_away and board.opened[-1].closed and losses == list(range(1, cycle + 1))
+            assert [bus.is_away, board.opened[-1].closed] == [True, True] and losses == list(range(1, cycle + 1))
             board.why_not = None
             await asyncio.sleep(RETRY_S)
             assert not bus.is_away and bus.send(FRAME)

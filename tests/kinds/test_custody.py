@@ -68,7 +68,7 @@ GIVEN = [token_entry("token_held", 1, BAY), token_entry("token_given", 2, ROBOT)
 
 def machine(node: int, entries: Iterable[Entry] = ()) -> Holon:
     """A machine with its journal, that knows the bus time; no other is there that could know better."""
-    past = [{"record": "boot", "boot": 1}, *entries] if entries else []
+    past: list[Entry] = [{"record": "boot", "boot": 1}, *entries] if entries else []
     made = Holon(
         SITE, SITE.machines[node], factory_for(SITE, SITE.machines[node].kind), boot=len(past[:1]) + 1, entries=past
     )

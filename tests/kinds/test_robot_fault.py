@@ -21,7 +21,7 @@ def test_a_shuttle_that_fails_right_after_a_restart_does_not_keep_the_robot_awak
     robot.receive(BusTime(STEWARD, 0), 0)
     home_mm = (SITE.machines[ROBOT].home.index - 1) * SITE.tracks[1].pitch_mm
     robot.sense(DriveState(ROBOT, 0, home_mm, 0, DriveMode.STANDING, True), 10)
-    assert robot.behaviour.state is MachineState.STARTING, "a pause until the others have said what they plan"
+    assert [robot.behaviour.state] == [MachineState.STARTING], "a pause until the others have said what they plan"
     robot.sense(ShuttleState(ROBOT, 0, ShuttleMode.FAULT, 0, Side.NEAR, 0, 2_500), 20)
     for now_us in range(STEP_US, 10 * STEP_US, STEP_US):
         robot.wake(now_us)

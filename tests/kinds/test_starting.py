@@ -90,13 +90,12 @@ def test_nothing_goes_on_before_the_shuttle_was_seen() -> None:
 def test_a_first_life_too_takes_part_only_with_its_shuttle_seen_at_home() -> None:
     board = Board()
     board.stands(6)
-    assert board.holon.behaviour.state is MachineState.STARTING
-    board.shuttle(ShuttleMode.REACHED)
-    assert board.holon.behaviour.state is MachineState.STOPPED
-    board.shuttle(ShuttleMode.HOME)
-    assert board.holon.behaviour.state is MachineState.IDLE
-    board.shuttle(ShuttleMode.MOVING)
-    assert board.holon.behaviour.state is MachineState.STOPPED, "whoever moves it by hand makes it an obstacle"
+    states = [board.holon.behaviour.state]
+    for mode in (ShuttleMode.REACHED, ShuttleMode.HOME, ShuttleMode.MOVING):
+        board.shuttle(mode)
+        states.append(board.holon.behaviour.state)
+    stopped = MachineState.STOPPED
+    assert states == [MachineState.STARTING, stopped, MachineState.IDLE, stopped], "moved by hand it is an obstacle"
 
 
 def test_pushed_away_while_it_listens_it_says_where_it_is_then() -> None:

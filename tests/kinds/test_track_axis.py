@@ -10,7 +10,7 @@ HALF_MM = 1_150
 
 
 def test_a_spur_has_its_mouth_one_pitch_before_its_segment() -> None:
-    assert (SPUR.lowest, SPUR.highest, SPUR.mouth) == (0, 1, MOUTH)
+    assert (SPUR.lowest, SPUR.highest, SPUR.mouths) == (0, 1, {0: MOUTH})
     assert (SPUR.position_mm(0), SPUR.position_mm(1)) == (-2_400, 0)
     assert [SPUR.index_at(mm) for mm in (-2_400, -1_300, -1_100, 0)] == [0, 0, 1, 1]
 
@@ -32,5 +32,5 @@ def test_a_body_is_in_both_slots_until_it_is_wholly_inside() -> None:
 
 def test_an_alley_does_not_care_for_the_spurs_beside_it() -> None:
     alley = TrackAxis(SPUR.site, 1)
-    assert (alley.lowest, alley.highest, alley.mouth) == (1, 12, None)
+    assert (alley.lowest, alley.highest, alley.mouths) == (1, 12, {})
     assert alley.rights([6, 7]) == [[Segment(1, 6)], [MOUTH]]

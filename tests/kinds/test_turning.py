@@ -84,9 +84,9 @@ def test_with_both_it_is_sent_in_and_tells_of_the_turn() -> None:
     assert set(one.occupied()) == {MOUTH, INSIDE}
     one.sense(state(-PITCH_MM, DriveMode.MOVING, across=True), 2, 1, 1)
     one.sense(state(0, across=True), 3, 1, 1)
-    assert not one.arrived, "it has not heard the last order yet"
+    assert [one.arrived] == [False], "it has not heard the last order yet"
     one.sense(state(0, across=True, sequence=one.sequence), 3, 1, 1)
-    assert one.arrived and one.occupied() == [INSIDE]
+    assert (one.arrived, one.occupied()) == (True, [INSIDE])
     given = [e.message for e in one.advance(3) if isinstance(e, Send) and isinstance(e.message, TokenGrant)]
     assert [(m.token, m.holder) for m in given] == [(MOUTH.number, STEWARD)]
 
@@ -99,12 +99,12 @@ def test_out_it_drives_into_the_mouth_first_and_then_turns() -> None:
     one.go(MOUTH)
     assert orders(one.advance(1)) == [(-PITCH_MM, True)]
     one.sense(state(-PITCH_MM, across=True), 2, 1, 2)
-    assert not one.arrived
+    assert [one.arrived] == [False]
     assert orders(one.advance(2)) == [(MOUTH_MM, False)]
     one.sense(state(-PITCH_MM, DriveMode.TURNING, across=True), 3, 1, 2)
     assert orders(one.advance(3)) == [], "the same order stands"
     assert places(one.sense(state(MOUTH_MM, sequence=one.sequence), 4, 1, 2)) == [(1, 7, 0)]
-    assert one.arrived and one.track == 1
+    assert (one.arrived, one.track) == (True, 1)
 
 
 def test_a_way_given_up_before_the_turn_leaves_it_on_the_alley() -> None:

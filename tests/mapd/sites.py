@@ -35,7 +35,8 @@ def site_text(robots: int, tasks: list[tuple[int, str, str]], step_ms: int = 100
 def drawn(count: int, seed: int, every: int = 1) -> list[tuple[int, str, str]]:
     """Tasks between endpoints, drawn."""
     chance = random.Random(f"mapd:{seed}")
-    return [(number * every, *chance.sample(ENDPOINTS, 2)) for number in range(count)]
+    ways = [chance.sample(ENDPOINTS, 2) for _ in range(count)]
+    return [(number * every, start, end) for number, (start, end) in enumerate(ways)]
 
 
 def made(robots: int, tasks: list[tuple[int, str, str]]) -> Mapd:

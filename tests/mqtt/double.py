@@ -126,7 +126,7 @@ class DoubleBroker:
 
 
 class DoubleSession:
-    """``ports.Session``."""
+    """``BrokerSession``."""
 
     def __init__(self, broker: DoubleBroker, will: Publication | None, waiting: list[Publication]) -> None:
         """``waiting`` is what the client has not taken, with QoS 1."""

@@ -53,7 +53,7 @@ async def mosquitto(tmp_path: Path, keys: Path) -> AsyncIterator[Mosquitto]:
 
 async def heard_until(broker: MqttBroker, patterns: tuple[str, ...], last: bytes, ready: asyncio.Event) -> set[str]:
     """Topics heard by one that subscribes, up to a payload that ends it."""
-    found = set()
+    found: set[str] = set()
     async with asyncio.timeout(20), broker.session("listener", None, patterns) as session:
         ready.set()
         async for one in session.incoming():
@@ -85,7 +85,7 @@ async def test_each_role_reads_what_it_may_and_nothing_else(mosquitto: Mosquitto
             async with mosquitto.broker(writer).session("writer", None, ()) as session:
                 for topic in sorted(topics):
                     await session.publish(Publication(topic, b"x", 1))
-        found = set()
+        found: set[str] = set()
         async with asyncio.timeout(20):
             while len(found) < len(MAY_READ[role]):
                 one = await anext(reader.incoming())

@@ -69,7 +69,7 @@ def three_floors(home: str = "p(1,2)", upper: int = 6) -> CarPark:
 
 @dataclass
 class HandTimer:
-    callback: Callable[[], None] | None
+    callback: Callable[[], object] | None
 
     def cancel(self) -> None:
         self.callback = None
@@ -86,7 +86,7 @@ class HandTimers:
     def now_us(self) -> int:
         return self._now_us
 
-    def call_at(self, when_us: int, callback: Callable[[], None]) -> HandTimer:
+    def call_at(self, when_us: int, callback: Callable[[], object]) -> HandTimer:
         timer = HandTimer(callback)
         self._count += 1
         heapq.heappush(self._heap, (max(when_us, self._now_us), self._count, timer))

@@ -29,7 +29,8 @@ def test_a_customer_comes_parks_and_fetches_their_car() -> None:
     # Reaction 1 s, driving 10 to 30 s, walking 4 to 8 s, and the script's tick.
     assert customer.visit.in_wait_us is not None
     assert 15 * SECOND <= customer.visit.in_wait_us <= 40 * SECOND
-    assert bench.world.where["blue"] in bench.site.places
+    parked_at = bench.world.where["blue"]
+    assert parked_at in bench.site.places
     bench.timers.run_until(900 * SECOND)
     assert (customer.state, customer.visit.outcome) == (CustomerState.GONE, VisitOutcome.SERVED)
     assert customer.visit.asked_us == 600 * SECOND

@@ -21,12 +21,12 @@ def test_takes_a_car_aboard_and_leaves_it_elsewhere() -> None:
     bench.timers.run_for(1)
     for sequence, action in enumerate((ShuttleAction.REACH, ShuttleAction.GRIP, ShuttleAction.RETRACT), 1):
         bench.shuttle(action, sequence)
-    assert bench.world.where["blue"] == Aboard(ROBOT)
+    was = [bench.world.where["blue"]]
     assert bench.links[ROBOT].last(ShuttleState).load_kg == CAR.mass_kg
     bench.drive_to_index(9, 1)
     for sequence, action in enumerate((ShuttleAction.REACH, ShuttleAction.RELEASE, ShuttleAction.RETRACT), 4):
         bench.shuttle(action, sequence)
-    assert bench.world.where["blue"] == Station(1, 9, Side.FAR)
+    assert [*was, bench.world.where["blue"]] == [Aboard(ROBOT), Station(1, 9, Side.FAR)]
     last = bench.links[ROBOT].last(ShuttleState)
     assert (last.mode, last.load_kg, last.extension_mm) == (ShuttleMode.HOME, 0, 0)
     changes = [mode.name for mode in dict.fromkeys(states(bench))]

@@ -16,6 +16,7 @@ def test_a_test_that_takes_more_than_a_second_of_processor_time_fails_by_name(
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     monkeypatch.setattr(quick, "LIMIT_S", 0.05)
+    pytester.makeini("[pytest]\nasyncio_default_fixture_loop_scope = function")
     pytester.makepyfile(
         test_it="""
         import time

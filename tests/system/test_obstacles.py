@@ -61,7 +61,7 @@ def plans(scene: Scene, node: int, from_s: float, to_s: float) -> int:
 def test_a_blocked_segment_is_gone_around_and_touches_only_the_plans_through_it() -> None:
     scene = scene_with("blocked:track=1,index=3,at_s=44,for_s=60")
     assert_all_served(scene)
-    assert [m.reason for _, m in [*scene.all(Blocked), *scene.all(Clear)]] == [Reason.OPERATOR] * 2
+    assert [m.reason for _, m in scene.all(Blocked)] + [m.reason for _, m in scene.all(Clear)] == [Reason.OPERATOR] * 2
     assert plans(scene, FIRST, 44, 60) >= 1, "its way led through it"
     assert plans(scene, OTHER, 44, 60) == 0
     over = [p for t, p in scene.all(Progress) if 50e6 < t < 104e6 and (p.track, p.index) == (1, 3)]

@@ -110,7 +110,7 @@ def test_p54_the_picture_shows_the_plant_as_it_is(run: tuple[Simulation, list[st
 def test_p54_the_picture_fits_the_terminal_with_the_newest_event_the_figures_and_the_address(
     name: str, size: tuple[int, int]
 ) -> None:
-    site, (width, height) = find_site(name), size
+    site, (width, height) = car_park(find_site(name)), size
     view = SiteView(site)
     view.history.lives.states = dict.fromkeys(site.machines, MachineState.STARTING)
     for number in range(40):

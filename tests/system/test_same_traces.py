@@ -5,7 +5,6 @@ in docs/decisions.md.
 """
 
 import hashlib
-import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -46,4 +45,4 @@ def renew(source: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(renew(Path(__file__)))
+    renew(Path(__file__))

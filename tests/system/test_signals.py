@@ -1,5 +1,6 @@
 """A supervisor's SIGTERM, a closed terminal: the log is whole, and no process is left behind."""
 
+import argparse
 import os
 import re
 import select
@@ -17,7 +18,8 @@ import pytest
 from onboard.cli import main as onboard
 from onboard.trace import cli as trace
 from onboard.trace.candump_reader import CandumpReader
-from tests.tools import require_tool
+from tests.dispositions import SENT
+from tests.tools import require_tool, run_tool
 
 ROOT = Path(__file__).parents[2]
 #: Only where something hangs.
@@ -102,6 +104,18 @@ def frames(log: Path) -> int:
         return sum(1 for _ in CandumpReader(lines))
 
 
+def test_whoever_ignores_signals_the_programs_of_the_tests_do_not() -> None:
+    """As under nohup, and in the background of a shell."""
+    names = ", ".join(f"signal.{number.name}" for number in SENT)
+    look = f"import signal; print([signal.getsignal(n) is signal.SIG_IGN for n in ({names})])"
+    shell = (
+        f"import signal, subprocess, sys; [signal.signal(n, signal.SIG_IGN) for n in ({names})]; "
+        "from tests.dispositions import give_children_the_default; give_children_the_default(); "
+        f"subprocess.run([sys.executable, '-c', {look!r}], check=True)"
+    )
+    assert run_tool(sys.executable, "-c", shell) == "[False, False, False]\n"
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_a_run_with_processes_and_a_broker_leaves_its_log_and_nobody(number: signal.Signals, tmp_path: Path) -> None:
     require_tool("mosquitto")
@@ -175,7 +189,7 @@ def test_a_look_at_a_log_ends_by_its_own_way_out(monkeypatch: pytest.MonkeyPatch
     parser = trace.build_parser()
     parser.set_defaults(run=slow_command)
     monkeypatch.setattr(trace, "build_parser", lambda: parser)
-    monkeypatch.setattr(parser, "parse_known_args", lambda _: (trace.argparse.Namespace(run=slow_command), []))
+    monkeypatch.setattr(parser, "parse_known_args", lambda _: (argparse.Namespace(run=slow_command), []))
     assert onboard(["trace", "dump"]) == 130
     assert closed == ["file"]
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL

@@ -185,8 +185,8 @@ def _typed(verb: Verb, what: int, count: int = 0, to: str = "S1", source: str = 
 def test_a_mission_that_comes_in_part_or_twice_is_carried_out_once_and_whole() -> None:
     orders = MissionBook(SITE, 1)
     one, other, end = _typed(Verb.TRANSHIP, box("B3")), _typed(Verb.TRANSHIP, box("B4")), _typed(Verb.END, 0, 2)
-    assert orders.key(one) is orders.answer(one) is None
-    assert orders.key(end) is orders.answer(end) is None, "one of two boxes was not heard"
+    assert (orders.key(one), orders.answer(one)) == (None, None)
+    assert (orders.key(end), orders.answer(end)) == (None, None), "one of two boxes was not heard"
     assert [orders.key(key) is None for key in (one, other, end)] == [True, True, False]
     assert orders.answer(end) is True
     again = MissionBook(SITE, 1)

@@ -47,8 +47,9 @@ def client(token: str | None = None) -> TestClient:
 
 def answer(socket: Any, text: str) -> dict[str, Any]:
     socket.send_text(text)
-    while "answer" not in (told := json.loads(socket.receive_text())):
-        pass
+    told: dict[str, Any] = {}
+    while "answer" not in told:
+        told = json.loads(socket.receive_text())
     return told
 
 

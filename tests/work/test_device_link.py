@@ -57,7 +57,7 @@ def test_an_order_that_failed_is_given_anew() -> None:
 
 def test_what_is_not_permitted_is_not_said_and_is_due_again_later() -> None:
     drive = link()
-    assert drive.order(GO, MAY_NOT, 0) == [] and drive.wanted is None
+    assert (drive.order(GO, MAY_NOT, 0), drive.wanted) == ([], None)
     drive.order(GO, PERMIT, 0)
     assert drive.order(ENTER, MAY_NOT, AGAIN_US) == []
     assert (drive.wanted, drive.due_us) == (GO, 2 * AGAIN_US)

@@ -39,7 +39,7 @@ class _LookedAt(TerminalStage):
     look: Callable[[TerminalRun], None]
 
     def show(self, console: Console) -> Show:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return _Looking(self.run, self.look)
 
 

@@ -6,15 +6,15 @@ from itertools import pairwise
 
 from onboard.core.site import Segment
 from onboard.ways.lifts import gate, lift_at, platform
-from onboard.ways.site import Track, TrackKind, WaySite
+from onboard.ways.site import Track, WaySite
 
 
 @dataclass(frozen=True)
 class TrackAxis:
     """The axis of an alley or a spur: index 1 at 0 mm.
 
-    On an alley index 0 and length + 1 are the platforms of the lifts that stop there. On a spur index 0 is its mouth, a
-    pitch before index 1: a body there is turned, or turning, and needs both slots.
+    Index 0 and length + 1 are the platforms of the lifts that stop there, or the mouths of linked ends, a pitch beyond:
+    a body there is turned, or turning, and needs both slots.
     """
 
     site: WaySite
@@ -34,26 +34,32 @@ class TrackAxis:
         return self.track.pitch_mm
 
     @cached_property
-    def mouth(self) -> Segment | None:
-        """The alley segment that a spur joins; None for an alley."""
-        return self.track.joins[0] if self.track.kind is TrackKind.SPUR else None
+    def mouths(self) -> dict[int, Segment]:
+        """By index the segments of other tracks in which this one's linked ends are."""
+        return dict(self.track.ends)
 
     @cached_property
     def lowest(self) -> int:
         """First index of the axis."""
-        return 1 if self.mouth is None and lift_at(self.site, Segment(self.number, 0)) is None else 0
+        return 0 if self._goes_on(0) else 1
 
     @cached_property
     def highest(self) -> int:
         """Last index of the axis."""
-        length = self.track.length
-        return length if lift_at(self.site, Segment(self.number, length + 1)) is None else length + 1
+        return self.track.length + self._goes_on(self.track.length + 1)
+
+    def _goes_on(self, index: int) -> bool:
+        return index in self.mouths or lift_at(self.site, Segment(self.number, index)) is not None
+
+    def end_at(self, mouth: Segment) -> int | None:
+        """The index that a segment of another track is on this one, None where this one does not end there."""
+        return next((index for index, at in self.mouths.items() if at == mouth), None)
 
     @cached_property
     def lifts(self) -> tuple[int, ...]:
         """Lifts, by track, whose platforms are at the ends of this axis."""
         ends = (lift_at(self.site, Segment(self.number, index)) for index in (0, self.track.length + 1))
-        return () if self.mouth is not None else tuple(lift for lift in ends if lift is not None)
+        return tuple(lift for lift in ends if lift is not None)
 
     def position_mm(self, index: int) -> int:
         """Centre of a segment, mm from that of index 1."""
@@ -65,9 +71,10 @@ class TrackAxis:
         return max(self.lowest, min(self.highest, index))
 
     def slot(self, index: int) -> Segment:
-        """The body slot of an index: a segment of the track, a lift's platform, or a spur's mouth."""
-        if index == 0 and self.mouth is not None:
-            return self.mouth
+        """The body slot of an index: a segment of the track, a lift's platform, or a mouth."""
+        mouth = self.mouths.get(index)
+        if mouth is not None:
+            return mouth
         lift = lift_at(self.site, Segment(self.number, index))
         return Segment(self.number, index) if lift is None else platform(lift)
 
@@ -99,10 +106,11 @@ class TrackAxis:
         held = [self.slot(index) for index in indices]
         for one, other in pairwise(indices):
             held += self.crossing(one, other)
-        held += [slot for slot in self._beside(indices[-1]) if slot not in held]
+        for index in dict.fromkeys((indices[-1], indices[0])):
+            held += [slot for slot in self._beside(index) if slot not in held]
         self._overlaps[lowest, highest] = held
         return held
 
     def _beside(self, index: int) -> list[Segment]:
-        """What a body needs beside the slot that it is in: whoever turns in a mouth, the spur."""
-        return [Segment(self.number, 1)] if index == 0 and self.mouth is not None else []
+        """What a body needs beside the slot that it is in: whoever turns in a mouth, the segment inside."""
+        return [self.track.inside(index)] if index in self.mouths else []

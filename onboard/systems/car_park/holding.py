@@ -15,7 +15,6 @@ from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.program import HandlingPhase
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.mirror import WayFleet
-from onboard.ways.site import TrackKind
 from onboard.work.manual import Manual
 
 
@@ -70,8 +69,8 @@ class RobotHold:
             return True
         if step.work is not None:
             return self.shuttle.phase is HandlingPhase.ACQUIRE
-        tracks = (step.track, self.carriage.track)
-        return step.action is LegAction.TRAVEL and all(site.tracks[one].kind is not TrackKind.SPUR for one in tracks)
+        turns = step.from_index == step.to_index or step.track != self.carriage.track
+        return step.action is LegAction.TRAVEL and not turns
 
     def come_to_rest(self, now_us: int) -> list[Effect]:
         """Drive on to where the drive was last sent, which is the end of the rights held, and ask for nothing beyond.

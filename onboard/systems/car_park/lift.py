@@ -32,7 +32,7 @@ from onboard.systems.car_park.lift_generation import LiftGeneration
 from onboard.systems.car_park.records import RideOverRecord, RideRecord
 from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.stewardship import Stewardship
-from onboard.ways.lifts import MARK_TOLERANCE_MM, gate, platform, under_gate
+from onboard.ways.lifts import MARK_TOLERANCE_MM, gate, nearest_stop, platform, stop_mm, under_gate
 from onboard.ways.mirror import WayFleet
 
 #: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps.
@@ -364,7 +364,9 @@ class Lift:
 
     def _set_off(self, ride: Ride, now_us: int) -> list[Effect]:
         self.ride, self.phase = ride, LiftPhase.RIDING
-        return [Record(RideRecord(ride.robot, ride.board, ride.leave)), *self._go(ride.leave, now_us)]
+        begun: list[Effect] = [Record(RideRecord(ride.robot, ride.board, ride.leave))]
+        # From one door to the other of the same stop nothing moves.
+        return begun + (self._when_riding(now_us) if self._stands_at(ride.leave) else self._go(ride.leave, now_us))
 
     def _rides_onward(self, now_us: int) -> Ride | None:
         """Where whoever is aboard says that it rides on from this floor, without having given the platform back.
@@ -415,16 +417,14 @@ class Lift:
         return self.fleet.tokens.holds(segment_token(platform(self.track)))
 
     def _position_mm(self, index: int) -> int:
-        return (index - 1) * self.fleet.site.tracks[self.track].pitch_mm
+        return stop_mm(self.fleet.site, self.track, index)
 
     def _index(self) -> int:
         assert self.drive is not None
         return self._nearest(self.drive.position_mm)
 
     def _nearest(self, position_mm: int) -> int:
-        track = self.fleet.site.tracks[self.track]
-        index = (position_mm + track.pitch_mm // 2) // track.pitch_mm + 1
-        return max(1, min(track.length, index))
+        return nearest_stop(self.fleet.site, self.track, position_mm)
 
     def _stands_at(self, index: int) -> bool:
         drive = self.drive

@@ -14,6 +14,7 @@ from onboard.contract.messages import CallForProposals, Itinerary, Leg, Referenc
 from onboard.core.serial import from_bus_ms, successor, to_bus_ms
 from onboard.core.site import Segment, Station
 from onboard.ways.lifts import lift_at, platform_on, sill
+from onboard.ways.occupancy import hop_origins
 from onboard.ways.site import WaySite
 
 #: Most steps that fit in an itinerary: the leg number has 5 bits.
@@ -102,6 +103,13 @@ class Program:
     current: int = 0
     version: int = 0
     stamp: Stamp = field(default_factory=lambda: Stamp(0, 0, 0))
+    #: A leg of no length before the steps, where only it tells through which mouth the first one comes.
+    named: tuple[CarStep, ...] = ()
+
+    @property
+    def leg(self) -> int:
+        """Number of the leg in hand in the itinerary as it was told last."""
+        return self.current + len(self.named)
 
     @property
     def step(self) -> CarStep | None:
@@ -216,8 +224,17 @@ class Program:
     def _tell_anew(self, steps: list[CarStep]) -> None:
         self._place()
         self.steps = steps
+        self.named = self._named(steps)
         self.current = 0
         self.version = successor(self.version, 8)
+
+    def _named(self, steps: list[CarStep]) -> tuple[CarStep, ...]:
+        first = steps[0] if 0 < len(steps) < MAX_STEPS else None
+        hops = first is not None and first.action is LegAction.TRAVEL and first.from_index == first.to_index
+        if first is None or not hops or len(hop_origins(self.site, first.destination)) == 1:
+            return ()
+        here = self._place()
+        return (CarStep(LegAction.STAND, here.track, here.index, here.index, first.begin_us, first.begin_us),)
 
     def itinerary(self, sender: int, now_us: int) -> Itinerary:
         """The firm itinerary as it goes on the bus; one STAND leg where nothing is left to do."""
@@ -227,7 +244,8 @@ class Program:
         if not _reaches(stamp, steps, now_us):
             # Hours late, or awarded while a clock was wrong: its place among the plans is that of one made now.
             stamp = stamp._replace(award_ms=to_bus_ms(now_us))
-        return to_itinerary(sender, self.version, Grade.FIRM, stamp, steps)
+        named = () if self.current else self.named
+        return to_itinerary(sender, self.version, Grade.FIRM, stamp, [*named, *steps])
 
 
 def standing_itinerary(sender: int, version: int, stamp: Stamp, place: Segment, now_us: int) -> Itinerary:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from onboard.core.authority import segment_token
 from onboard.core.effects import Effect
 from onboard.systems.car_park.sill import SillProof
-from onboard.ways.lifts import gate, platform
+from onboard.ways.lifts import gate, is_same_stop, platform
 from onboard.ways.mirror import WayFleet
 
 
@@ -42,5 +42,5 @@ class Riding:
             return tokens.want(key, now_us)
         if not tokens.holds(segment_token(platform(self.lift_track))):
             return []
-        self.done = self.sill.stands_at(self.lift_track) == self.leave
+        self.done = is_same_stop(self.fleet.site, self.lift_track, self.sill.stands_at(self.lift_track), self.leave)
         return self.sill.ask([self.lift_track], now_us)

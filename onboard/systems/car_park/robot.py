@@ -149,7 +149,7 @@ class ParkingRobot:
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """Drive and shuttle states."""
         if isinstance(message, DriveState):
-            return self.carriage.sense(message, now_us, self.program.version, self.program.current)
+            return self.carriage.sense(message, now_us, self.program.version, self.program.leg)
         if isinstance(message, ShuttleState):
             effects = self.shuttle.sense(message, now_us)
             if self.shuttle.fault and self._fault is Reason.NONE:
@@ -346,7 +346,7 @@ class ParkingRobot:
         effects: list[Effect] = []
         itinerary = self.fleet.mirror.itineraries.get(self.fleet.node_id)
         if itinerary is not None:
-            effects += [Send(itinerary), *self.carriage.statement(self.program.version, self.program.current)]
+            effects += [Send(itinerary), *self.carriage.statement(self.program.version, self.program.leg)]
         # An initiator that was restarted learns that its task is in hand.
         effects += self._taken_on(self.program.works())
         effects += custody.statements(self.fleet) + self.holding.manual.statement()
@@ -406,7 +406,7 @@ class ParkingRobot:
                 # Before the turn: the drive tells only that it is across, not in which spur.
                 return [floor_record(step.track)]
         elif step.action is LegAction.RIDE:
-            told = self.carriage.statement(self.program.version, self.program.current)
+            told = self.carriage.statement(self.program.version, self.program.leg)
             return [ride_record(step), *told, *self.riding.begin(step.track, step.to_index)]
         else:
             # A way that was given up while its rights were awaited is not gone when they come.

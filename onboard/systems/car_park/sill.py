@@ -12,7 +12,7 @@ from onboard.contract.messages import Progress, SyncRequest
 from onboard.core.authority import segment_token
 from onboard.core.effects import Effect, Send
 from onboard.core.site import Segment
-from onboard.ways.lifts import GATE_INDEX, gate, lift_index_of, platform, says_standing
+from onboard.ways.lifts import GATE_INDEX, gate, is_same_stop, lift_index_of, platform, says_standing
 from onboard.ways.mirror import WayFleet
 
 #: Who holds a gate and has not heard where its lift stands asks for it after so long, and again, us: a lift that moves
@@ -41,7 +41,8 @@ class SillProof:
         if slot.index != GATE_INDEX or slot.track not in self.fleet.site.lifts:
             return Reason.NONE
         here = lift_index_of(self.fleet.site, slot.track, floor)
-        return Reason.NONE if here is not None and self.stands_at(slot.track) == here else Reason.DOOR_NOT_READY
+        there = self.stands_at(slot.track)
+        return Reason.NONE if is_same_stop(self.fleet.site, slot.track, there, here) else Reason.DOOR_NOT_READY
 
     def ask(self, lifts: Iterable[int], now_us: int) -> list[Effect]:
         """Ask each of these lifts whose gate is held for its word, where that has not come a while after, and again."""
@@ -62,8 +63,8 @@ class SillProof:
 
         It took the robot for one that boards there; with both back it looks anew.
         """
-        at, tokens = self.stands_at(lift_track), self.fleet.tokens
-        if at is None or at == lift_index_of(self.fleet.site, lift_track, floor):
+        at, site, tokens = self.stands_at(lift_track), self.fleet.site, self.fleet.tokens
+        if at is None or is_same_stop(site, lift_track, at, lift_index_of(site, lift_track, floor)):
             return []
         effects: list[Effect] = []
         lift = self.fleet.site.stewards[lift_track]

@@ -4,12 +4,12 @@ The drive's target is always the centre of the last segment of an unbroken line 
 inside its authority at any moment; orders are repeated only while ``authorised`` still agrees, and a drive that hears
 nothing brakes by itself.
 
-Into a spur a carrier turns in its mouth, and back into the alley there too. From the beginning of a leg into the spur
-until it is turned back its axis is the spur's, with the mouth at index 0; there it needs both slots before it turns.
+Through a mouth a carrier turns into another track, and out of it there too (``placing``). In the mouth it needs that
+slot and the one inside before it turns.
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from onboard.contract.codes import DriveMode, Reason, TokenKind
 from onboard.contract.messages import DriveOrder, DriveState, Progress, Waiting
@@ -19,6 +19,7 @@ from onboard.core.motion_authority import ALONE, Permit, authorised
 from onboard.core.serial import successor
 from onboard.core.site import Segment
 from onboard.systems.car_park.axis import TrackAxis
+from onboard.systems.car_park.placing import Placing
 from onboard.systems.car_park.sill import SillProof
 from onboard.systems.car_park.stall import Stall
 from onboard.ways.all_or_none import AllOrNone
@@ -33,8 +34,6 @@ LOOKAHEAD_US = 3_000_000
 #: A holder's view of the order that has differed from mine for this long will not be mended by asking again, us:
 #: several answers have come and gone.
 ORDER_PATIENCE_US = 5_000_000
-#: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps.
-OFF_LIMIT_MM = 20_000
 
 
 @dataclass
@@ -54,7 +53,6 @@ class Carriage:
     #: Where the drive was sent, by the order's sequence, since the one that it goes by: whatever the goal is by now.
     _sent: dict[int, Segment] = field(default_factory=dict)
     _reported: Segment | None = None
-    _axes: dict[int, TrackAxis] = field(default_factory=dict)
     #: What ``advance`` looked at when it last found nothing to do.
     _settled: tuple[object, ...] | None = None
     #: Where the carrier stood by the last word of its sensors, on which track and after which order.
@@ -66,21 +64,17 @@ class Carriage:
     whole: AllOrNone = field(init=False)
     sill: SillProof = field(init=False)
     stall: Stall = field(default_factory=Stall)
+    placing: Placing = field(init=False)
 
     def __post_init__(self) -> None:
+        self.placing = Placing(self.fleet.site)
         self.whole = AllOrNone(self.fleet.tokens)
         self.sill = SillProof(self.fleet)
 
     @property
     def axis(self) -> TrackAxis:
-        """The alley that the carrier is on, or the spur that it is in, turns into or comes out of."""
-        return self._axes.get(self.track) or self._axis_of(self.track)
-
-    def _axis_of(self, track: int) -> TrackAxis:
-        axis = self._axes.get(track)
-        if axis is None:
-            axis = self._axes[track] = TrackAxis(self.fleet.site, track)
-        return axis
+        """The track that the carrier is on, turns into or comes out of."""
+        return self.placing.axis(self.track)
 
     @property
     def standing_at(self) -> Segment | None:
@@ -88,7 +82,7 @@ class Carriage:
 
         Both must say so: the measured way, which tells the marks apart, and the fine sensor, which sees one (row P34).
 
-        On a lift's platform it is index 0 or length + 1 of the alley, turned in a spur's mouth index 0 of the spur.
+        On a lift's platform it is index 0 or length + 1 of the alley; so it is turned in a mouth, of the track inside.
         """
         now = (self.track, self.sequence)
         if self._stood is None or self._stood[0] is not self.sensed or self._stood[1] != now:
@@ -112,7 +106,7 @@ class Carriage:
         if self.sensed is None:
             raise ValueError("no position is known yet")
         index = self.axis.index_at(self.sensed.position_mm)
-        return Segment(self.track, index) if index or self.axis.mouth is None else self.axis.mouth
+        return self.axis.mouths.get(index) or Segment(self.track, index)
 
     @property
     def way_out(self) -> Segment | None:
@@ -134,6 +128,7 @@ class Carriage:
 
     def ride_to(self, floor: int) -> None:
         """The platform under the carrier has come to another floor: the same position on another alley."""
+        self.sensed = self.placing.ridden(self.sensed, self.track, floor)
         self.track = floor
         self._sent.clear()
         self.goal = None
@@ -152,46 +147,26 @@ class Carriage:
 
     @property
     def _in_mouth(self) -> Segment | None:
-        """The mouth where the carrier stands before it turns, the spur's axis already in hand; else None."""
-        state = self.sensed
-        if state is None or state.across or state.mode is DriveMode.TURNING:
-            return None
-        return self.axis.mouth
-
-    def _placed(self, state: DriveState) -> DriveState | None:
-        """A drive's word on the axis in hand, which is the alley's once it has turned back; None where it fits none."""
-        mouth = self.axis.mouth
-        if mouth is None:
-            return None if state.across else state
-        if state.across:
-            return state
-        if state.mode is DriveMode.TURNING or (self.goal is not None and self.goal.track == self.track):
-            return self._moved_to(state, mouth, Segment(self.track, 0))
-        self.track = mouth.track
-        return state
-
-    def _moved_to(self, state: DriveState, here: Segment, there: Segment) -> DriveState:
-        """The same place, which is ``here`` on one axis, as ``there`` on another."""
-        site = self.fleet.site
-        by_mm = site.position_mm(there) - site.position_mm(here)
-        return replace(state, position_mm=state.position_mm + by_mm)
+        """The mouth where the carrier stands before it turns, the axis inside already in hand; else None."""
+        return self.placing.unturned(self.sensed, self.track)
 
     def _told_at(self, state: DriveState) -> tuple[Segment, int]:
-        """Position and offset in mm as the fleet is told; index 0 of a spur is turned, or turning, in its mouth."""
+        """Position and offset in mm as the fleet is told; beyond a linked end is turned, or turning, in the mouth."""
         index = self.axis.index_at(state.position_mm)
         offset_mm = state.position_mm - self.axis.position_mm(index)
         return self._in_mouth or Segment(self.track, index), offset_mm
 
     def sense(self, state: DriveState, now_us: int, itinerary_version: int, leg: int) -> list[Effect]:
         """Take up the drive's state: tell the fleet when the body is in another segment, starts or stops."""
-        if self._is_far_off(state):
+        if self.placing.is_far_off(state, self.track):
             self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
         self.stall.sensed(state.position_mm, now_us)
         before = self.sensed
         if before is None:
             self.sequence = state.sequence
-        self.sensed = placed = self._placed(state)
+        self.track, placed = self.placing.placed(state, self.track, self.goal)
+        self.sensed = placed
         if placed is None:
             # Turned into some spur, but nobody remembers which.
             return []
@@ -200,12 +175,6 @@ class Carriage:
         if here == self._reported and not started_or_stopped:
             return []
         return self.statement(itinerary_version, leg)
-
-    def _is_far_off(self, state: DriveState) -> bool:
-        # One that has turned back out of a spur speaks of the alley's marks already.
-        mouth = self.axis.mouth
-        axis = self.axis if mouth is None or state.across else self._axis_of(mouth.track)
-        return abs(state.position_mm - axis.position_mm(axis.index_at(state.position_mm))) > OFF_LIMIT_MM
 
     def statement(self, itinerary_version: int, leg: int) -> list[Effect]:
         """Where the body is, in leg ``leg`` of the itinerary as told; nothing where no position is known.
@@ -230,25 +199,14 @@ class Carriage:
             self.blocked = None
             if goal not in self.whole.slots:
                 self.whole.end()
-            self._face(goal)
+            if self.sensed is not None and goal.track != self.track:
+                self.track, self.sensed = self.placing.faced(self.sensed, self.track, goal)
 
     def stay(self) -> None:
         """Drop the goal: the drive gets no more orders, and brakes by itself where it moves."""
         self.goal = self.target = self.blocked = self.refresh_at_us = None
         self.stall.rests()
         self.whole.end()
-
-    def _face(self, goal: Segment) -> None:
-        """Take the axis of a goal in hand where that is another one and the carrier is not turned away from it."""
-        if self.sensed is None or goal.track == self.track:
-            return
-        mouth = TrackAxis(self.fleet.site, goal.track).mouth
-        if mouth is not None and mouth.track == self.track:
-            self.sensed = self._moved_to(self.sensed, mouth, Segment(goal.track, 0))
-            self.track = goal.track
-        elif self._in_mouth is not None:
-            self.sensed = self._moved_to(self.sensed, Segment(self.track, 0), self._in_mouth)
-            self.track = goal.track
 
     def advance(self, now_us: int) -> list[Effect]:
         """Ask for the segments ahead, extend the drive's target as far as they are held, and repeat its order."""
@@ -357,8 +315,8 @@ class Carriage:
         """Indices from where the body is to the goal, the goal included, in the order of travel."""
         assert self.goal is not None and self.sensed is not None
         here = self.axis.index_at(self.sensed.position_mm)
-        # Out of a spur the way on this axis ends in the mouth.
-        there = self.goal.index if self.goal.track == self.track else 0
+        # Out of this track the way on its axis ends in the mouth.
+        there = self.goal.index if self.goal.track == self.track else self.placing.way_out(self.track, self.goal)
         step = 1 if there >= here else -1
         return list(range(here, there + step, step))
 
@@ -402,11 +360,11 @@ class Carriage:
 
     @property
     def _turns_back(self) -> bool:
-        """Whether the carrier is out of a spur in its mouth, and all that is left is to turn into the alley."""
+        """Whether the carrier is in the mouth of its track, and all that is left is to turn out of it."""
         state = self.sensed
         if state is None or self.goal is None or self.goal.track == self.track:
             return False
-        off_mm = abs(state.position_mm - self.axis.position_mm(0))
+        off_mm = abs(state.position_mm - self.axis.position_mm(self.placing.way_out(self.track, self.goal)))
         return state.mode in (DriveMode.STANDING, DriveMode.TURNING) and off_mm <= MARK_TOLERANCE_MM
 
     def _hold(self, ahead: list[int], reason: Reason) -> list[Effect]:
@@ -429,9 +387,9 @@ class Carriage:
         self._sent[self.sequence] = self.target
         self.stall.ordered(now_us)
         self.refresh_at_us = now_us + self.fleet.site.timing.drive_refresh_us
-        site = self.fleet.site
-        position_mm, across = site.position_mm(self.target), site.tracks[self.target.track].kind is TrackKind.SPUR
-        order = DriveOrder(self.fleet.node_id, self.sequence, position_mm, site.carrier.speed_mm_s, across)
+        site, target = self.fleet.site, self.target
+        tape_mm, across = self.placing.tape_mm(target), site.across(target.track)
+        order = DriveOrder(self.fleet.node_id, self.sequence, tape_mm, site.carrier.speed_mm_s, across)
         return permit.order(order)
 
     def _give_back(self, now_us: int) -> list[Effect]:

@@ -5,7 +5,6 @@ where the contract says, to the sub-contractor and nobody else. A contract in ha
 them is ``active``, the most urgent whose part this robot may take (row C15).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from onboard.contract.cell import ArmMode, ArmPhase, ArmProgress, GripAction, GripMode, PartAt
@@ -28,6 +27,7 @@ from onboard.systems.cell.memory import Undertaking, lost_record, stage_record, 
 from onboard.systems.cell.motion import ArmDriver
 from onboard.systems.cell.records import ContractStage
 from onboard.systems.cell.site import Cell
+from onboard.systems.cell.steps import TABLE, Deed, Finding
 from onboard.work.device_link import DeviceLink
 from onboard.work.undertaking import TaskEvent, Undertakings
 
@@ -77,7 +77,6 @@ class ArmRobot:
     _unsure: set[Reference] = field(default_factory=set)
     _progress_at_us: int | None = None
     _told: tuple[ArmPhase, ArmMode] | None = None
-    _table: dict[ArmPhase, Callable[[Undertaking, int], list[Effect]]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         site = self.generation.site
@@ -103,12 +102,6 @@ class ArmRobot:
                     self._call_at_us[one.task] = 0
                     self._unsure.add(one.task)
         self._engage()
-        self._table = {
-            ArmPhase.TO_PART: self._when_going_there,
-            ArmPhase.TAKING: self._when_taking,
-            ArmPhase.CARRYING: self._when_carrying,
-            ArmPhase.PUTTING: self._when_putting,
-        }
 
     # --- the Behaviour -----------------------------------------------------------------------------------------
 
@@ -183,9 +176,9 @@ class ArmRobot:
             return []
         effects = self._want_parts(now_us) + self._manage(now_us) + self._give_back(now_us)
         if self.active is None:
-            effects += self._choose(now_us)
+            effects += self._step(now_us)
         if self.active is not None:
-            effects += self._table[self.phase](self.tasks.in_hand[self.active], now_us)
+            effects += self._step(now_us)
         if self._progress_at_us is not None and self._progress_at_us <= now_us:
             self._told = None
             effects += self._progress(now_us)
@@ -376,56 +369,77 @@ class ArmRobot:
 
     # --- steps -------------------------------------------------------------------------------------------------
 
-    def _choose(self, now_us: int) -> list[Effect]:
+    def _step(self, now_us: int) -> list[Effect]:
+        """One line of ``TABLE``; a new phase is told after what it follows from."""
+        one = self._in_hand or self._next()
+        phase, deed = TABLE[self.phase, self._found(one)]
+        return self._do(deed, one, now_us) + self._to(phase, now_us)
+
+    @property
+    def _in_hand(self) -> Undertaking | None:
+        return self.tasks.in_hand[self.active] if self.active is not None else None
+
+    def _next(self) -> Undertaking | None:
         """The part that is aboard, else the most urgent of those that I may take (row C15)."""
         ready = [
             one
             for one in self.tasks.in_hand.values()
             if one.stage in (ContractStage.WON, ContractStage.TAKEN) and self.fleet.tokens.holds(_part_token(one))
         ]
-        if not ready:
-            return self._to(ArmPhase.WAITING if self.tasks.in_hand else ArmPhase.IDLE, now_us)
-        one = min(ready, key=lambda one: (one.stage is not ContractStage.TAKEN, one.contract.goal.urgency))
-        self.active = one.task
-        return self._to(ArmPhase.TO_PART if one.stage is ContractStage.WON else ArmPhase.TAKING, now_us)
+        return min(
+            ready, key=lambda one: (one.stage is not ContractStage.TAKEN, one.contract.goal.urgency), default=None
+        )
 
-    def _when_going_there(self, one: Undertaking, now_us: int) -> list[Effect]:
-        if not self.driver.stands_at(one.contract.goal.start):
-            return self.driver.go(one.contract.goal.start, part_token(one.contract.goal.part), now_us)
-        one.stage = ContractStage.TAKEN
-        self._engage()
-        return [*self.driver.rest(), stage_record(one), *self._to(ArmPhase.TAKING, now_us)]
+    def _found(self, one: Undertaking | None) -> Finding:
+        """What contracts, tokens and the devices' last words come to for ``one``, in hand or to be chosen."""
+        if one is None:
+            return Finding.NO_RIGHT if self.tasks.in_hand else Finding.NOTHING
+        if self.active is None:
+            return Finding.HALF_TAKEN if one.stage is ContractStage.TAKEN else Finding.MAY_TAKE
+        if self.phase is ArmPhase.TAKING:
+            return self._found_taking(one)
+        if self.phase is ArmPhase.PUTTING:
+            assert self.grip is not None
+            return Finding.GRIPPED if self.grip.grip_mode is GripMode.OPEN else Finding.THERE
+        goal = one.contract.goal.start if self.phase is ArmPhase.TO_PART else one.contract.move.via
+        return Finding.THERE if self.driver.stands_at(goal) else Finding.ELSEWHERE
 
-    def _when_taking(self, one: Undertaking, now_us: int) -> list[Effect]:
-        """The step is journalled before the order: whoever starts again looks into the gripper first."""
+    def _found_taking(self, one: Undertaking) -> Finding:
+        """Also after a restart in which the part was put down, and that not yet journalled."""
         assert self.grip is not None
-        part = one.contract.goal.part
-        if self.grip.grip_mode is GripMode.HOLDING and self.grip.part == part:
-            self.gripper.rest()
-            return [self._part_at(one), *self._to(ArmPhase.CARRYING, now_us)]
-        if self.grip.grip_mode is GripMode.BUSY:
+        mode = self.grip.grip_mode
+        if mode is GripMode.HOLDING and self.grip.part == one.contract.goal.part:
+            return Finding.GRIPPED
+        if mode is GripMode.BUSY:
+            return Finding.GRIPPING
+        if mode is GripMode.OPEN and self.gripper.wanted is None and self.driver.stands_at(one.contract.move.via):
+            return Finding.LIES
+        return Finding.THERE if self.driver.stands_at(one.contract.goal.start) else Finding.ELSEWHERE
+
+    def _do(self, deed: Deed, one: Undertaking | None, now_us: int) -> list[Effect]:
+        if one is None or deed is Deed.WAIT:
             self.gripper.pause()
             return []
-        if self.driver.stands_at(one.contract.move.via) and self._lies_here():
-            return self._put(one, now_us)
-        if not self.driver.stands_at(one.contract.goal.start):
-            return self.driver.go(one.contract.goal.start, part_token(one.contract.goal.part), now_us)
-        return self._order(GripAction.TAKE, part, now_us)
-
-    def _when_carrying(self, one: Undertaking, now_us: int) -> list[Effect]:
-        if not self.driver.stands_at(one.contract.move.via):
-            return self.driver.go(one.contract.move.via, part_token(one.contract.goal.part), now_us)
-        return [*self.driver.rest(), *self._to(ArmPhase.PUTTING, now_us)]
-
-    def _when_putting(self, one: Undertaking, now_us: int) -> list[Effect]:
-        assert self.grip is not None
-        if self.grip.grip_mode is GripMode.OPEN:
-            return self._put(one, now_us)
-        return self._order(GripAction.PUT, one.contract.goal.part, now_us)
-
-    def _lies_here(self) -> bool:
-        """After a restart before the put-down was journalled: the gripper is open where the part is to lie."""
-        return self.grip is not None and self.grip.grip_mode is GripMode.OPEN and self.gripper.wanted is None
+        goal, via = one.contract.goal, one.contract.move.via
+        match deed:
+            case Deed.CHOOSE:
+                self.active = one.task
+            case Deed.TO_START | Deed.TO_END:
+                return self.driver.go(goal.start if deed is Deed.TO_START else via, part_token(goal.part), now_us)
+            case Deed.BEGIN:
+                one.stage = ContractStage.TAKEN
+                self._engage()
+                return [*self.driver.rest(), stage_record(one)]
+            case Deed.TAKE | Deed.PUT:
+                return self._order(GripAction.TAKE if deed is Deed.TAKE else GripAction.PUT, goal.part, now_us)
+            case Deed.LIFTED:
+                self.gripper.rest()
+                return [self._part_at(one)]
+            case Deed.REST:
+                return self.driver.rest()
+            case Deed.PUT_DOWN:
+                return self._put(one, now_us)
+        return []
 
     def _put(self, one: Undertaking, now_us: int) -> list[Effect]:
         one.stage = ContractStage.PUT

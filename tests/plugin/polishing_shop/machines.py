@@ -115,8 +115,9 @@ class Desk(Plain):
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """A part is done."""
-        is_own = isinstance(message, TaskReport) and message.task.origin == self.fleet.node_id
-        if not is_own or message.phase is not TaskPhase.DONE:
+        if not isinstance(message, TaskReport) or message.phase is not TaskPhase.DONE:
+            return []
+        if message.task.origin != self.fleet.node_id:
             return []
         return [Tell(PartOut(self.fleet.node_id, message.task.number))]
 

@@ -12,7 +12,7 @@ from onboard.contract.codes import DriveMode
 from onboard.contract.messages import DriveOrder, DriveState, Message
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment
-from onboard.ways.site import Axis, TrackKind, WaySite
+from onboard.ways.site import Axis, Offset, WaySite
 
 #: A moving drive that has heard no order for this long brakes to a stand (dbc/device.dbc).
 DRIVE_TIMEOUT_US = 500_000
@@ -30,9 +30,11 @@ class Carrier:
     target beyond the end of its alley unless a platform stands there, whose shaft gate is open only then; and aboard a
     platform that is not at a floor. ``fault`` says why in words.
 
-    An order for the other way than the carrier is turned, into the spur or back into the alley, makes it turn first; it
-    does so only standing in the spur's mouth, and refuses elsewhere. A turn that was begun is ended whatever is ordered
-    meanwhile: the body does not leave its place. The order that is fresh then is carried out.
+    An order for another track, into it or out of it through a mouth, makes it turn first; it does so only standing in
+    the mouth, and refuses elsewhere. On a straight site the order says only that it is the other way, and else where on
+    the tape. Aboard a platform with two doors it goes by whichever the order names, without a turn. A turn that was
+    begun is ended whatever is ordered meanwhile: the body does not leave its place. The order that is fresh then is
+    carried out.
 
     An order is taken up if its sequence is the last one's or newer; any sequence counts after ``DRIVE_TIMEOUT_US``
     without orders, as that of a controller that started again. Repeating an order keeps it fresh. A DriveState follows
@@ -89,7 +91,8 @@ class Carrier:
         at_mark = self._at_mark()
         sequence = self._order.sequence if self._order is not None else 0
         across = self._is_across
-        return DriveState(self.node_id, sequence, round(position_mm), round(speed_mm_s), self.mode, at_mark, across)
+        tape_mm = round(position_mm) + self._origin_mm
+        return DriveState(self.node_id, sequence, tape_mm, round(speed_mm_s), self.mode, at_mark, across)
 
     @property
     def _body(self) -> RobotBody | PlatformBody:
@@ -97,7 +100,12 @@ class Carrier:
 
     @property
     def _is_across(self) -> bool:
-        return self._site.tracks[self._body.track].kind is TrackKind.SPUR
+        return self._site.across(self._world.axis_of(self.node_id))
+
+    @property
+    def _origin_mm(self) -> int:
+        """Where the tape has index 1 of the track on whose axis the drive measures."""
+        return self._site.tracks[self._world.axis_of(self.node_id)].origin_mm
 
     @property
     def _axis(self) -> Axis:
@@ -142,37 +150,52 @@ class Carrier:
         return order.sequence != self._order.sequence and not is_newer(order.sequence, self._order.sequence, 8)
 
     def _would_move(self, order: DriveOrder, now_us: int) -> bool:
-        off_mm = abs(order.target_mm - self._body.motion.at(now_us)[0])
-        return order.across is not self._is_across or off_mm > AT_TARGET_MM
+        aim = self._aim(order)
+        if aim is None or aim.track != self._body.track:
+            return True
+        return abs(aim.position_mm - self._body.motion.at(now_us)[0]) > AT_TARGET_MM
+
+    def _aim(self, order: DriveOrder) -> Offset | None:
+        """Track and position on it of an order's target; None where it is on one to which no way leads from here."""
+        here, ways = self._body.track, self._world.other_ways(self.node_id)
+        if not self._site.is_charted:
+            if order.across is self._is_across:
+                return Offset(here, order.target_mm)
+            return Offset(ways[0].track, order.target_mm) if ways else None
+        told = self._site.on_tape(order.target_mm)
+        if told is None:
+            return Offset(here, order.target_mm - self._origin_mm)
+        beside = (*ways, *self._world.other_doors(self.node_id))
+        return told if told.track in (here, *(one.track for one in beside)) else None
 
     def _refusal(self, order: DriveOrder) -> str:
         if not self._shuttle_home():
             return "the shuttle is out"
         if self._world.is_riding(self.node_id):
             return "the platform under the carrier is between two floors"
-        track = self._body.track
-        if order.across is not self._is_across:
-            turned = self._world.other_way(self.node_id)
-            if turned is None:
-                return "the carrier does not stand in the mouth of a spur"
-            track = turned.track
-        low_mm, high_mm = self._world.limits_mm(track)
-        if not low_mm <= order.target_mm <= high_mm:
+        aim = self._aim(order)
+        if aim is None:
+            return "the carrier does not stand in the mouth of that track"
+        low_mm, high_mm = self._world.limits_mm(aim.track)
+        if not low_mm <= aim.position_mm <= high_mm:
             return f"target {order.target_mm} mm is beyond the end of the track, and no platform is there"
         return ""
 
     def _carry_out(self, order: DriveOrder, now_us: int) -> None:
         before = self.mode
         self.fault = ""
+        aim = self._aim(order)
+        assert aim is not None
+        self._go_by_door(aim.track)
         position_mm, speed_mm_s = self._body.motion.at(now_us)
         axis = self._axis
         limit_mm_s = min(order.speed_limit_mm_s, axis.speed_mm_s)
         if limit_mm_s <= 0:
             self._brake(now_us)
-        elif order.across is not self._is_across:
-            self._turn(now_us)
-        elif speed_mm_s or abs(order.target_mm - position_mm) > AT_TARGET_MM:
-            motion = driving(position_mm, speed_mm_s, order.target_mm, limit_mm_s, axis.acceleration_mm_s2, now_us)
+        elif aim.track != self._body.track:
+            self._turn(aim.track, now_us)
+        elif speed_mm_s or abs(aim.position_mm - position_mm) > AT_TARGET_MM:
+            motion = driving(position_mm, speed_mm_s, aim.position_mm, limit_mm_s, axis.acceleration_mm_s2, now_us)
             self._moving, self._is_braking = True, False
             self._move(motion)
             self._watch(now_us)
@@ -183,8 +206,13 @@ class Carrier:
 
     # --- turning -----------------------------------------------------------------------------------------------
 
-    def _turn(self, now_us: int) -> None:
-        turned = self._world.other_way(self.node_id)
+    def _go_by_door(self, track: int) -> None:
+        for position in self._world.other_doors(self.node_id):
+            if position.track == track != self._body.track:
+                self._world.go_by(self.node_id, position)
+
+    def _turn(self, track: int, now_us: int) -> None:
+        turned = next((one for one in self._world.other_ways(self.node_id) if one.track == track), None)
         if turned is None:
             return
         self._turn_timer = self._timers.call_at(now_us + self._site.carrier_turn_us, lambda: self._end_turn(turned))
@@ -248,7 +276,7 @@ class Carrier:
     def _on_platform(self, now_us: int) -> None:
         """A shaft's gate opened or shut, perhaps after a ride to an alley of another length."""
         if not self._moving:
-            if round(self._body.motion.final_mm) != self._told_mm:
+            if round(self._body.motion.final_mm) + self._origin_mm != self._told_mm:
                 self._say(now_us)
         elif self._order is not None:
             refusal = self._refusal(self._order)

@@ -5,9 +5,10 @@ from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.carrier import Carrier
 from bus_sim.systems.car_park.plant.motion import Motion
 from bus_sim.systems.car_park.plant.shaft import PlatformBody
-from bus_sim.systems.car_park.plant.world import CarParkWorld, WorldChange, is_at_mark
+from bus_sim.systems.car_park.plant.world import MARK_TOLERANCE_MM, CarParkWorld, WorldChange
 from onboard.contract.messages import DriveOrder, PlatformState
-from onboard.ways.site import Axis, WaySite
+from onboard.ways.lifts import nearest_stop, stop_mm
+from onboard.ways.site import Axis, Offset, WaySite
 
 #: PlatformState is repeated at least this often (dbc/device.dbc).
 REPEAT_US = 10_000_000
@@ -54,18 +55,38 @@ class LiftDrive(Carrier):
     def _pitch_mm(self) -> int:
         return self._site.tracks[self._body.track].pitch_mm
 
+    @property
+    def _origin_mm(self) -> int:
+        return 0
+
+    @property
+    def _is_across(self) -> bool:
+        return False
+
+    def _aim(self, order: DriveOrder) -> Offset | None:
+        return Offset(self._body.track, order.target_mm)
+
+    def _go_by_door(self, track: int) -> None:
+        """A platform has but one axis."""
+
     def _move(self, motion: Motion) -> None:
         self._world.move_platform(self.node_id, motion)
 
     def _at_mark(self) -> bool:
-        return is_at_mark(self._body.motion.at(self._timers.now_us())[0], self._pitch_mm)
+        height_mm, track = self._body.motion.at(self._timers.now_us())[0], self._body.track
+        away_mm = height_mm - stop_mm(self._site, track, nearest_stop(self._site, track, height_mm))
+        return abs(away_mm) <= MARK_TOLERANCE_MM
 
     def _refusal(self, order: DriveOrder) -> str:
         if self._world.overhang(self.node_id) is not None:
             return OVER_THE_SILL
         if order.across:
             return "a platform does not turn"
-        if not 0 <= order.target_mm <= (self._site.tracks[self._body.track].length - 1) * self._pitch_mm:
+        if (
+            not 0
+            <= order.target_mm
+            <= stop_mm(self._site, self._body.track, self._site.tracks[self._body.track].length)
+        ):
             return f"target {order.target_mm} mm is beyond the end of the shaft"
         return ""
 

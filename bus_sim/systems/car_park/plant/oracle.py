@@ -10,9 +10,9 @@ from itertools import pairwise
 
 from bus_sim.systems.car_park.plant.bodies import Aboard, Location
 from bus_sim.systems.car_park.plant.motion import Motion
+from bus_sim.systems.car_park.plant.mouth_rules import MouthRules
 from bus_sim.systems.car_park.plant.rules import OVERLAP_TOLERANCE_MM, MotionSpan, PlantRule, PlantViolation
 from bus_sim.systems.car_park.plant.shaft_rules import ShaftRules
-from bus_sim.systems.car_park.plant.spur_rules import SpurRules
 from bus_sim.systems.car_park.plant.world import BayBody, CarParkWorld, RobotBody, WorldChange
 from onboard.contract.codes import DoorName, DoorPosition
 from onboard.core.site import Station
@@ -35,8 +35,8 @@ class Oracle:
         for node_id, robot in world.robots.items():
             self._spans[node_id] = MotionSpan(robot.track, robot.motion, now_us, robot.turning_to)
         self._shafts = ShaftRules(world, self._spans)
-        self._spurs = SpurRules(world.site)
-        self._has_spurs = bool(world.site.spurs)
+        self._mouths = MouthRules(world.site)
+        self._has_mouths = bool(world.site.links)
         self._judge_pairs(now_us)
         world.watch(self._on_change)
         world.on_hazard.append(self._once)
@@ -70,7 +70,7 @@ class Oracle:
             self._judge_pairs(now_us, node_id)
             robot = self.world.robots[node_id]
             span = self._spans[node_id] = MotionSpan(robot.track, robot.motion, now_us, robot.turning_to)
-            self.violations += self._spurs.judge_turn(node_id, span)
+            self.violations += self._mouths.judge_turn(node_id, span)
         if change is WorldChange.PERSON:
             self._judge_passage(node_id)
         if change is WorldChange.CAR:
@@ -159,14 +159,14 @@ class Oracle:
     # --- whole motions, afterwards -----------------------------------------------------------------------------
 
     def _judge_track(self, node_id: int, now_us: int) -> None:
-        """A carrier's centre stays on its segments, and beyond them only in a shaft, or in the mouth of a spur."""
+        """A carrier's centre stays on its segments, and beyond them only in a shaft, or in a mouth."""
         span = self._spans[node_id]
         track = self.world.site.tracks[span.track]
         if track.kind is TrackKind.LIFT:
             return
         low_mm, high_mm = -track.pitch_mm / 2, (track.length - 0.5) * track.pitch_mm
-        if track.kind is TrackKind.SPUR:
-            low_mm -= track.pitch_mm
+        low_mm -= track.pitch_mm * (track.low is not None)
+        high_mm += track.pitch_mm * (track.high is not None)
         for sills in self.world.sills.values():
             if span.track in sills:
                 far_mm = sills[span.track].centre_mm + sills[span.track].towards * track.pitch_mm / 2
@@ -185,7 +185,7 @@ class Oracle:
 
     def _judge_pair(self, first: int, second: int, now_us: int) -> None:
         one, two = self._spans[first], self._spans[second]
-        for violation in self._spurs.judge_pair((first, second), one, two, now_us) if self._has_spurs else ():
+        for violation in self._mouths.judge_pair((first, second), one, two, now_us) if self._has_mouths else ():
             self._note_once(violation)
         if one.track != two.track:
             return

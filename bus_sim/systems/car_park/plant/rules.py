@@ -27,7 +27,7 @@ class PlantRule(Enum):
     LIFT_CRUSH = "a lift crushing what overhangs its sill"
     FALL = "a carrier in a shaft without a platform"
     ONE_ABOARD = "two bodies are on one platform"
-    TURN_IN_MOUTH = "a carrier turns elsewhere than in the mouth of a spur"
+    TURN_IN_MOUTH = "a carrier turns elsewhere than in a mouth"
     RIDE_AT_REST = "a carrier moves on a moving platform"
 
 

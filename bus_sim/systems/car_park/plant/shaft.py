@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from bus_sim.systems.car_park.plant.motion import Motion
+from onboard.core.site import Segment
 from onboard.ways.site import WaySite
 
 
@@ -38,11 +39,11 @@ class PlatformBody:
 
 def sills_of(site: WaySite, lift_track: int) -> dict[int, Sill]:
     """The sills of one lift by floor."""
-    return {segment.track: _sill(site, segment.track, segment.index) for segment in site.tracks[lift_track].joins}
+    return {segment.track: _sill(site, segment) for segment in site.tracks[lift_track].joins}
 
 
-def _sill(site: WaySite, floor: int, index: int) -> Sill:
-    pitch_mm = site.tracks[floor].pitch_mm
-    towards = -1 if index == 1 else 1
-    middle_mm = (index - 1) * pitch_mm
+def _sill(site: WaySite, segment: Segment) -> Sill:
+    pitch_mm = site.tracks[segment.track].pitch_mm
+    towards = -1 if site.beyond(segment).index == 0 else 1
+    middle_mm = site.position_mm(segment)
     return Sill(middle_mm + towards * pitch_mm / 2, towards, float(middle_mm + towards * pitch_mm))

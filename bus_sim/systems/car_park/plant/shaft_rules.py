@@ -24,21 +24,21 @@ class ShaftRules:
         self._spans = spans
         self._length_mm = float(world.site.carrier_length_mm)
         self._since_us = dict.fromkeys(world.platforms, world.timers.now_us())
-        self._floors = {lift: world.platform_floor(lift) for lift in world.platforms}
+        self._floors = {lift: world.platform_floors(lift) for lift in world.platforms}
         self._present: dict[int, set[tuple[PlantRule, str]]] = {lift: set() for lift in world.platforms}
 
     def judge(self, now_us: int) -> list[PlantViolation]:
         """What was broken since the last look. To be called while ``spans`` are still as they were before a change."""
         found: list[PlantViolation] = []
         for lift, before in self._floors.items():
-            floor = self._world.platform_floor(lift)
+            floors = self._world.platform_floors(lift)
             # A platform that nobody told to have come to its floor has been there since the end of its motion.
-            turned_us = now_us if floor is None else min(now_us, self._world.platforms[lift].motion.end_us)
-            until_us = max(self._since_us[lift], now_us if floor == before else turned_us)
+            turned_us = now_us if not floors else min(now_us, self._world.platforms[lift].motion.end_us)
+            until_us = max(self._since_us[lift], now_us if floors == before else turned_us)
             found += self._judge_time(lift, until_us)
-            if floor != before:
+            if floors != before:
                 found += self._judge_departure(lift, until_us)
-                self._floors[lift], self._since_us[lift] = floor, until_us
+                self._floors[lift], self._since_us[lift] = floors, until_us
                 found += self._judge_time(lift, now_us)
         return found
 
@@ -65,32 +65,33 @@ class ShaftRules:
                 if time_us is None:
                     continue
                 beyond.append((node, span))
-                if span.track != self._floors[lift]:
+                if span.track not in self._floors[lift]:
                     yield PlantViolation(time_us, PlantRule.FALL, f"robot {node} on track {span.track}, lift {lift}")
         for (one, first), (other, second) in combinations(beyond, 2):
             begin_us = max(from_us, first.from_us, second.from_us)
-            if first.track == second.track:
+            if first.track == second.track or {first.track, second.track} <= set(self._floors[lift]):
                 time_us = self._first_beyond_us(lift, [first, second], begin_us, until_us)
                 if time_us is not None:
                     yield PlantViolation(time_us, PlantRule.ONE_ABOARD, f"robots {one} and {other}, lift {lift}")
 
     def _judge_departure(self, lift: int, now_us: int) -> Iterator[PlantViolation]:
         """A platform that leaves a floor must have nothing over its sill."""
-        floor = self._floors[lift]
-        if floor is None:
-            return
-        sill = self._world.sills[lift][floor]
         for node, span in self._spans.items():
-            if span.track == floor:
-                beyond_mm = sill.beyond_mm(span.motion.at(now_us)[0], self._length_mm)
+            if span.track in self._floors[lift]:
+                floor = span.track
+                beyond_mm = self._world.sills[lift][floor].beyond_mm(span.motion.at(now_us)[0], self._length_mm)
                 if OVERLAP_TOLERANCE_MM < beyond_mm < self._length_mm - OVERLAP_TOLERANCE_MM:
                     yield PlantViolation(now_us, PlantRule.LIFT_CRUSH, f"lift {lift} at floor {floor}, robot {node}")
 
     def _first_beyond_us(self, lift: int, spans: list[MotionSpan], begin_us: int, until_us: int) -> int | None:
-        """When all these bodies of one alley are first in the shaft together: at the begin, or as one comes in."""
-        sill = self._world.sills[lift][spans[0].track]
-        times = {time for span in spans for time in _crossings(sill, span.motion, self._length_mm, begin_us, until_us)}
-        return next((time for time in sorted(times) if all(self._is_beyond(sill, span, time) for span in spans)), None)
+        """When all these bodies are first in the shaft together: at the begin, or as one comes in."""
+        sills, length_mm = self._world.sills[lift], self._length_mm
+        times = {
+            time for one in spans for time in _crossings(sills[one.track], one.motion, length_mm, begin_us, until_us)
+        }
+        return next(
+            (time for time in sorted(times) if all(self._is_beyond(sills[one.track], one, time) for one in spans)), None
+        )
 
     def _is_beyond(self, sill: Sill, span: MotionSpan, time_us: int) -> bool:
         return sill.beyond_mm(span.motion.at(time_us)[0], self._length_mm) > OVERLAP_TOLERANCE_MM

@@ -16,7 +16,8 @@ from bus_sim.systems.car_park.plant.rules import PlantRule
 from bus_sim.systems.car_park.plant.shaft import PlatformBody, Sill, sills_of
 from onboard.contract.codes import DoorName, DoorPosition, KindCode, Side
 from onboard.core.site import Segment, Station
-from onboard.ways.site import TrackKind, WaySite
+from onboard.ways.lifts import is_same_stop, nearest_stop, stop_mm
+from onboard.ways.site import WaySite
 
 #: Tolerance of the fine position sensor opposite a station, mm (row P34).
 MARK_TOLERANCE_MM = 5.0
@@ -46,8 +47,8 @@ Watcher = Callable[[WorldChange, int, int], None]
 class RobotBody:
     """A robot as it is: its carrier on a track and its shuttle's extension (mm from home, towards ``side``).
 
-    From the end of a turn into a spur to the end of the turn back the track is the spur: its segment is at 0 mm and the
-    mouth one pitch before. ``turning_to`` is the track towards which a carrier turns now.
+    From the end of a turn into a track to the end of the turn out of it the track is that one, the mouth one pitch
+    beyond its end. ``turning_to`` is the track towards which a carrier turns now.
     """
 
     track: int
@@ -139,7 +140,8 @@ class CarParkWorld:
     def standing_position(self, node_id: int) -> Segment | None:
         """The mark at which a robot's carrier stands still; index 0 or length + 1 of an alley on a platform there.
 
-        Turned in the mouth of a spur it is index 0 of the spur. None between marks, while it moves, and while it rides.
+        Turned in a mouth it is the index beyond the end of the track inside. None between marks, while it moves, and
+        while it rides.
         """
         robot = self.robots[node_id]
         if self.is_riding(node_id) or not self.stands(node_id) or not self.at_mark(node_id):
@@ -155,18 +157,31 @@ class CarParkWorld:
             return None
         return position
 
-    # --- spurs -------------------------------------------------------------------------------------------------
+    # --- mouths ------------------------------------------------------------------------------------------------
 
-    def other_way(self, node_id: int) -> Segment | None:
-        """Where a carrier would be, turned: index 0 of the spur in whose mouth it stands, or that mouth; else None."""
+    def other_ways(self, node_id: int) -> tuple[Segment, ...]:
+        """Where a carrier could be, turned: beyond the ends of the tracks in whose mouth it stands, or that mouth."""
         here = self.standing_position(node_id)
         if here is None:
-            return None
-        track = self.site.tracks[here.track]
-        if track.kind is TrackKind.SPUR:
-            return track.joins[0] if here.index == 0 else None
-        spur = self.site.spurs.get(here)
-        return None if spur is None else Segment(spur, 0)
+            return ()
+        mouth = self.site.mouths.get(here)
+        return self.site.links.get(here, ()) if mouth is None else (mouth,)
+
+    def other_doors(self, node_id: int) -> tuple[Segment, ...]:
+        """The same platform under a standing carrier as the position beyond the sills of its other doors here."""
+        here = self.standing_position(node_id)
+        lift_track = None if here is None else self.site.platforms.get(here)
+        return tuple(
+            self.site.beyond(sill)
+            for lift, platform in self.platforms.items()
+            if platform.track == lift_track
+            for sill in self.site.tracks[platform.track].joins
+            if sill.track in self.platform_floors(lift)
+        )
+
+    def go_by(self, node_id: int, position: Segment) -> None:
+        """A carrier that stands where two tracks have a position each is on the other one's axis from now on."""
+        self.end_turn(node_id, position)
 
     def begin_turn(self, node_id: int, track: int) -> None:
         """A carrier begins to turn where it is, towards another track."""
@@ -184,35 +199,44 @@ class CarParkWorld:
 
     def platform_floor(self, node_id: int) -> int | None:
         """The floor at whose mark a lift's platform stands still, None while it is between floors or moves."""
+        return next(iter(self.platform_floors(node_id)), None)
+
+    def platform_floors(self, node_id: int) -> tuple[int, ...]:
+        """The tracks to which the doors lead where a lift's platform stands still; empty while it does not."""
         platform = self.platforms[node_id]
         if self.timers.now_us() < platform.motion.end_us:
-            return None
-        track = self.site.tracks[platform.track]
-        if not is_at_mark(platform.motion.final_mm, track.pitch_mm):
-            return None
-        index = round(platform.motion.final_mm / track.pitch_mm) + 1
-        return track.joins[index - 1].track if 1 <= index <= track.length else None
+            return ()
+        number, height_mm = platform.track, platform.motion.final_mm
+        index = nearest_stop(self.site, number, height_mm)
+        if abs(height_mm - stop_mm(self.site, number, index)) > MARK_TOLERANCE_MM:
+            return ()
+        sills = enumerate(self.site.tracks[number].joins, start=1)
+        return tuple(sill.track for other, sill in sills if is_same_stop(self.site, number, index, other))
 
     def limits_mm(self, floor: int) -> tuple[float, float]:
         """How far a carrier may drive on a track now: onto a platform only where one stands there."""
         track = self.site.tracks[floor]
         low_mm, high_mm = 0.0, float((track.length - 1) * track.pitch_mm)
-        if track.kind is TrackKind.SPUR:
-            return -float(track.pitch_mm), high_mm
+        low_mm -= track.pitch_mm * (track.low is not None)
+        high_mm += track.pitch_mm * (track.high is not None)
         for node_id in self.platforms:
-            if self.platform_floor(node_id) == floor:
+            if floor in self.platform_floors(node_id):
                 centre_mm = self.sills[node_id][floor].centre_mm
                 low_mm, high_mm = min(low_mm, centre_mm), max(high_mm, centre_mm)
         return low_mm, high_mm
 
     def on_platform(self, node_id: int) -> int | None:
         """The robot whose body is wholly on a lift's platform, at its mark or not, moving or not."""
-        riding, floor = self.platforms[node_id].robot, self.platform_floor(node_id)
-        if riding is not None or floor is None:
+        riding, length_mm = self.platforms[node_id].robot, self.site.carrier_length_mm
+        if riding is not None:
             return riding
-        sill, length_mm = self.sills[node_id][floor], self.site.carrier_length_mm
-        play_mm = max(MARK_TOLERANCE_MM, (self.site.tracks[floor].pitch_mm - length_mm) / 2)
-        return next((node for node in self._on(floor) if abs(self._at(node) - sill.centre_mm) <= play_mm), None)
+        for floor in self.platform_floors(node_id):
+            centre_mm = self.sills[node_id][floor].centre_mm
+            play_mm = max(MARK_TOLERANCE_MM, (self.site.tracks[floor].pitch_mm - length_mm) / 2)
+            for node in self._on(floor):
+                if abs(self._at(node) - centre_mm) <= play_mm:
+                    return node
+        return None
 
     def aboard(self, node_id: int) -> int | None:
         """The robot that stands wholly on a lift's platform, at its mark."""
@@ -223,22 +247,22 @@ class CarParkWorld:
 
     def overhang(self, node_id: int) -> int | None:
         """The robot whose body is over the sill of a lift at the floor where its platform stands."""
-        floor = self.platform_floor(node_id)
-        if floor is None:
-            return None
-        sill, length_mm = self.sills[node_id][floor], self.site.carrier_length_mm
-        beyond_mm = {node: sill.beyond_mm(self._at(node), length_mm) for node in self._on(floor)}
-        return next((node for node, over_mm in beyond_mm.items() if 0 < over_mm < length_mm), None)
+        length_mm = self.site.carrier_length_mm
+        for floor in self.platform_floors(node_id):
+            sill = self.sills[node_id][floor]
+            for node in self._on(floor):
+                if 0 < sill.beyond_mm(self._at(node), length_mm) < length_mm:
+                    return node
+        return None
 
     def next_crossing_us(self, node_id: int) -> int | None:
         """When, at the earliest, a body that is moving now begins or ends to be over the sill of a lift."""
-        floor = self.platform_floor(node_id)
-        if floor is None:
-            return None
         now_us, half_mm = self.timers.now_us(), self.site.carrier_length_mm / 2
-        edge_mm = self.sills[node_id][floor].edge_mm
-        motions = [self.robots[node].motion for node in self._on(floor)]
-        times = [motion.next_reach_us(edge_mm + off_mm, now_us) for motion in motions for off_mm in (-half_mm, half_mm)]
+        times = []
+        for floor in self.platform_floors(node_id):
+            edge_mm = self.sills[node_id][floor].edge_mm
+            motions = [self.robots[node].motion for node in self._on(floor)]
+            times += [one.next_reach_us(edge_mm + off_mm, now_us) for one in motions for off_mm in (-half_mm, half_mm)]
         # At the very microsecond of touching, nothing is over the sill yet.
         return min((time + 1 for time in times if time is not None), default=None)
 
@@ -257,15 +281,16 @@ class CarParkWorld:
             platform.axis = self.robots[robot_id].track
         platform.motion = motion
         if robot_id is not None:
-            self._carry(platform, self.sills[node_id], robot_id, self.platform_floor(node_id))
+            self._carry(platform, self.sills[node_id], robot_id, self.platform_floors(node_id))
             self._tell(WorldChange.CARRIER, robot_id)
         self._tell(WorldChange.PLATFORM, node_id)
 
-    def _carry(self, platform: PlatformBody, sills: dict[int, Sill], robot_id: int, floor: int | None) -> None:
+    def _carry(self, platform: PlatformBody, sills: dict[int, Sill], robot_id: int, floors: tuple[int, ...]) -> None:
         robot = self.robots[robot_id]
-        if floor is None:
+        if not floors:
             platform.robot, robot.track = robot_id, platform.track
             return
+        floor = platform.axis if platform.axis in floors else floors[0]
         robot.motion = robot.motion.shifted(sills[floor].centre_mm - sills[platform.axis].centre_mm)
         platform.robot, robot.track = None, floor
 

@@ -1,0 +1,54 @@
+"""What a machine says at fixed times: its sign of life with all that goes with it, and bus time where it sends that."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from onboard.contract.codes import Reason
+from onboard.contract.messages import BusTime
+from onboard.core.behaviour import Fleet
+from onboard.core.bus_time import BUS_TIME_MODULUS
+from onboard.core.effects import Effect, Send
+from onboard.holon.drops import ToldDrops
+from onboard.holon.holds import Holds
+from onboard.holon.presence import Presence
+from onboard.holon.timekeeper import Timekeeper
+
+
+@dataclass
+class FixedTimes:
+    """One machine's words at fixed times. All times are bus time in us; ``drops`` gives what it dropped, by reason."""
+
+    time: Timekeeper
+    presence: Presence
+    holds: Holds
+    fleet: Fleet
+    drops: Callable[[], Counter[Reason]]
+    #: None before the first word.
+    heartbeat_due_us: int | None = None
+    _told: ToldDrops = field(default_factory=ToldDrops)
+
+    def due_us(self, work_due_us: int | None) -> int | None:
+        """The first of these words and of what is to be done otherwise; None where there is neither."""
+        times = (self.heartbeat_due_us, self.time.due_us, work_due_us)
+        return min((time for time in times if time is not None), default=None)
+
+    def words(self, now_us: int) -> list[Effect]:
+        """What is due of them, and when the next is due."""
+        effects: list[Effect] = []
+        timing, node_id = self.fleet.site.timing, self.fleet.node_id
+        if self.heartbeat_due_us is not None and self.heartbeat_due_us <= now_us:
+            self.heartbeat_due_us = now_us + timing.heartbeat_us
+            self.presence.review(now_us)
+            effects += self.holds.words() + self.fleet.mirror.forgotten()
+            effects += self._told.words(node_id, self.drops())
+            effects += [Send(word) for word in self.presence.halted_ones(now_us)]
+            effects += [Send(self.presence.standing_word(node)) for node in self.fleet.winners.stuck(now_us)]
+        if self.time.due_us is not None and self.time.due_us <= now_us:
+            self.time.due_us = now_us + timing.bus_time_us
+            effects.append(self.bus_time(now_us))
+        return effects
+
+    def bus_time(self, now_us: int) -> Effect:
+        """Bus time as this machine sends it."""
+        return Send(BusTime(self.fleet.node_id, now_us % BUS_TIME_MODULUS))

@@ -1,0 +1,58 @@
+"""What a robot of the cell does next: one table of (phase, finding), the same for a start in the middle of a grip."""
+
+from enum import Enum
+
+from onboard.contract.cell import ArmPhase
+
+
+class Finding(Enum):
+    """What contracts, tokens and the last words of drive and gripper come to, for the phase in which the robot is."""
+
+    NOTHING = "no part is in hand, and no contract either"
+    NO_RIGHT = "no part is in hand, and none of the contracts' parts may be taken"
+    MAY_TAKE = "no part is in hand, and a contract's may be taken"
+    HALF_TAKEN = "no part is in hand, and the journal says that one was being taken"
+    ELSEWHERE = "the robot does not stand where this phase needs it"
+    THERE = "it stands where this phase needs it, and the gripper is not done"
+    GRIPPING = "the gripper is at work"
+    GRIPPED = "the gripper has done what this phase is for"
+    LIES = "the gripper is open where the part is to lie, and has no order: it was put down before a restart"
+
+
+class Deed(Enum):
+    """What the robot does about what it found, once in each round: the table of steps chooses it."""
+
+    WAIT = "nothing"
+    CHOOSE = "take the most urgent contract in hand"
+    TO_START = "drive on to where the part lies"
+    TO_END = "drive on to where the part is to lie"
+    BEGIN = "journal that the part is being taken"
+    TAKE = "order the gripper to take"
+    LIFTED = "tell that the part is aboard"
+    REST = "order the drive no more"
+    PUT = "order the gripper to put down"
+    PUT_DOWN = "journal and tell that the part lies where it is to lie"
+
+
+#: A part was put down in TAKING or PUTTING; in any of these none is in hand at times.
+CHOOSING = (ArmPhase.IDLE, ArmPhase.WAITING, ArmPhase.TAKING, ArmPhase.PUTTING)
+
+#: (phase, finding) -> (phase that follows, deed).
+TABLE: dict[tuple[ArmPhase, Finding], tuple[ArmPhase, Deed]] = {
+    **{(phase, Finding.NOTHING): (ArmPhase.IDLE, Deed.WAIT) for phase in CHOOSING},
+    **{(phase, Finding.NO_RIGHT): (ArmPhase.WAITING, Deed.WAIT) for phase in CHOOSING},
+    **{(phase, Finding.MAY_TAKE): (ArmPhase.TO_PART, Deed.CHOOSE) for phase in CHOOSING},
+    **{(phase, Finding.HALF_TAKEN): (ArmPhase.TAKING, Deed.CHOOSE) for phase in CHOOSING},
+    (ArmPhase.TO_PART, Finding.ELSEWHERE): (ArmPhase.TO_PART, Deed.TO_START),
+    # What is journalled first tells whoever starts again to look into the gripper.
+    (ArmPhase.TO_PART, Finding.THERE): (ArmPhase.TAKING, Deed.BEGIN),
+    (ArmPhase.TAKING, Finding.ELSEWHERE): (ArmPhase.TAKING, Deed.TO_START),
+    (ArmPhase.TAKING, Finding.THERE): (ArmPhase.TAKING, Deed.TAKE),
+    (ArmPhase.TAKING, Finding.GRIPPING): (ArmPhase.TAKING, Deed.WAIT),
+    (ArmPhase.TAKING, Finding.GRIPPED): (ArmPhase.CARRYING, Deed.LIFTED),
+    (ArmPhase.TAKING, Finding.LIES): (ArmPhase.TAKING, Deed.PUT_DOWN),
+    (ArmPhase.CARRYING, Finding.ELSEWHERE): (ArmPhase.CARRYING, Deed.TO_END),
+    (ArmPhase.CARRYING, Finding.THERE): (ArmPhase.PUTTING, Deed.REST),
+    (ArmPhase.PUTTING, Finding.THERE): (ArmPhase.PUTTING, Deed.PUT),
+    (ArmPhase.PUTTING, Finding.GRIPPED): (ArmPhase.PUTTING, Deed.PUT_DOWN),
+}

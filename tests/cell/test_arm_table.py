@@ -1,0 +1,172 @@
+"""A robot's steps: every phase meets whatever its devices may say, and does what its table says and nothing else."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import pytest
+
+from onboard.contract.cell import ArmMode, ArmPhase, ArmProgress, GripAction, GripMode, PartAt
+from onboard.contract.cell_device import ArmOrder, ArmState, GripOrder, GripState
+from onboard.contract.codes import TokenKind
+from onboard.contract.messages import Reference, TaskReport
+from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.motion_authority import acts, authorised
+from onboard.core.records import TokenHeldRecord
+from onboard.holon.holon import Holon
+from onboard.systems.cell.contracts import part_token
+from onboard.systems.cell.geometry import Point
+from onboard.systems.cell.records import ContractRecord, ContractStage, StageRecord
+from onboard.systems.cell.robot import ArmRobot
+from onboard.systems.cell.steps import CHOOSING, TABLE, Deed, Finding
+from onboard.systems.registry import factory_for
+from tests.cell.playing import cell
+
+ARM = 1
+TASK, PART, OTHER = Reference(9, 1), Reference(9, 7), Reference(9, 8)
+PLACES = {"start": Point(10_000, 10_000), "end": Point(20_000, 10_000), "home": Point(8_000, 11_000)}
+CONTRACT = ContractRecord(
+    TASK, PART, ARM, 0, "10000,10000", "20000,10000", "10000,10000 20000,10000", "", (ARM,), 1.0, 1.0, (ARM,), 0
+)
+NOW_US, LATER_US = 10_000_000, 20_000_000
+WORKING = (ArmPhase.TO_PART, ArmPhase.TAKING, ArmPhase.CARRYING, ArmPhase.PUTTING)
+
+
+@dataclass(frozen=True)
+class Words:
+    """Where the drive says that it stands, what the gripper says, and whether it has had an order in this life."""
+
+    place: str
+    grip: GripMode
+    part: Reference
+    is_ordered: bool
+
+
+GRIPS = [(mode, PART if mode is GripMode.HOLDING else Reference(0, 0)) for mode in GripMode]
+WORDS = [
+    Words(place, *grip, ordered)
+    for place, grip, ordered in product(PLACES, [*GRIPS, (GripMode.HOLDING, OTHER)], (True, False))
+]
+
+
+def robot(words: Words, stage: ContractStage | None, *, is_custodian: bool) -> ArmRobot:
+    """One with a contract at ``stage``, or with none."""
+    site = cell()
+    machine = site.machines[ARM]
+    key = part_token(PART)
+    entries = [CONTRACT.entry, StageRecord(TASK, stage, 0).entry] if stage is not None else []
+    if is_custodian:
+        entries.append(TokenHeldRecord(TokenKind.CAR, key.number, 1, ARM).entry)
+    behaviour = Holon(site, machine, factory_for(site, machine.kind), boot=2, entries=entries).behaviour
+    assert isinstance(behaviour, ArmRobot)
+    behaviour.fleet.tokens.trust()
+    behaviour.fleet.motion.why_still = acts
+    if words.is_ordered:
+        behaviour.gripper.order((GripAction.TAKE, PART), authorised(behaviour.fleet.motion, [key]), NOW_US)
+    return behaviour
+
+
+def say(behaviour: ArmRobot, words: Words) -> None:
+    behaviour.sense(ArmState(ARM, 0, *PLACES[words.place], ArmMode.RESTING), NOW_US)
+    behaviour.sense(GripState(ARM, behaviour.gripper.sequence, words.grip, words.part), NOW_US)
+
+
+def meant(phase: ArmPhase, words: Words) -> Finding:
+    """What the words come to for a part in hand, told once more."""
+    match phase:
+        case ArmPhase.TO_PART:
+            return Finding.THERE if words.place == "start" else Finding.ELSEWHERE
+        case ArmPhase.CARRYING:
+            return Finding.THERE if words.place == "end" else Finding.ELSEWHERE
+        case ArmPhase.PUTTING:
+            return Finding.GRIPPED if words.grip is GripMode.OPEN else Finding.THERE
+    if words.grip is GripMode.BUSY:
+        return Finding.GRIPPING
+    if (words.grip, words.part) == (GripMode.HOLDING, PART):
+        return Finding.GRIPPED
+    if words.grip is GripMode.OPEN and words.place == "end" and not words.is_ordered:
+        return Finding.LIES
+    return Finding.THERE if words.place == "start" else Finding.ELSEWHERE
+
+
+#: What is ordered, written and told; a new phase is told besides.
+SAID: dict[Deed, list[object]] = {
+    Deed.WAIT: [],
+    Deed.CHOOSE: [],
+    Deed.TO_START: [PLACES["start"]],
+    Deed.TO_END: [PLACES["end"]],
+    Deed.BEGIN: [ContractStage.TAKEN],
+    Deed.TAKE: [GripAction.TAKE],
+    Deed.LIFTED: ["aboard"],
+    Deed.REST: [],
+    Deed.PUT: [GripAction.PUT],
+    Deed.PUT_DOWN: [ContractStage.PUT, "lies", ContractStage.OVER, "DONE"],
+}
+
+
+def told(effects: list[Effect]) -> Iterator[object]:
+    for one in effects:
+        match one:
+            case Actuate(ArmOrder() as order):
+                yield Point(order.x_mm, order.y_mm)
+            case Actuate(GripOrder() as order):
+                yield order.grip_action
+            case Record(StageRecord() as record):
+                yield record.stage
+            case Send(PartAt() as at):
+                yield "aboard" if at.aboard else "lies"
+            case Send(TaskReport() as report):
+                yield report.phase.name
+            case Send(ArmProgress() as progress):
+                yield progress.arm_phase
+
+
+def line(phase: ArmPhase, finding: Finding) -> tuple[ArmPhase, list[object]]:
+    following, deed = TABLE[phase, finding]
+    return following, SAID[deed] + ([following] if following is not phase else [])
+
+
+@pytest.mark.parametrize("phase", WORKING)
+def test_every_phase_meets_every_word_of_drive_and_gripper(phase: ArmPhase) -> None:
+    stage = ContractStage.WON if phase is ArmPhase.TO_PART else ContractStage.TAKEN
+    for words in WORDS:
+        one = robot(words, stage, is_custodian=True)
+        one.phase, one.active = phase, TASK
+        say(one, words)
+        following, said = line(phase, meant(phase, words))
+        assert (list(told(one.advance(LATER_US))), one.phase) == (said, following), words
+        assert (one.active is None) is ("lies" in said)
+
+
+@pytest.mark.parametrize("phase", CHOOSING)
+@pytest.mark.parametrize("stage", [None, ContractStage.WON, ContractStage.TAKEN])
+@pytest.mark.parametrize("is_custodian", [True, False])
+def test_without_a_part_in_hand_the_next_is_chosen(
+    phase: ArmPhase, stage: ContractStage | None, is_custodian: bool
+) -> None:
+    for words in [one for one in WORDS if not one.is_ordered]:
+        one = robot(words, stage, is_custodian=is_custodian)
+        one.phase = phase
+        say(one, words)
+        finding = choice(stage, is_custodian=is_custodian)
+        following, said = line(phase, finding)
+        if TABLE[phase, finding][1] is Deed.CHOOSE:
+            # What was chosen is begun at once.
+            following, then = line(following, meant(following, words))
+            said += then
+        assert (list(told(one.advance(LATER_US))), one.phase) == (said, following), words
+
+
+def choice(stage: ContractStage | None, *, is_custodian: bool) -> Finding:
+    if stage is None:
+        return Finding.NOTHING
+    if not is_custodian:
+        return Finding.NO_RIGHT
+    return Finding.HALF_TAKEN if stage is ContractStage.TAKEN else Finding.MAY_TAKE
+
+
+def test_a_line_of_the_table_is_for_what_can_be() -> None:
+    met = {(phase, meant(phase, words)) for phase, words in product(WORKING, WORDS)}
+    stands = product((None, ContractStage.WON, ContractStage.TAKEN), (True, False))
+    chosen = {choice(stage, is_custodian=custodian) for stage, custodian in stands}
+    assert met | set(product(CHOOSING, chosen)) == set(TABLE)
