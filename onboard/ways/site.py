@@ -210,7 +210,10 @@ class WaySite(Site):
             seen.add(track)
 
     def position_mm(self, segment: Segment) -> int:
-        """Centre of a segment along its track, in mm from that of index 1."""
+        """Centre of a segment along its track, in mm from that of index 1; of a stop of a lift its height."""
+        heights_mm = self.tracks[segment.track].heights_mm
+        if 0 < segment.index <= len(heights_mm):
+            return heights_mm[segment.index - 1]
         return (segment.index - 1) * self.tracks[segment.track].pitch_mm
 
 

@@ -16,6 +16,7 @@ from onboard.trace.check.geometry import (
     ReportedPosition,
     body_of,
     floor_of,
+    floors_of,
     lifts_under,
     occupied,
     swept,
@@ -154,7 +155,7 @@ class PlatformThere(Rule):
             lift = self.picture.bodies.get(site.stewards.get(slot.track, 0))
             if slot.index != GATE_INDEX or lift is None or lift.track != slot.track:
                 continue
-            if lift.speed_mm_s or floor_of(site, lift) != body.track:
+            if lift.speed_mm_s or body.track not in floors_of(site, lift):
                 wrong = True
                 where = "moves" if lift.speed_mm_s else f"is at floor {floor_of(site, lift)}"
                 if body.node not in self._told:

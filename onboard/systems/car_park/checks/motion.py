@@ -1,6 +1,5 @@
 """Motion: only under authority and inside it, and never two bodies in one slot (design, section 5)."""
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -14,13 +13,15 @@ from onboard.trace.check.geometry import (
     body_of,
     lifts_under,
     occupied,
-    spur_slots,
+    slots_at,
     swept,
     token_of,
+    turned_slots,
 )
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
-from onboard.ways.site import TrackKind, way_site
+from onboard.ways.lifts import platform_on
+from onboard.ways.site import TrackKind, WaySite, way_site
 
 #: Who was pushed by hand has so long to get the rights to where it is, us: it may have to start first, and to listen
 #: until it is admitted (seen: 30 s).
@@ -86,18 +87,10 @@ class InsideAuthority(Rule):
         sensed_mm = self._sensed_mm.get(event.message.sender)
         if body is None or sensed_mm is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
-        site = self.picture.site
-        body = replace(self.picture.on_floor(body), position_mm=sensed_mm)
-        kind = way_site(site).tracks[body.track].kind
-        if kind is TrackKind.LIFT:
-            return
-        if event.message.across is (kind is TrackKind.SPUR):
-            slots = swept(site, body, event.message.target_mm)
-        else:
-            # Sent to turn where it is: into the spur of this mouth, or out of this one.
-            spur = way_site(site).spurs.get(Segment(body.track, body.index)) if event.message.across else body.track
-            slots = spur_slots(site, spur, -math.inf) if spur is not None else [Segment(body.track, body.index)]
-        self._judge(event, body, slots, "is sent through")
+        site, body = self.picture.site, self.picture.on_floor(body)
+        if way_site(site).tracks[body.track].kind is not TrackKind.LIFT:
+            slots = _sent_through(way_site(site), body, sensed_mm, event.message)
+            self._judge(event, body, slots, "is sent through")
 
     def _judge(
         self,
@@ -116,6 +109,33 @@ class InsideAuthority(Rule):
             elif (body.node, slot) not in self._told:
                 self._told.add((body.node, slot))
                 self.find(event, (body.node,), f"{how} {slot}, which {holder} holds")
+
+
+def _sent_through(site: WaySite, body: ReportedPosition, sensed_mm: int, order: DriveOrder) -> list[Segment]:
+    """Slots through which an order sends a body that its drive last said to be at ``sensed_mm``."""
+    if not site.is_charted:
+        body = replace(body, position_mm=sensed_mm)
+        if order.across is site.across(body.track):
+            return swept(site, body, order.target_mm)
+        # Sent to turn where it is: into the spur of this mouth, or out of this one.
+        here = Segment(body.track, body.index)
+        spurs = [end.track for end in site.links.get(here, ())] if order.across else [body.track]
+        ends = [Segment(spur, 0) for spur in spurs if Segment(spur, 0) in site.mouths]
+        return slots_at(site, ends[0]) if ends else [here]
+    at, aim = site.on_tape(sensed_mm), site.on_tape(order.target_mm)
+    if at is None or aim is None:
+        return []
+    body = replace(body, track=at.track, position_mm=at.position_mm)
+    if aim.track == at.track:
+        return swept(site, body, aim.position_mm)
+    here = Segment(at.track, round(at.position_mm / site.tracks[at.track].pitch_mm) + 1)
+    lift = site.platforms.get(here)
+    there = None if lift is None else platform_on(site, lift, aim.track)
+    if there is not None:
+        # By the other door of the platform on which it stands.
+        body = replace(body, track=there.track, index=there.index, position_mm=site.position_mm(there))
+        return swept(site, body, aim.position_mm)
+    return turned_slots(site, here, aim.track) or [here]
 
 
 class OneBody(Rule):
@@ -146,13 +166,22 @@ class OneBody(Rule):
                 self.find(event, (body.node, other.node), f"both on the platform of lift {lift}")
             for one, two in ((body, other), (other, body)):
                 if self._is_in_mouth_of(one, two):
-                    self.find(event, (body.node, other.node), f"{one.node} in the mouth of spur {two.track}")
+                    self.find(event, (body.node, other.node), f"{one.node} in the mouth of {self._name(two.track)}")
+
+    def _name(self, track: int) -> str:
+        kind = way_site(self.picture.site).tracks[track].kind
+        return f"{'spur' if kind is TrackKind.SPUR else 'track'} {track}"
 
     def _is_in_mouth_of(self, one: ReportedPosition, two: ReportedPosition) -> bool:
-        """Whether a body on an alley is where another turns into a spur, or comes out of it."""
-        site = self.picture.site
-        if way_site(site).tracks[two.track].kind is not TrackKind.SPUR or len(occupied(site, two)) < 2:
-            return False
-        mouth = way_site(site).tracks[two.track].joins[0]
-        apart_mm = abs(one.position_mm - way_site(site).position_mm(mouth))
-        return one.track == mouth.track and apart_mm < way_site(site).carrier_length_mm - TOLERANCE_MM
+        """Whether a body is where another turns into a track, or comes out of it."""
+        ways = way_site(self.picture.site)
+        here = occupied(ways, two)
+        for _, mouth in ways.tracks[two.track].ends:
+            if mouth not in here:
+                continue
+            apart_mm = abs(one.position_mm - ways.position_mm(mouth))
+            if one.track == mouth.track and apart_mm < ways.carrier_length_mm - TOLERANCE_MM:
+                return True
+            if one.track not in (mouth.track, two.track) and mouth in occupied(ways, one):
+                return True
+        return False
