@@ -118,7 +118,7 @@ class TomlTable:
         return found
 
     def flag(self, name: str, *, default: bool) -> bool:
-        """True or false."""
+        """True or false; the default where the key is missing or of another type."""
         value = self._get(name, bool, "true or false", required=False)
         return default if value is None else bool(value)
 

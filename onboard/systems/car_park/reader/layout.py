@@ -56,7 +56,7 @@ class Layout:
 
     @property
     def floors(self) -> int:
-        """How many there are."""
+        """How many floors there are, by their own alleys."""
         return sum(1 for _, name in self.named if name == BASE)
 
     def alleys(self) -> list[Track]:
