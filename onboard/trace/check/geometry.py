@@ -5,14 +5,14 @@ the lift's track), and a lift's gate (index 255), which whoever is over the sill
 its mouth, one pitch away: whoever is there is turned, or turning, and is in both slots.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from onboard.contract.codes import TokenKind
-from onboard.contract.messages import Progress
+from onboard.contract.messages import DriveOrder, Progress
 from onboard.core.site import Segment, Site
 from onboard.trace.check.tokens_seen import Token
-from onboard.ways.lifts import is_same_stop
+from onboard.ways.lifts import is_same_stop, platform_on
 from onboard.ways.site import TrackKind, way_site
 
 PLATFORM_INDEX = 0
@@ -85,11 +85,38 @@ def swept(site: Site, body: ReportedPosition, until_mm: float) -> list[Segment]:
     return slots_of(site, body.track, low_mm - half_mm, high_mm + half_mm)
 
 
-def turned_slots(site: Site, here: Segment, track: int) -> list[Segment]:
-    """Slots of a body that turns where it stands, towards another track; none where no mouth is."""
+def body_at(site: Site, body: ReportedPosition, tape_mm: int) -> ReportedPosition:
+    """A body where its drive says that it is; where it was told to be, if that is on no track."""
     ways = way_site(site)
-    ends = [here] if here in ways.mouths else [end for end in ways.links.get(here, ()) if end.track == track]
-    return slots_at(site, ends[0]) if ends else []
+    if not ways.is_charted:
+        return replace(body, position_mm=tape_mm)
+    told = ways.on_tape(tape_mm)
+    if told is None:
+        return body
+    index = _index_at(told.position_mm, ways.tracks[told.track].pitch_mm)
+    return replace(body, track=told.track, index=index, position_mm=told.position_mm)
+
+
+def sent_through(site: Site, body: ReportedPosition, order: DriveOrder) -> list[Segment]:
+    """Slots through which an order sends a body: along its track, or to turn where it is."""
+    ways, here = way_site(site), Segment(body.track, body.index)
+    if not ways.is_charted:
+        if order.across is ways.across(body.track):
+            return swept(site, body, order.target_mm)
+        # Into the spur of this mouth, or out of this one.
+        spurs = [end.track for end in ways.links.get(here, ())] if order.across else [body.track]
+        return slots_at(site, Segment(spurs[0], 0)) if spurs else [here]
+    aim = ways.on_tape(order.target_mm)
+    if aim is None or aim.track == body.track:
+        return [] if aim is None else swept(site, body, aim.position_mm)
+    lift = ways.platforms.get(here)
+    there = None if lift is None else platform_on(ways, lift, aim.track)
+    if there is not None:
+        # By another door of the platform on which it stands.
+        body = replace(body, track=there.track, index=there.index, position_mm=ways.position_mm(there))
+        return swept(site, body, aim.position_mm)
+    ends = [here] if here in ways.mouths else [end for end in ways.links.get(here, ()) if end.track == aim.track]
+    return slots_at(site, ends[0]) if ends else [here]
 
 
 def slots_at(site: Site, position: Segment) -> list[Segment]:

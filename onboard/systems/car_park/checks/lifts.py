@@ -19,7 +19,7 @@ from onboard.trace.check.geometry import (
     floors_of,
     lifts_under,
     occupied,
-    swept,
+    sent_through,
     token_of,
 )
 from onboard.trace.check.picture import BusPicture
@@ -146,8 +146,8 @@ class PlatformThere(Rule):
         body = self.picture.bodies.get(event.message.sender)
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
-        body = self.picture.on_floor(body)
-        self._judge(event, body, swept(self.picture.site, body, event.message.target_mm), "is sent over")
+        site, body = self.picture.site, self.picture.on_floor(body)
+        self._judge(event, body, sent_through(site, body, event.message), "is sent over")
 
     def _judge(self, event: LogEvent[Message], body: ReportedPosition, slots: list[Segment], how: str) -> None:
         site, wrong = self.picture.site, False

@@ -1,7 +1,6 @@
 """Motion: only under authority and inside it, and never two bodies in one slot (design, section 5)."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 from onboard.contract.codes import KindCode
 from onboard.contract.messages import DriveOrder, DriveState, Progress
@@ -10,18 +9,17 @@ from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.geometry import (
     TOLERANCE_MM,
     ReportedPosition,
+    body_at,
     body_of,
     lifts_under,
     occupied,
-    slots_at,
+    sent_through,
     swept,
     token_of,
-    turned_slots,
 )
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
-from onboard.ways.lifts import platform_on
-from onboard.ways.site import TrackKind, WaySite, way_site
+from onboard.ways.site import TrackKind, way_site
 
 #: Who was pushed by hand has so long to get the rights to where it is, us: it may have to start first, and to listen
 #: until it is admitted (seen: 30 s).
@@ -89,7 +87,7 @@ class InsideAuthority(Rule):
             return
         site, body = self.picture.site, self.picture.on_floor(body)
         if way_site(site).tracks[body.track].kind is not TrackKind.LIFT:
-            slots = _sent_through(way_site(site), body, sensed_mm, event.message)
+            slots = sent_through(site, body_at(site, body, sensed_mm), event.message)
             self._judge(event, body, slots, "is sent through")
 
     def _judge(
@@ -109,33 +107,6 @@ class InsideAuthority(Rule):
             elif (body.node, slot) not in self._told:
                 self._told.add((body.node, slot))
                 self.find(event, (body.node,), f"{how} {slot}, which {holder} holds")
-
-
-def _sent_through(site: WaySite, body: ReportedPosition, sensed_mm: int, order: DriveOrder) -> list[Segment]:
-    """Slots through which an order sends a body that its drive last said to be at ``sensed_mm``."""
-    if not site.is_charted:
-        body = replace(body, position_mm=sensed_mm)
-        if order.across is site.across(body.track):
-            return swept(site, body, order.target_mm)
-        # Sent to turn where it is: into the spur of this mouth, or out of this one.
-        here = Segment(body.track, body.index)
-        spurs = [end.track for end in site.links.get(here, ())] if order.across else [body.track]
-        ends = [Segment(spur, 0) for spur in spurs if Segment(spur, 0) in site.mouths]
-        return slots_at(site, ends[0]) if ends else [here]
-    at, aim = site.on_tape(sensed_mm), site.on_tape(order.target_mm)
-    if at is None or aim is None:
-        return []
-    body = replace(body, track=at.track, position_mm=at.position_mm)
-    if aim.track == at.track:
-        return swept(site, body, aim.position_mm)
-    here = Segment(at.track, round(at.position_mm / site.tracks[at.track].pitch_mm) + 1)
-    lift = site.platforms.get(here)
-    there = None if lift is None else platform_on(site, lift, aim.track)
-    if there is not None:
-        # By the other door of the platform on which it stands.
-        body = replace(body, track=there.track, index=there.index, position_mm=site.position_mm(there))
-        return swept(site, body, aim.position_mm)
-    return turned_slots(site, here, aim.track) or [here]
 
 
 class OneBody(Rule):
