@@ -91,6 +91,8 @@ class CarPark(WaySite):
     classes: tuple[SizeClass, ...] = ()
     #: Number of a place's class by its station's number; who is not named takes every car of the site.
     place_class: dict[int, int] = field(default_factory=dict)
+    #: What the file calls alleys beside the one that each floor has by itself, by track number.
+    alley_names: dict[int, str] = field(default_factory=dict)
 
     def car_class(self, length_mm: int, height_mm: int, load_kg: int, *, charging: bool = False) -> int:
         """The first class that a car fits, ``ANY_CLASS`` where there is none."""
