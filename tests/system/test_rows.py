@@ -203,7 +203,7 @@ def test_p52_an_operators_order_takes_the_same_path_as_a_customers_press() -> No
         simulation.loop.call_at(200.0, send, bus, simulation)
 
     def send(bus: object, simulation: Simulation) -> None:
-        (parked,) = simulation.view.cars
+        (parked,) = simulation.view.history.loads.stations
         order = OperatorOrder(251, 1, OperatorAction.INSERT_TICKET, parked)
         for frame in fleet_codec().encode(order):
             bus.send(frame)  # type: ignore[attr-defined]  # a SimulatedBus
@@ -238,7 +238,7 @@ def test_p20_p49_a_compartment_is_a_participant_too_asked_twice() -> None:
                 bus.send(frame)
 
         def call() -> None:
-            (parked,) = simulation.view.cars
+            (parked,) = simulation.view.history.loads.stations
             deadline_ms = simulation.loop.now_us() // 1000 + 1_000
             task = Reference(251, 1)
             say(
