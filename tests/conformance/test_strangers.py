@@ -1,7 +1,5 @@
 """A machine that bids and does nothing starves nobody, on any system that calls: served, or told why."""
 
-from pathlib import Path
-
 import pytest
 
 from bus_sim.campaign.strangers import StrangerPlan, play_pair
@@ -10,22 +8,19 @@ from bus_sim.sites import find_site
 from bus_sim.systems.orders import OrderArrivals
 from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.stranger import Stranger
-from tests.mapd.sites import site_text
+from tests.conformance.cases import CASES
+from tests.conformance.runs import site_file, site_of
+from tests.thinned import some
 
-ORDERS = {
-    "graph": OrderArrivals(3, 20.0),
-    "terminal": OrderArrivals(2, 30.0),
-    "cell": OrderArrivals(3, 20.0),
-    "turning": OrderArrivals(2, 30.0),
-}
+BESIDE = [(case.system, how, case.orders) for case in CASES.values() if case.orders is not None for how in Stranger]
+#: Nobody there bids by the core's calls.
+WITHOUT = [name for name in CASES if simulated_of(site_of(name)).worker is None]
 
 
-@pytest.mark.parametrize("how", list(Stranger))
-@pytest.mark.parametrize("name", list(ORDERS))
-def test_orders_are_served_or_told_why_beside_a_stranger(name: str, how: Stranger) -> None:
-    site = find_site(name)
-    limit_s = simulated_of(site).patience_s(site, ORDERS[name], 1)
-    pair = play_pair(StrangerPlan(name, how, ORDERS[name], limit_s), 1)
+@pytest.mark.parametrize(("system", "how", "orders"), some(BESIDE, 6))
+def test_orders_are_served_or_told_why_beside_a_stranger(system: str, how: Stranger, orders: OrderArrivals) -> None:
+    limit_s = simulated_of(site_of(system)).patience_s(site_of(system), orders, 1)
+    pair = play_pair(StrangerPlan(site_file(system), how, orders, limit_s), 1)
     assert pair.is_good, pair.line()
     assert pair.strange.served, "not all of them refused"
 
@@ -40,8 +35,7 @@ def test_two_desks_that_want_one_box_get_two() -> None:
     assert pair.is_good, pair.line()
 
 
-def test_a_site_without_calls_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "made.toml"
-    path.write_text(site_text(2, [(0, "1,2", "3,5")]), encoding="utf-8")
-    assert main(["campaign", str(path), "--stranger", "stands", "--seeds", "1-1"]) == 2
+@pytest.mark.parametrize("system", WITHOUT)
+def test_a_site_on_which_nobody_can_be_a_stranger_says_so(system: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["campaign", site_file(system), "--stranger", "stands", "--seeds", "1-1"]) == 2
     assert "where no machine bids by the calls of all" in capsys.readouterr().err

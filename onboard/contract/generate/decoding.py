@@ -1,20 +1,17 @@
-"""Straight-line functions between message objects and bytes as Python text.
+"""Straight-line functions from bytes to message objects as Python text.
 
-A frame is cut into words of 1, 2, 4 or 8 bytes such that no signal crosses a cut, and ``struct`` does the rest. Where
-several signals share a word they are put together with sums of products: on CPython 3.11 both have a fast way of their
-own for whole numbers, shifts and ``|`` have none (bench/codec.py).
+A frame is cut into words of 1, 2, 4 or 8 bytes such that no signal crosses a cut, and ``struct`` does the rest.
 """
 
+import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from onboard.contract.generate.model import TUPLES, DbcMessage, Field
+from onboard.contract.generate.model import TUPLES, DbcMessage
 from onboard.wire.dbc_file import SignalLayout
 
 #: Letters of ``struct`` by length in bytes.
 _LETTERS = {1: "B", 2: "H", 4: "I", 8: "Q"}
-#: Bits of one digit of CPython's whole numbers: sums that stay below are several times as fast.
-_DIGIT_BITS = 30
 #: Cost of one more word and of one more signal in a word, in ns on the machine of docs/figures.md, and of each signal
 #: behind the first in a word that is longer than a digit.
 _WORD_NS, _SIGNAL_NS, _LONG_NS = 12, 30, 20
@@ -90,91 +87,19 @@ def function_name(frame: DbcMessage) -> str:
     return "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in frame.layout.name).lstrip("_")
 
 
-def pack_function(frame: DbcMessage) -> str:
-    """The function from a message to its bytes."""
-    name = function_name(frame)
-    lines = [f"def pack_{name}(message: {frame.layout.name}) -> bytes:"]
-    for field in frame.fields:
-        for signal, path in _paths(field):
-            if field.kind in ("int", *TUPLES):
-                lines.append(f"    {signal.name} = message.{path}")
-                lines += _refusal(frame, signal)
-    enums = {signal.name: f"message.{path}" for field in frame.fields for signal, path in _paths(field)}
-    ints = {signal.name for field in frame.fields if field.kind in ("int", *TUPLES) for signal in field.signals}
-    values = [
-        _written(word, {name: name if name in ints else path for name, path in enums.items()})
-        for word in words(frame)
-        if word.signals
-    ]
-    lines.append(f"    return _{_shape(frame)}.pack({', '.join(values)})")
-    return "\n".join(lines) + "\n"
-
-
-def _paths(field: Field) -> Iterator[tuple[SignalLayout, str]]:
-    for number, signal in enumerate(field.signals):
-        yield signal, f"{field.name}.{TUPLES[field.kind][number]}" if field.kind in TUPLES else field.name
-
-
-def _refusal(frame: DbcMessage, signal: SignalLayout) -> list[str]:
-    where = f'"{frame.layout.name}.{signal.name}"'
-    return [
-        f"    if not {signal.minimum} <= {signal.name} <= {signal.maximum}:",
-        f"        raise OutOfRangeError({where}, {signal.name}, {signal.minimum}, {signal.maximum})",
-    ]
-
-
-def _written(word: Word, names: dict[str, str]) -> str:
-    """The expression that makes a word of its signals, those of one digit of a whole number together."""
-    digits: list[list[SignalLayout]] = []
-    for signal in word.signals:
-        end = signal.shift + signal.bits
-        if digits and end - digits[-1][0].shift <= _DIGIT_BITS:
-            digits[-1].append(signal)
-        else:
-            digits.append([signal])
-    sums = []
-    for digit in digits:
-        terms = [_times(_raw(word, signal, names[signal.name]), signal.shift - digit[0].shift) for signal in digit]
-        shift = digit[0].shift - word.start * 8
-        total = " + ".join(terms)
-        sums.append(_times(f"({total})" if shift and len(terms) > 1 else total, shift))
-    return " + ".join(sums)
-
-
-def _raw(word: Word, signal: SignalLayout, name: str) -> str:
-    """What a signal holds of a value."""
-    term = name
-    if signal.scale != 1:
-        term = f"({term} - {signal.offset}) // {signal.scale}" if signal.offset else f"{term} // {signal.scale}"
-        term = term if len(word.signals) == 1 else f"({term})"
-    return f"({term} & {_mask(signal)})" if signal.signed and not word.is_plain else term
-
-
-def _times(term: str, shift: int) -> str:
-    return f"{term} * 0x{1 << shift:X}" if shift else term
-
-
 def _mask(signal: SignalLayout) -> str:
     return f"0x{(1 << signal.bits) - 1:X}"
 
 
-def _shape(frame: DbcMessage) -> str:
-    """The name of the frame's ``Struct``."""
-    return (
-        struct_format(frame)
-        .lstrip("<")
-        .replace("b", "sb")
-        .replace("h", "sh")
-        .replace("i", "si")
-        .replace("q", "sq")
-        .upper()
-    )
+def shape(layout: str) -> str:
+    """A name for a format of ``struct``: signed letters with an S before them."""
+    return re.sub("[bhiq]", lambda found: f"S{found[0].upper()}", layout.lstrip("<")).replace("x", "X")
 
 
-def shapes(frames: tuple[DbcMessage, ...]) -> str:
-    """A ``Struct`` for each format in use."""
-    found = {_shape(frame): struct_format(frame) for frame in frames}
-    return "".join(f'_{shape} = Struct("{found[shape]}")\n' for shape in sorted(found))
+def reader(frame: DbcMessage) -> tuple[str, str]:
+    """Name and value of what takes the words out of a frame."""
+    layout = struct_format(frame)
+    return f"_UNPACK_{shape(layout)}", f'struct.Struct("{layout}").unpack_from'
 
 
 def unpack_function(frame: DbcMessage) -> str:
@@ -183,7 +108,7 @@ def unpack_function(frame: DbcMessage) -> str:
     lines = [f"def unpack_{name}(sender: int, data: bytes) -> {frame.layout.name} | None:"]
     if parts:
         names = [word.signals[0].name if len(word.signals) == 1 else f"word_{word.start}" for word in parts]
-        lines.append(f"    {', '.join(names)}{',' if len(names) == 1 else ''} = _{_shape(frame)}.unpack_from(data)")
+        lines.append(f"    {', '.join(names)}{',' if len(names) == 1 else ''} = {reader(frame)[0]}(data)")
     tables = {field.signals[0].name: field.kind for field in frame.fields if field.kind not in ("int", "bool", *TUPLES)}
     booleans = {field.signals[0].name for field in frame.fields if field.kind == "bool"}
     for word in parts:

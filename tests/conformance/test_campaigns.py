@@ -13,25 +13,15 @@ from bus_sim.campaign.trial import play
 from bus_sim.cli import main
 from bus_sim.faults.injection import parse_injection
 from bus_sim.faults.scenario import FaultScenario, load_scenario
-from bus_sim.sites import find_site
-from bus_sim.systems.mapd.importers.command import import_files
-from bus_sim.systems.mapd.importers.draft import site_text
-from bus_sim.systems.mapd.importers.mapf import DrawnDemand
 from bus_sim.systems.orders import DRAWN, OrderArrivals, OrderedSystem
 from bus_sim.systems.registry import simulated_names, simulated_of
 from onboard.core.site import Site
 from onboard.systems.registry import system_names
-from tests.faults.systems import PLANTS
+from tests.conformance.cases import CASES
+from tests.conformance.runs import site_of
 
-SHIPPED = ("cell", "graph", "terminal", "turning")
-
-
-@pytest.fixture(scope="module")
-def hotel(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The file of an imported plant."""
-    path = tmp_path_factory.mktemp("hotel") / "hotel.toml"
-    path.write_text(site_text(import_files([PLANTS / "hotel.building.yaml"], DrawnDemand(tasks=3, seed=7))), "utf-8")
-    return str(path)
+#: To which orders come.
+ORDERED = [name for name in CASES if name != "car-park"]
 
 
 def ordered(site: Site) -> OrderedSystem[Any, Any]:
@@ -45,9 +35,9 @@ def test_every_system_of_the_boards_can_be_simulated() -> None:
     assert simulated_names() == system_names()
 
 
-@pytest.mark.parametrize("name", [*SHIPPED, "hotel"])
-def test_a_seed_draws_orders_of_its_own_and_they_are_carried_out(name: str, hotel: str) -> None:
-    site = find_site(hotel if name == "hotel" else name)
+@pytest.mark.parametrize("name", ORDERED)
+def test_a_seed_draws_orders_of_its_own_and_they_are_carried_out(name: str) -> None:
+    site = site_of(name)
     system = ordered(site)
     orders = OrderArrivals(3, system.most(site).apart_s)
     drawn = [system.with_orders(site, orders, seed) for seed in (1, 1, 2)]
@@ -59,10 +49,10 @@ def test_a_seed_draws_orders_of_its_own_and_they_are_carried_out(name: str, hote
     assert report.simulated_s < 3 * system.span_s(drawn[0])[1]
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", ORDERED)
 def test_faults_strike_while_orders_are_carried_out(name: str) -> None:
-    system = ordered(find_site(name))
-    site = system.with_orders(find_site(name), OrderArrivals(4, 30.0), 1)
+    system = ordered(site_of(name))
+    site = system.with_orders(site_of(name), OrderArrivals(4, 30.0), 1)
     first_s, last_s = system.span_s(site)
     for profile in ("bus", "crash", "all"):
         assert kinds_for(profile, site).keys() <= DRAWN

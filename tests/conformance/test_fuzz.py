@@ -8,11 +8,13 @@ import pytest
 from bus_sim.campaign.fuzz import Fuzzer
 from bus_sim.sites import find_site
 from onboard.contract.codes import Reason
-from tests.mapd.sites import drawn, made
+from tests.conformance.cases import CASES
+from tests.conformance.runs import one_of_each_kind, site_of
+from tests.thinned import is_long
 
-FRAMES = 20_000
+FRAMES = 20_000 if is_long() else 8_000
 #: Where a machine's own frames are few, or its device bus is silent, most that can be found is found in so many.
-SYSTEM_FRAMES = 8_000
+SYSTEM_FRAMES = 8_000 if is_long() else 4_000
 #: Items in all tables of one controller; a run of the site without a fuzzer has about a third of it.
 MOST_ITEMS = 40_000
 
@@ -28,25 +30,13 @@ def test_a_controller_survives_whatever_the_wire_brings(name: str) -> None:
     assert outcome.reasons.keys() >= {Reason.OTHER_CONTRACT, Reason.OTHER_SITE, Reason.INCOMPLETE_SET}
 
 
-#: One machine of every kind of the other systems; the last one's site is drawn.
-MACHINES = [
-    ("graph", "R1"),
-    ("graph", "NA"),
-    ("graph", "OD"),
-    ("cell", "R1"),
-    ("cell", "GM"),
-    ("turning", "L1"),
-    ("turning", "DESK"),
-    ("terminal", "R1"),
-    ("terminal", "Desk"),
-    ("warehouse", "R1"),
-    ("warehouse", "Desk"),
-]
+#: One machine of every kind of the other systems.
+MACHINES = [(name, machine) for name in CASES if name != "car-park" for machine in one_of_each_kind(name)]
 
 
 @pytest.mark.parametrize(("name", "machine"), MACHINES)
 def test_a_machine_of_any_system_survives_it_too(name: str, machine: str) -> None:
-    site = made(3, drawn(8, 1)) if name == "warehouse" else find_site(name)
+    site = site_of(name)
     outcome = Fuzzer(site, site.machine(machine)).run(SYSTEM_FRAMES)
     assert outcome.errors == []
     assert outcome.uncounted == []

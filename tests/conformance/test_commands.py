@@ -1,6 +1,7 @@
 """`bus-sim run` takes every option on every system: what concerns buses, processes and faults is nobody's own."""
 
 import json
+import os
 import re
 import signal
 from collections.abc import Callable
@@ -19,28 +20,20 @@ from bus_sim.faults.table import KINDS
 from bus_sim.options import RunOptions
 from bus_sim.processes.plan import ProcessPlan
 from bus_sim.run import FLEET, BusRun
-from bus_sim.sites import find_site, site_text
+from bus_sim.sites import site_text
 from bus_sim.systems.registry import simulated_names
 from onboard.contract.messages import Heartbeat, Message
 from onboard.systems.contract import codecs_for
+from onboard.systems.registry import system_names
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.decoder import Decoder
-from tests.mapd import sites as mapd
+from tests.conformance.cases import CASES
+from tests.conformance.runs import site_file, site_of
+from tests.tools import DEADLINE_S
 
-#: A site of each system.
-SITES = {"car-park": "small", "cell": "cell", "graph": "graph", "terminal": "terminal", "turning": "turning"}
-#: A process that has said nothing until then never will, s of the clock.
-DEADLINE_S = 120.0
-every_system = pytest.mark.parametrize("system", simulated_names())
-
-
-def site_of(system: str, folder: Path) -> str:
-    """A site of this system as ``bus-sim run`` takes it."""
-    if system in SITES:
-        return SITES[system]
-    path = folder / "made.toml"
-    path.write_text(mapd.site_text(2, [(0, "1,2", "3,5"), (4, "3,5", "1,2")]), encoding="utf-8")
-    return str(path)
+PLUGIN = Path(__file__).parents[1] / "plugin"
+every_system = pytest.mark.parametrize("system", CASES)
+without_cars = pytest.mark.parametrize("system", [one for one in CASES if one != "car-park"])
 
 
 @pytest.fixture
@@ -50,7 +43,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
 
     def play(system: str, *options: str, seconds: float = 20.0, statuses: tuple[int, ...] = (0, 1)) -> str:
         # Few runs are over so soon: 1 says that somebody waits, and nothing else may be wrong.
-        words = [site_of(system, tmp_path), "--for", str(seconds), "--seed", "1", "--json", "figures.json", *options]
+        words = [site_file(system), "--for", str(seconds), "--seed", "1", "--json", "figures.json", *options]
         status = main(["run", *words])
         said = capsys.readouterr()
         assert status in statuses, said.err
@@ -66,19 +59,19 @@ def nothing_broke(folder: Path) -> None:
 
 def heard(system: str, folder: Path, log: str = "trace.log") -> set[int]:
     """Who was heard on the fleet bus: node-IDs."""
-    decoder = Decoder(codecs_for(find_site(site_of(system, folder))).fleet)
+    decoder = Decoder(codecs_for(site_of(system)).fleet)
     with (folder / log).open("rb") as lines:
         messages = [decoder.feed(one.frame, 0) for one in CandumpReader(lines) if one.channel == FLEET]
     return {one.sender for one in messages if isinstance(one, Heartbeat)}
 
 
-def test_each_system_that_boards_know_has_a_site_here() -> None:
-    assert {*SITES, "mapd"} == set(simulated_names())
+def test_each_system_that_can_be_simulated_is_tried_here() -> None:
+    assert CASES.keys() == set(simulated_names()) == set(system_names())
 
 
 @every_system
 def test_a_machine_is_left_out(system: str, run: Callable[..., str], tmp_path: Path) -> None:
-    machines = find_site(site_of(system, tmp_path)).machines
+    machines = site_of(system).machines
     left_out = list(machines.values())[-1]
     run(system, "--without", left_out.name, "--speed", "max")
     assert heard(system, tmp_path) == set(machines) - {left_out.node_id}
@@ -97,7 +90,7 @@ def test_its_buses_are_served_joined_and_shown(system: str, run: Callable[..., s
         options = ("--serve", "127.0.0.1:0", "--bus", f"virtual:{channel}", "--web", "0", "--speed", "max")
         said = run(system, *options, seconds=3.0)
         frames = list(iter(partial(outside.recv, timeout=0), None))
-    names = [one.name for one in find_site(site_of(system, tmp_path)).machines.values()]
+    names = [one.name for one in site_of(system).machines.values()]
     assert f"(socketcand), channels {', '.join([FLEET, *names])}" in said
     assert f"the fleet bus is on virtual:{channel}" in said and "picture at http://127.0.0.1:" in said
     assert frames, "nothing came through to the interface"
@@ -108,8 +101,10 @@ def test_its_buses_are_served_joined_and_shown(system: str, run: Callable[..., s
 def test_a_machine_is_a_process_of_its_own(system: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The last machine runs as ``onboard``, all others are off; it speaks under its site's digest."""
     monkeypatch.chdir(tmp_path)
-    name = site_of(system, tmp_path)
-    site = find_site(name)
+    # As where the package of a system is installed.
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(PLUGIN), str(PLUGIN.parents[1])]))
+    name = site_file(system)
+    site = site_of(system)
     *others, process = site.machines.values()
     said: list[Heartbeat] = []
 
@@ -154,9 +149,9 @@ def test_it_is_published(system: str, run: Callable[..., str], monkeypatch: pyte
     assert published == [(system, True, "mqtt://127.0.0.1:1", "127.0.0.1")]
 
 
-def faults_on(system: str, folder: Path) -> list[str]:
+def faults_on(system: str) -> list[str]:
     """One fault of each kind that any system can have."""
-    names = [one.name for one in find_site(site_of(system, folder)).machines.values()]
+    names = [one.name for one in site_of(system).machines.values()]
     settings = {"target": names[-1], "receivers": names[-1], "members": names[-1], "name": "mutated", "do": "stop"}
     found = []
     for kind in (*FRAME_FAULTS, *ACTIONS):
@@ -169,7 +164,7 @@ def faults_on(system: str, folder: Path) -> list[str]:
 @every_system
 def test_faults_of_buses_controllers_and_operators_strike(system: str, run: Callable[..., str], tmp_path: Path) -> None:
     """All at once, so that only what is said of them can be looked at: every kind is taken, and nothing gives way."""
-    options = [word for fault in faults_on(system, tmp_path) for word in ("--fault", fault)]
+    options = [word for fault in faults_on(system) for word in ("--fault", fault)]
     run(system, *options, "--speed", "max", seconds=12.0)
     figures = json.loads((tmp_path / "figures.json").read_text(encoding="utf-8"))
     assert not figures["violations"], figures
@@ -177,13 +172,13 @@ def test_faults_of_buses_controllers_and_operators_strike(system: str, run: Call
 
 @every_system
 def test_one_crash_is_got_over(system: str, run: Callable[..., str], tmp_path: Path) -> None:
-    machine = list(find_site(site_of(system, tmp_path)).machines.values())[-1]
+    machine = list(site_of(system).machines.values())[-1]
     run(system, "--fault", f"crash:target={machine.name},at_s=5,restart_s=2", "--speed", "max", seconds=12.0)
     nothing_broke(tmp_path)
     assert machine.node_id in heard(system, tmp_path)
 
 
-@pytest.mark.parametrize("system", [one for one in simulated_names() if one != "car-park"])
+@without_cars
 @pytest.mark.parametrize(
     "option",
     [("--random", "40", "15"), ("--one-car", "60"), ("--hour", "07:00"), ("--by-hand",), ("--day", "x")],
@@ -196,7 +191,7 @@ def test_what_is_about_cars_is_refused_where_no_cars_come(
     assert re.match(rf"bus-sim: {option[0]}: is about cars .* is a {system}, and its orders are those of its", said)
 
 
-@pytest.mark.parametrize("system", [one for one in simulated_names() if one != "car-park"])
+@without_cars
 def test_a_fault_that_strikes_nothing_there_is_refused_with_the_reason(system: str, run: Callable[..., str]) -> None:
     said = run(system, "--fault", "lost_ticket:car=1", "--speed", "max", seconds=1.0, statuses=(2,))
     assert f"a {system} has nothing that this strikes (a customer comes back without the ticket)" in said
@@ -205,6 +200,6 @@ def test_a_fault_that_strikes_nothing_there_is_refused_with_the_reason(system: s
 @every_system
 def test_a_scene_of_single_faults_is_there(system: str, tmp_path: Path) -> None:
     """`bus-sim campaign S --exhaustive crash`: one order alone, all points of it, of which two are played."""
-    name = site_of(system, tmp_path)
+    name = site_file(system)
     words = ["--exhaustive", "crash", "--sample", "2", "--jobs", "1", "--out", str(tmp_path / "out")]
     assert main(["campaign", name, *words]) == 0

@@ -1,7 +1,5 @@
 """Where rights cannot be made anew a machine whose journal is lost or short holds by name too, and has a remedy."""
 
-from pathlib import Path
-
 import pytest
 
 from bus_sim.campaign.trial import stage_of
@@ -9,10 +7,6 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.faults.scenario import FaultScenario
 from bus_sim.run import run_until
-from bus_sim.sites import find_site
-from bus_sim.systems.mapd.importers.command import import_files
-from bus_sim.systems.mapd.importers.draft import site_text
-from bus_sim.systems.mapd.importers.mapf import DrawnDemand
 from bus_sim.systems.orders import OrderArrivals
 from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.system import Occasion
@@ -36,18 +30,16 @@ from onboard.operate.commands import CommandRequest, maker_of
 from onboard.operate.names import OperateError
 from onboard.operate.park import Park
 from onboard.operate.status import Status
-from tests.faults.systems import PLANTS
+from tests.conformance.cases import CASES
+from tests.conformance.runs import one_of_each_kind, site_of
 
 AT_S, OFF_S, END_S = 30, 3, 60
 #: What nobody says whose rights are not known.
 OF_RIGHTS = (CallForProposals, Bid, Award, TokenRequest, TokenGrant, TokenHeld, TokenGiven, NodeAnswer)
 
 
-@pytest.fixture(scope="module")
-def hotel(tmp_path_factory: pytest.TempPathFactory) -> str:
-    path: Path = tmp_path_factory.mktemp("hotel") / "hotel.toml"
-    path.write_text(site_text(import_files([PLANTS / "hotel.building.yaml"], DrawnDemand(tasks=3, seed=7))), "utf-8")
-    return str(path)
+#: One machine of each kind of every system whose rights nobody can make anew.
+MACHINES = [(name, machine) for name in CASES if name != "car-park" for machine in one_of_each_kind(name)]
 
 
 def said_by(site: Site, name: str, journal: str) -> tuple[list[tuple[int, Message]], Park]:
@@ -71,28 +63,12 @@ def said_by(site: Site, name: str, journal: str) -> tuple[list[tuple[int, Messag
     return [one for one in said if one[0] >= from_us and one[1].sender == node], park
 
 
-@pytest.mark.parametrize(
-    "where",
-    [
-        "cell R1",
-        "cell GM",
-        "graph NA",
-        "graph R1",
-        "graph OD",
-        "terminal Desk",
-        "terminal R1",
-        "turning L1",
-        "turning DESK",
-        "hotel",
-    ],
-)
+@pytest.mark.parametrize(("system", "name"), MACHINES)
 @pytest.mark.parametrize(("journal", "reason"), [("lost", Reason.JOURNAL_LOST), ("unsealed", Reason.JOURNAL_SHORT)])
 def test_a_machine_of_any_system_holds_for_its_journal_and_tells_the_remedy(
-    where: str, journal: str, reason: Reason, hotel: str
+    system: str, name: str, journal: str, reason: Reason
 ) -> None:
-    system, _, name = where.partition(" ")
-    site = find_site(hotel if system == "hotel" else system)
-    name = name or next(iter(site.machines.values())).name
+    site = site_of(system)
     said, park = said_by(site, name, journal)
     at_us = next(time_us for time_us, one in said if isinstance(one, Halted))
     assert at_us < (AT_S + OFF_S + 4) * 1_000_000

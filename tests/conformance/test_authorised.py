@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from bus_sim.cli import main
-from bus_sim.sites import find_site
 from onboard.contract.codes import KindCode, Reason
 from onboard.contract.messages import Halted, Message, TokenGrant
 from onboard.contract.terminal_device import MoveOrder
@@ -16,23 +15,15 @@ from onboard.holon.taking_part import TakingPart
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.listener import Listener
 from onboard.trace.readers.open_log import Log
-from tests.web.logs import contract, file_of
-
-#: How long each system runs until something has been set in motion, s, and with what else.
-RUNS = {
-    "small": ["--random", "40", "15", "--cars", "2", "--for", "150"],
-    "graph": ["--for", "30"],
-    "terminal": ["--for", "30"],
-    "cell": ["--for", "60"],
-    "turning": ["--for", "60"],
-    "mapd": ["--for", "20"],
-}
+from tests.conformance.cases import CASES
+from tests.conformance.runs import site_file, site_of
+from tests.web.logs import contract
 
 
 def orders_in_a_run(name: str, folder: Path) -> list[Message]:
     """What was said to devices in a run by which something moves; no machine has stopped for an order of its own."""
-    log, site = folder / "run.log", find_site(str(file_of(name)))
-    main(["run", str(file_of(name)), *RUNS[name], "--speed", "max", "--no-web", "--devices", "--trace", str(log)])
+    log, site = folder / "run.log", site_of(name)
+    main(["run", site_file(name), *CASES[name].moving, "--speed", "max", "--no-web", "--devices", "--trace", str(log)])
     orders, listener = list[Message](), Listener(contract(site))
     with Log(str(log)) as lines:
         for raw in lines:
@@ -43,12 +34,12 @@ def orders_in_a_run(name: str, folder: Path) -> list[Message]:
     return orders
 
 
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", CASES)
 def test_a02_a04_what_moves_is_set_in_motion_under_its_right(name: str, tmp_path: Path) -> None:
     assert orders_in_a_run(name, tmp_path), "else the other tests show nothing"
 
 
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", CASES)
 def test_a05_a_machine_that_may_not_move_orders_nothing(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -57,13 +48,13 @@ def test_a05_a_machine_that_may_not_move_orders_nothing(
     assert orders_in_a_run(name, tmp_path) == []
 
 
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", CASES)
 def test_a01_a03_a06_without_the_rights_of_others_nothing_enters_what_is_shared(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Every grant is lost: what still moves does so on open ground, within the machine, or in a shaft of its own."""
     monkeypatch.setattr(TokenBook, "on_grant", lost)
-    site = find_site(str(file_of(name)))
+    site = site_of(name)
     for order in orders_in_a_run(name, tmp_path):
         is_lift = site.machines[order.sender].kind is KindCode.LIFT
         assert is_lift or site.moved_by[type(order).__name__] is not MotionNeeds.RIGHT

@@ -7,8 +7,8 @@ import pytest
 from onboard.contract.codes import TaskPhase
 from onboard.contract.graph import VisitList
 from onboard.contract.messages import CallForProposals, TaskReport
+from tests.graph.test_named_orders import run
 from tests.mqtt.ordered import NODE
-from tests.mqtt.test_named_orders import run
 
 ORDERS = "onboard/made/orders"
 DESK = 9

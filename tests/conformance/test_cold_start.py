@@ -5,15 +5,18 @@ import pytest
 from bus_sim.campaign.cold_start import MOMENTS_S, STARTS_S, Start, cold_start, cold_starts
 from bus_sim.cli import main
 from bus_sim.sites import find_site
+from tests.conformance.cases import CASES
+from tests.conformance.runs import site_file
 
 #: Sites of all systems that take little time; the rest by ``bus-sim campaign SITE --cold-start``.
-CHEAP = ("level1", "small", "graph", "turning", "terminal", "cell")
+CHEAP = ("level1", *CASES)
 
 
 @pytest.mark.parametrize("name", CHEAP)
 def test_every_machine_that_has_power_takes_part_in_time(name: str) -> None:
-    starts = list(cold_starts(find_site(name), name, MOMENTS_S[:1]))
-    assert len(starts) == 1 + len(find_site(name).machines)
+    file = site_file(name) if name in CASES else name
+    starts = list(cold_starts(find_site(file), file, MOMENTS_S[:1]))
+    assert len(starts) == 1 + len(find_site(file).machines)
     assert [str(one) for one in starts if not one.is_good] == []
     assert all(0 < one.longest_s <= STARTS_S for one in starts if one.missing is None)
 
