@@ -24,7 +24,7 @@ from onboard.core.effects import Effect, Record, Send
 from onboard.core.journal_records import records_in
 from onboard.core.motion_authority import authorised
 from onboard.core.negotiation import Awarded, AwardedAgain, NegotiationEvent, PreAssigned, Released
-from onboard.core.serial import from_bus_ms, successor
+from onboard.core.serial import from_bus_ms
 from onboard.systems.car_park.bay_memory import BayMemory
 from onboard.systems.car_park.lift_generation import LiftGeneration
 from onboard.systems.car_park.lift_steps import LIFT_TABLE, LiftDeed, LiftFinding, LiftPhase
@@ -33,6 +33,7 @@ from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.ways.lifts import MARK_TOLERANCE_MM, gate, nearest_stop, platform, stop_mm, under_gate
 from onboard.ways.mirror import WayFleet
+from onboard.work.device_link import DeviceLink
 
 #: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps.
 OFF_LIMIT_MM = 20_000
@@ -62,15 +63,20 @@ class Lift:
     stewardship: Stewardship = field(init=False)
     stall: Stall = field(default_factory=Stall)
     _is_stuck: bool = False
-    _sequence: int = 0
-    _target: int | None = None
-    _refresh_at_us: int | None = None
+    #: The drive's orders: a position in the shaft, mm.
+    link: DeviceLink[int] = field(init=False)
     _told: tuple[int, DriveMode, int] | None = None
     _gate_was_out: bool = False
     _made: dict[int, int] = field(default_factory=dict)
     _rides_with_me: dict[int, tuple[Itinerary, bool]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        me, site = self.fleet.node_id, self.fleet.site
+        speed_mm_s = site.lift.speed_mm_s
+        self.link = DeviceLink(
+            lambda sequence, position_mm: DriveOrder(me, sequence, position_mm, speed_mm_s),
+            site.timing.drive_refresh_us,
+        )
         self.stewardship = Stewardship(self.fleet)
         self.stewardship.replay(BayMemory(self.fleet.node_id).read(self.fleet.entries))
 
@@ -112,7 +118,7 @@ class Lift:
             self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
         if self.drive is None:
-            self._sequence = message.sequence
+            self.link.go_on_from(message.sequence)
         self.drive = message
         self.stall.sensed(message.position_mm, now_us)
         self.generation.index = self._index()
@@ -193,7 +199,7 @@ class Lift:
 
     def next_wake(self) -> int | None:
         """When the drive's order is to be repeated, or a winner counts as lost."""
-        due = [time for time in (self._refresh_at_us, self.stewardship.next_wake()) if time is not None]
+        due = [time for time in (self.link.due_us, self.stewardship.next_wake()) if time is not None]
         return min(due, default=None)
 
     def watches(self, now_us: int) -> bool:
@@ -412,15 +418,14 @@ class Lift:
 
     def _stands_at(self, index: int) -> bool:
         drive = self.drive
-        if drive is None or drive.mode is not DriveMode.STANDING or drive.sequence != self._sequence:
+        if drive is None or drive.mode is not DriveMode.STANDING or drive.sequence != self.link.sequence:
             # One that has not taken up the last order yet may still go by it.
             return False
         return abs(drive.position_mm - self._position_mm(index)) <= MARK_TOLERANCE_MM
 
     def _stand(self) -> list[Effect]:
         self.stall.rests()
-        self._refresh_at_us = None
-        self._target = None
+        self.link.rest()
         return []
 
     def _go(self, index: int, now_us: int) -> list[Effect]:
@@ -430,16 +435,10 @@ class Lift:
         permit = authorised(self.fleet.motion, [segment_token(gate(self.track))])
         if not permit or self.platform is None or self.platform.crossing:
             return self._stand()
-        if index != self._target:
-            self._target = index
-            self._sequence = successor(self._sequence, 8)
-        elif self._refresh_at_us is not None and self._refresh_at_us > now_us:
-            return []
-        site = self.fleet.site
-        self.stall.ordered(now_us)
-        self._refresh_at_us = now_us + site.timing.drive_refresh_us
-        order = DriveOrder(self.fleet.node_id, self._sequence, self._position_mm(index), site.lift.speed_mm_s)
-        return permit.order(order)
+        said = self.link.order(self._position_mm(index), permit, now_us)
+        if said:
+            self.stall.ordered(now_us)
+        return said
 
 
 def rides_of(track: int, robot: int, itinerary: Itinerary, seen: Progress | None, now_us: int) -> list[Ride]:
