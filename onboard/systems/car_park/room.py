@@ -63,11 +63,9 @@ def _why_not(site: WaySite, home: Segment, tracks: list[int], taken: dict[int, s
 def _why_cut_off(site: WaySite, home: Segment) -> str:
     if home in open_refuges(site, ()):
         return ""
-    here = {track: stretch for track, stretch in resting_room(site).stretches.items() if track == home.track}
-    if here:
-        return (
-            f"nobody may stand there for ever; on this alley {here[home.track][0]} to {here[home.track][-1]} are free"
-        )
+    free = [one.index for one in resting_room(site).stretches.get(home.track, ())]
+    if free:
+        return f"nobody may stand there for ever; on this track positions {ranges_text(sorted(free))} are free"
     refused = dict(resting_room(site).refused)
     return refused.get(home.track, "nobody may stand there for ever")
 
