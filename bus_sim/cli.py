@@ -10,6 +10,7 @@ from typing import Any
 from bus_sim.attacks.command import add_attack, run_attack_command
 from bus_sim.campaign.command import add_campaign, run_campaign_command, run_scenario
 from bus_sim.demand import DemandError
+from bus_sim.demand_options import TABLE_OPTIONS, add_table_options
 from bus_sim.faults.injection import AnyFault, parse_injection
 from bus_sim.options import RunOptions
 from bus_sim.outputs import OutputError, check_outputs
@@ -95,7 +96,8 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         help="name of a shipped site, or a site file (default: standard, and an hour in which cars come and go)",
     )
     demand = run.add_argument_group("who comes (default: the shipped real day, 2019-07-24)")
-    demand.add_argument("--sessions", type=Path, metavar="FILE", help="sessions file (columns as in bus_sim/data)")
+    demand.add_argument("--sessions", type=Path, metavar="FILE", help="sessions file (CSV; docs/demand.md)")
+    add_table_options(demand)
     demand.add_argument(
         "--day",
         metavar="D[..D]",
@@ -342,7 +344,10 @@ def _faults(args: argparse.Namespace) -> list[AnyFault]:
 
 
 #: Options of ``run`` that say who comes, or what is shown of it: the system of the site reads them.
-_WHO_COMES = ("sessions", "day", "stalls", "one_car", "by_hand", "random", "cars", "hour", "window")
+_WHO_COMES = (
+    *("sessions", "counts", *TABLE_OPTIONS, "inside"),
+    *("day", "stalls", "one_car", "by_hand", "random", "cars", "hour", "window"),
+)
 
 
 def _options(args: argparse.Namespace, site: Site) -> RunOptions:

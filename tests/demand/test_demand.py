@@ -86,8 +86,11 @@ def test_columns_may_come_in_any_order_with_crlf_and_more(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("", "sessions.csv:1: no column arrival, departure, station_id, session_id; the first line must name"),
-        ("arrival,station_id,session_id\n", "sessions.csv:1: no column departure; the first line must name"),
+        ("", "sessions.csv:1: no column arrival, departure; the first line must name"),
+        (
+            "arrival,station_id,session_id\n",
+            "sessions.csv:1: no column departure; it has arrival, station_id, session_id; say which is which",
+        ),
         (HEAD, "sessions.csv: no sessions in the file"),
         (HEAD + GOOD + GOOD, "sessions.csv:3: session_id 'one' is that of line 2 too; make it unique"),
         (
@@ -96,8 +99,8 @@ def test_columns_may_come_in_any_order_with_crlf_and_more(tmp_path: Path) -> Non
         ),
         (HEAD + GOOD.replace("-07:00", "", 1), "sessions.csv:2: arrival '2019-07-24 05:35:06' has no UTC offset;"),
         (HEAD + GOOD.replace("15:39:33", "05:35:06"), "is not after arrival '2019-07-24 05:35:06-07:00'; correct"),
-        (HEAD + GOOD.replace("AG-1F11", " "), "sessions.csv:2: station_id is empty; every row needs one"),
-        (HEAD + GOOD + "2019-07-24 05:35:06-07:00\n", "sessions.csv:3: departure is empty; every row needs one"),
+        (HEAD + ",-,AG-1F11,one\n", "sessions.csv:2: arrival and departure are empty; every row needs one of them"),
+        (HEAD + GOOD + "2019-07-24 05:35:06-07:00\n", "sessions.csv:3: has 1 cell, the first line 4 names; put values"),
     ],
 )
 def test_a_bad_file_gets_one_line_with_place_value_and_remedy(tmp_path: Path, text: str, line: str) -> None:
@@ -108,7 +111,7 @@ def test_a_bad_file_gets_one_line_with_place_value_and_remedy(tmp_path: Path, te
 
 
 def test_a_file_that_is_not_there_or_no_text_gets_one_line(tmp_path: Path) -> None:
-    with pytest.raises(DemandError, match=r"nowhere\.csv: cannot be read .*; name a session CSV file"):
+    with pytest.raises(DemandError, match=r"nowhere\.csv: cannot be read .*; name a CSV file"):
         Demand.from_sessions(tmp_path / "nowhere.csv")
     with pytest.raises(DemandError, match="cannot be read"):
         Demand.from_sessions(tmp_path)

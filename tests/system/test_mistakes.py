@@ -25,9 +25,9 @@ MISTAKES = [
     (
         bus_sim,
         "run --sessions semicolons.csv",
-        r"semicolons.csv:1: no column arrival, .*divided by semicolons; save",
+        r"semicolons.csv:1: no column arrival, .*divided by another character; add --delimiter semi",
     ),
-    (bus_sim, "run --sessions tabs.csv", r"tabs.csv:1: no column arrival, .*divided by tabs; save it with commas"),
+    (bus_sim, "run --sessions tabs.csv", r"tabs.csv:1: no column arrival, .*add --delimiter tab"),
     (bus_sim, "compare --json gone/t.json", r"--json gone/t.json: there is no folder gone"),
     (bus_sim, "campaign small --json gone/t.json", r"--json gone/t.json: there is no folder gone"),
     (bus_sim, "campaign small --out file", r"--out file: is a file; name a folder"),

@@ -1,14 +1,21 @@
 """Who comes to a car park in ``bus-sim run``: the day, the hour or the cars that a person asked for."""
 
 from argparse import Namespace
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
 
 from bus_sim.demand import DemandError
-from bus_sim.systems.car_park.demand import LEVEL1_DAY, WHOLE_DAY, Demand
+from bus_sim.systems.car_park.csv_rows import CsvForm
+from bus_sim.systems.car_park.demand import LEVEL1_DAY, WHOLE_DAY, Demand, with_more_inside
+from bus_sim.systems.car_park.mapping import table_form
 from onboard.core.site import Site
 from onboard.ways.site import way_site
+
+#: Word of ``--inside`` for the cars that the table itself says were there.
+RECORDED = "recorded"
+#: More cars than any site has places.
+MOST_INSIDE = 100_000
 
 
 @dataclass(frozen=True)
@@ -16,6 +23,12 @@ class ParkingDay:
     """Who comes, as the options of ``bus-sim run`` say it; see its help. ``window`` is what is shown of it."""
 
     sessions: Path | None = None
+    #: Counts by the hour instead of sessions.
+    counts: Path | None = None
+    form: CsvForm = field(default_factory=CsvForm)
+    #: So many more cars are inside at the start; ``overnight``: and who came before the day and was still there.
+    inside: int = 0
+    overnight: bool = False
     day: str | None = None
     stalls: tuple[str, ...] = ()
     one_car_s: float | None = None
@@ -41,8 +54,20 @@ def choose_demand(day: ParkingDay, site: Site | None = None, seed: int = 1) -> D
     if day.random_s is not None:
         return Demand.by_mean(*day.random_s, seed, count=day.cars)
     first, last = _days(day.day)
+    if day.counts is not None:
+        return Demand.from_counts(day.counts, day=first, until=last, seed=seed, form=day.form, inside=day.inside)
     shipped = WHOLE_DAY if site is not None and len(way_site(site).compartments) > 1 else LEVEL1_DAY
-    return Demand.from_sessions(day.sessions, stations=day.stalls, day=first, until=last, shipped=shipped, seed=seed)
+    demand = Demand.from_sessions(
+        day.sessions,
+        stations=day.stalls,
+        day=first,
+        until=last,
+        shipped=shipped,
+        seed=seed,
+        form=day.form,
+        overnight=day.overnight,
+    )
+    return with_more_inside(demand, day.inside, seed)
 
 
 def _days(text: str | None) -> tuple[date | None, date | None]:
@@ -72,8 +97,14 @@ def asked_day(args: Namespace, *, live: bool) -> ParkingDay:
             f"--without {args.without[0]}: a window's warm-up is hurried, and a controller in another process lives at "
             "the clock's pace; leave out --hour and --window"
         )
+    _check_together(args)
+    inside, overnight = asked_inside(args)
     return ParkingDay(
         sessions=args.sessions,
+        counts=args.counts,
+        form=table_form(args),
+        inside=inside,
+        overnight=overnight,
         day=args.day,
         stalls=tuple(name for name in args.stalls.split(",") if name),
         one_car_s=args.one_car,
@@ -83,6 +114,31 @@ def asked_day(args: Namespace, *, live: bool) -> ParkingDay:
         short_eve=True,
         by_hand=args.by_hand,
     )
+
+
+def asked_inside(args: Namespace) -> tuple[int, bool]:
+    """How many are inside at the start, and whether who was recorded is. Raises ``DemandError`` for anything else."""
+    text = args.inside
+    if text is None:
+        return 0, False
+    if text == RECORDED:
+        if args.day is None or args.counts is not None:
+            raise DemandError(f"--inside {text}: who came before the day; add --day D and --sessions FILE")
+        return 0, True
+    if not text.isdecimal() or int(text) > MOST_INSIDE:
+        raise DemandError(f"--inside {text}: must be a number of cars from 0 to {MOST_INSIDE}, or {RECORDED}")
+    return int(text), False
+
+
+def _check_together(args: Namespace) -> None:
+    """Raise ``DemandError`` for two options that say differently who comes."""
+    others = ("sessions", "one_car", "random", "by_hand")
+    given = [f"--{name.replace('_', '-')}" for name in others if getattr(args, name) not in (None, False)]
+    if args.counts is not None and (given or args.stalls):
+        raise DemandError(f"{(given or ['--stalls'])[0]}: does not go with --counts; leave one of them out")
+    drawn = [option for option in given if option != "--sessions"]
+    if args.inside is not None and drawn:
+        raise DemandError(f"--inside {args.inside}: does not go with {drawn[0]}; leave one of them out")
 
 
 def _window(args: Namespace, *, live: bool) -> str | None:

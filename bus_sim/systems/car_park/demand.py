@@ -1,37 +1,25 @@
 """What customers want of a car park: who comes when with which car, and when it is fetched.
 
-Three sources: recorded sessions (CSV), random intervals by mean and standard deviation (row P53), cars by hand (P52).
+Four sources: recorded sessions and hourly counts (CSV), random intervals by mean and standard deviation (row P53), cars
+by hand (P52).
 """
 
-import csv
-import io
 import random
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from datetime import date, datetime, time
 from importlib.resources import files
 from pathlib import Path
-from typing import NamedTuple, Protocol
 
 from bus_sim.demand import DemandError, Law
+from bus_sim.systems.car_park.counts import chosen_counts, day_zero, drawn_stays, no_counts, read_counts
+from bus_sim.systems.car_park.csv_rows import CsvForm, CsvTable, Readable
 from bus_sim.systems.car_park.plant.bodies import CarBody, random_car
+from bus_sim.systems.car_park.sessions import ParkingSession, nothing_chosen, read_sessions
 
-#: Columns of a session file that are read; others may be there.
-COLUMNS = ("arrival", "departure", "station_id", "session_id")
 #: What ships with the simulator, both 2019-07-24 (bus_sim/data/README.md): stalls AG-1F01 to AG-1F14, and all 52.
 LEVEL1_DAY = "acn_jpl_2019-07-24_level1.csv"
 WHOLE_DAY = "acn_jpl_2019-07-24.csv"
-
-
-class Readable(Protocol):
-    """A file, on disk or inside a package."""
-
-    @property
-    def name(self) -> str:
-        """Its name, for error lines."""
-
-    def read_text(self, encoding: str) -> str:
-        """Its whole text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,11 +37,16 @@ class Stay:
 
 @dataclass(frozen=True)
 class Demand:
-    """Stays in the order of arrival. ``zero`` is the wall time of time zero, where the demand has one."""
+    """Stays in the order of arrival. ``zero`` is the wall time of time zero, where the demand has one.
+
+    ``inside``: cars that are inside when it begins; when they came is not known. ``remarks``: lines for who asked.
+    """
 
     stays: tuple[Stay, ...]
     zero: datetime | None = None
     skipped: int = 0
+    inside: tuple[Stay, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @classmethod
     def from_sessions(
@@ -65,26 +58,67 @@ class Demand:
         until: date | None = None,
         shipped: str = LEVEL1_DAY,
         seed: int = 0,
+        form: CsvForm | None = None,
+        overnight: bool = False,
     ) -> "Demand":
         """The sessions of a CSV file that begin on one local day at stations named, or beginning as named.
 
         Without a path the ``shipped`` day is read; without stations all count; without a day all days, and time zero is
         midnight before the first arrival. With ``until`` the days from ``day`` to it, both included. A session still
-        there at midnight keeps its later departure. ``skipped`` counts rows of other days and stations. Raises
-        ``DemandError`` for what cannot be read.
+        there at midnight keeps its later departure. One without an arrival is inside at the start if it is fetched on
+        one of the days, with ``overnight`` also who came before the first day and was there when it began. ``skipped``
+        counts rows of other days and stations. Raises ``DemandError`` for what cannot be read, and for bad rows unless
+        the form passes them over.
         """
         source: Readable = Path(path) if path is not None else _shipped(shipped)
-        wanted = tuple(stations)
-        sessions = list(read_sessions(source))
-        last = until or day
-        chosen = [s for s in sessions if s.is_at(wanted) and _is_within(s.arrival.date(), day, last)]
+        wanted, last = tuple(stations), until or day
+        table = CsvTable(source.name, form or CsvForm())
+        sessions = list(read_sessions(source, table))
+        remarks = table.checked()
+        here = [one for one in sessions if one.is_at(wanted)]
+        held = [one for one in here if overnight and one.is_inside(day)]
+        chosen = [one for one in here if one not in held and _is_within(one.first.date(), day, last)]
         if not chosen:
-            raise DemandError(_nothing(source.name, sessions, wanted, day, last))
-        chosen.sort(key=lambda session: (session.arrival, session.name))
-        first = chosen[0].arrival
+            raise nothing_chosen(source.name, sessions, wanted, day, last)
+        chosen.sort(key=lambda session: (session.first, session.name))
+        first = chosen[0].first
         zero = datetime.combine(first.date(), time(), first.tzinfo)
-        stays = tuple(session.stay(zero, seed) for session in chosen)
-        return cls(stays, zero, len(sessions) - len(chosen))
+        stays = tuple(_session_stay(one, zero, seed) for one in chosen if one.arrival is not None)
+        unknown = [one for one in chosen if one.arrival is None]
+        before = tuple(_session_stay(one._replace(arrival=None), zero, seed) for one in (*held, *unknown))
+        return cls(stays, zero, len(sessions) - len(chosen) - len(held), before, tuple(remarks))
+
+    @classmethod
+    def from_counts(
+        cls,
+        path: str | Path,
+        *,
+        day: date | None = None,
+        until: date | None = None,
+        seed: int = 0,
+        form: CsvForm | None = None,
+        inside: int = 0,
+    ) -> "Demand":
+        """Cars that come and go as often as a CSV file counts in each hour; see ``drawn_stays``.
+
+        Raises ``DemandError`` as ``from_sessions`` does.
+        """
+        source = Path(path)
+        table = CsvTable(source.name, form or CsvForm())
+        counts = read_counts(source, table)
+        remarks = table.checked()
+        chosen = chosen_counts(counts, day, until or day)
+        if not chosen:
+            raise no_counts(source.name, counts, day, until or day)
+        drawn = drawn_stays(chosen, inside, seed)
+        cars = [random_car(f"car {number}", seed) for number in range(1, len(drawn) + 1)]
+        stays = [Stay(one.arrival_us or 0, one.departure_us, car) for one, car in zip(drawn, cars, strict=True)]
+        held = sum(one.arrival_us is None for one in drawn)
+        if held > inside:
+            remarks.append(f"{source.name}: {held} cars are inside at the start: so many leave before they came")
+        return cls(
+            tuple(stays[held:]), day_zero(chosen), len(counts) - len(chosen), tuple(stays[:held]), tuple(remarks)
+        )
 
     @classmethod
     def by_mean(
@@ -130,6 +164,12 @@ class Demand:
         return cls((Stay(0, departure_us, car or random_car("car 1", seed)),))
 
 
+def with_more_inside(demand: Demand, cars: int, seed: int) -> Demand:
+    """So many more cars are inside when it begins, and stay."""
+    more = tuple(Stay(0, None, random_car(f"inside {number}", seed)) for number in range(1, cars + 1))
+    return replace(demand, inside=(*demand.inside, *more)) if more else demand
+
+
 @dataclass(frozen=True)
 class Arrivals:
     """Cars at normal intervals, in s, fetched at such intervals ``min_stay_s`` after their coming at the earliest."""
@@ -159,97 +199,15 @@ class Arrivals:
         ]
 
 
-class ParkingSession(NamedTuple):
-    """One row of a session file; both times carry their UTC offset."""
-
-    arrival: datetime
-    departure: datetime
-    station: str
-    name: str
-
-    def is_at(self, stations: tuple[str, ...]) -> bool:
-        """Whether the session's station is named by, or begins with, one of ``stations``; any where there are none."""
-        return not stations or self.station.startswith(stations)
-
-    def stay(self, zero: datetime, seed: int) -> Stay:
-        """The visit in us after ``zero``, with a car drawn for this session."""
-        return Stay(_us(self.arrival, zero), _us(self.departure, zero), random_car(self.name, seed))
-
-
-def read_sessions(source: Readable) -> Iterator[ParkingSession]:
-    """All sessions of a CSV file in its order. Raises ``DemandError`` at the first thing that cannot be read."""
-    try:
-        text = source.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DemandError(f"{source.name}: cannot be read as UTF-8 text ({error}); name a session CSV file") from error
-    rows = csv.DictReader(io.StringIO(text, newline=""))
-    missing = [column for column in COLUMNS if column not in (rows.fieldnames or ())]
-    if missing:
-        raise DemandError(f"{source.name}:1: no column {', '.join(missing)}; {_header_remedy(rows.fieldnames)}")
-    names: dict[str, int] = {}
-    for row in rows:
-        where = f"{source.name}:{rows.line_num}"
-        session = _session(row, where)
-        if session.name in names:
-            raise DemandError(
-                f"{where}: session_id {session.name!r} is that of line {names[session.name]} too; make it unique"
-            )
-        names[session.name] = rows.line_num
-        yield session
-
-
-def _header_remedy(names: Sequence[str] | None) -> str:
-    """What to do about a first line that does not name the columns; spreadsheets often divide by other characters."""
-    if names is not None and len(names) == 1:
-        for mark, word in ((";", "semicolons"), ("\t", "tabs")):
-            if mark in names[0]:
-                return f"its columns are divided by {word}; save it with commas"
-    return f"the first line must name {', '.join(COLUMNS)}, divided by commas"
-
-
-def _session(row: dict[str, str | None], where: str) -> ParkingSession:
-    arrival, departure = _time(row, "arrival", where), _time(row, "departure", where)
-    if departure <= arrival:
-        times = f"departure {row['departure']!r} is not after arrival {row['arrival']!r}"
-        raise DemandError(f"{where}: {times}; correct or leave out the row")
-    return ParkingSession(arrival, departure, _cell(row, "station_id", where), _cell(row, "session_id", where))
-
-
-def _cell(row: dict[str, str | None], column: str, where: str) -> str:
-    value = (row.get(column) or "").strip()
-    if not value:
-        raise DemandError(f"{where}: {column} is empty; every row needs one")
-    return value
-
-
-def _time(row: dict[str, str | None], column: str, where: str) -> datetime:
-    value = _cell(row, column, where)
-    remedy = "write it as 2019-07-24 05:35:06-07:00"
-    try:
-        moment = datetime.fromisoformat(value)
-    except ValueError as error:
-        raise DemandError(f"{where}: {column} {value!r} is no date and time; {remedy}") from error
-    if moment.tzinfo is None:
-        raise DemandError(f"{where}: {column} {value!r} has no UTC offset; {remedy}")
-    return moment
+def _session_stay(session: ParkingSession, zero: datetime, seed: int) -> Stay:
+    """The visit in us after ``zero``, with a car drawn for this session; at 0 where the arrival is not known."""
+    arrival_us = 0 if session.arrival is None else _us(session.arrival, zero)
+    departure_us = None if session.departure is None else _us(session.departure, zero)
+    return Stay(arrival_us, departure_us, random_car(session.name, seed))
 
 
 def _is_within(day: date, first: date | None, last: date | None) -> bool:
     return (first is None or first <= day) and (last is None or day <= last)
-
-
-def _nothing(
-    name: str, sessions: list[ParkingSession], stations: tuple[str, ...], day: date | None, last: date | None
-) -> str:
-    if not sessions:
-        return f"{name}: no sessions in the file"
-    here = [session for session in sessions if session.is_at(stations)]
-    if not here:
-        known = sorted({session.station for session in sessions})
-        return f"{name}: no station {', '.join(stations)}; the file has {known[0]} to {known[-1]}"
-    days = sorted({session.arrival.date() for session in here})
-    when = f"on {day}" if day == last else f"from {day} to {last}"
-    return f"{name}: nobody arrives {when}; the file has {days[0]} to {days[-1]}"
 
 
 def _us(moment: datetime, zero: datetime) -> int:

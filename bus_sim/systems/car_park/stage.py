@@ -152,7 +152,7 @@ class CarParkStage(SystemStage[Plant]):
         told = (
             f"site {self.run.site.name}, {len(stays)} cars, seed {options.seed}, speed {options.speed or 'unlimited'}"
         )
-        return [told + "".join(f", fault {fault}" for fault in options.faults)]
+        return [told + "".join(f", fault {fault}" for fault in options.faults), *self._coming.demand.remarks]
 
     def warming_up(self, wall_s: float | None) -> str:
         """See ``SystemStage``."""

@@ -60,12 +60,13 @@ def two_way_hour(demand: Demand) -> DayWindow:
 
 def _best_hour(demand: Demand, worth: Callable[[int, int], tuple[int, int]]) -> DayWindow:
     """The first of the hours whose counts of arrivals and departures are worth most."""
-    if not demand.stays:
+    both = (*demand.inside, *demand.stays)
+    if not both:
         raise DemandError("busiest hour: nobody comes at all; give other days or stalls")
     come = sorted(stay.arrival_us for stay in demand.stays)
-    go = sorted(stay.departure_us for stay in demand.stays if stay.departure_us is not None)
-    first = max(0, (come[0] - HOUR_US) // MINUTE_US)
-    starts = range(first * MINUTE_US, max(come[-1], go[-1] if go else 0) + 1, MINUTE_US)
+    go = sorted(stay.departure_us for stay in both if stay.departure_us is not None)
+    first = max(0, (min([*come, *go], default=0) - HOUR_US) // MINUTE_US)
+    starts = range(first * MINUTE_US, max([*come, *go], default=0) + 1, MINUTE_US)
 
     def key(start: int) -> tuple[tuple[int, int], int]:
         return worth(_count(come, start, start + HOUR_US), _count(go, start, start + HOUR_US)), -start
@@ -89,6 +90,19 @@ def with_short_eve(demand: Demand, window: DayWindow, compartments: int) -> Dema
     ]
     later = [stay for stay in demand.stays if stay.arrival_us >= window.begin_us]
     return replace(demand, stays=(*eve, *later))
+
+
+def with_eve(demand: Demand, compartments: int) -> Demand:
+    """The cars that are inside at the start come before it, one by one: no machine knows a car that it has not seen."""
+    if not demand.inside:
+        return demand
+    both = (*demand.inside, *demand.stays)
+    moments = [stay.departure_us for stay in both if stay.departure_us is not None]
+    begin_us = min([*moments, *(stay.arrival_us for stay in demand.stays)], default=0)
+    every_us, count = EVE_US // max(1, compartments), len(demand.inside)
+    eve = [replace(one, arrival_us=begin_us - every_us * (count - at)) for at, one in enumerate(demand.inside)]
+    told = f"{count} cars are inside at the start: they come before it, one in {every_us / 1e6:g} s"
+    return replace(demand, stays=(*eve, *demand.stays), inside=(), remarks=(*demand.remarks, told))
 
 
 def choose_window(demand: Demand, text: str) -> DayWindow:

@@ -6,15 +6,17 @@ import sys
 from pathlib import Path
 
 from bus_sim.demand import DemandError
+from bus_sim.demand_options import add_table_options
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.compare.free_flow import bounds_us
 from bus_sim.systems.car_park.compare.optimum import OptimumError, is_available
 from bus_sim.systems.car_park.compare.plays import POLICIES, Play, play
 from bus_sim.systems.car_park.compare.small_table import SmallTable, solve_case
 from bus_sim.systems.car_park.compare.table import ComparisonTable, tabulate
-from bus_sim.systems.car_park.day import ParkingDay, choose_demand
+from bus_sim.systems.car_park.day import ParkingDay, asked_inside, choose_demand
 from bus_sim.systems.car_park.demand import Demand
-from bus_sim.systems.car_park.window import DayWindow, choose_window
+from bus_sim.systems.car_park.mapping import table_form
+from bus_sim.systems.car_park.window import DayWindow, choose_window, with_eve
 from onboard.core.site import Site
 from onboard.systems.car_park.site import CarPark
 
@@ -59,6 +61,7 @@ def add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     )
     compare.add_argument("--day", metavar="D", help="the day whose busiest hour is played (default: the shipped one)")
     compare.add_argument("--sessions", type=Path, metavar="FILE", help="sessions file of that day")
+    add_table_options(compare)
     compare.add_argument(
         "--window", default="busiest", metavar="FROM-TO", help="another part of it, such as 06:30-09:00"
     )
@@ -108,10 +111,15 @@ def compare_random(site: Site, seeds: range, cars: int, interval_s: tuple[float,
     return tabulate(title, plays, {seed: bounds_us(site, demand, seed) for seed, demand in demands.items()})
 
 
-def compare_day(site: Site, args: argparse.Namespace) -> ComparisonTable:
+def compare_day(site: CarPark, args: argparse.Namespace) -> ComparisonTable:
     """All policies on a window of a real day: what comes before is played too, and not counted."""
-    demand = choose_demand(ParkingDay(sessions=args.sessions, day=args.day), site)
+    inside, overnight = asked_inside(args)
+    day = ParkingDay(args.sessions, args.counts, table_form(args), inside, overnight, args.day)
+    demand = choose_demand(day, site)
     window = choose_window(demand, args.window)
+    demand = with_eve(demand, len(site.compartments))
+    for remark in demand.remarks:
+        print(remark, file=sys.stderr, flush=True)
     seed = 1
     before = Demand(tuple(stay for stay in demand.stays if stay.arrival_us < window.end_us), demand.zero)
     plays = [_told(play(site, before, policy, seed, window)) for policy in POLICIES]
