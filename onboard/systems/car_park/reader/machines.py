@@ -1,0 +1,89 @@
+"""The machines of a car park's site file, and who is steward of what."""
+
+from onboard.config.fleet import FleetReader
+from onboard.config.reader import TomlTable
+from onboard.config.toml_lines import path_text
+from onboard.contract.codes import KindCode
+from onboard.core.site import Machine, Segment
+from onboard.systems.car_park.reader.layout import FIRST_LIFT, SIDES, Layout
+from onboard.ways.site import BayUse, Track
+
+_NOWHERE = Segment(0, 0)
+
+
+def read_fleet(root: TomlTable, layout: Layout) -> tuple[FleetReader, dict[int, BayUse]]:
+    """Lifts, compartments and robots of a site file, and the compartments that are for one use only, by node-ID."""
+    fleet = FleetReader()
+    uses: dict[int, BayUse] = {}
+    for number, table in enumerate(layout.lifts, start=FIRST_LIFT):
+        fleet.add(table, KindCode.LIFT, Segment(number, 1))
+    for table in root.tables("compartments"):
+        side = table.choice("side", list(SIDES), "near")
+        station = layout.take(table, layout.find(table, "at"), side)
+        if station is not None:
+            layout.kept.setdefault(station.segment, f"the front of {path_text(table.path)} is")
+        use = BayUse(table.choice("use", [one.value for one in BayUse], BayUse.BOTH.value))
+        fleet.add(table, KindCode.COMPARTMENT, station.segment if station is not None else _NOWHERE, station)
+        if use is not BayUse.BOTH and "node" not in table.wrong:
+            uses[table.values["node"]] = use
+    for table in root.tables("robots"):
+        home = _read_home(table, layout, fleet)
+        fleet.robots.append((table, home))
+        fleet.add(table, KindCode.ROBOT, home)
+    return fleet, uses
+
+
+def _read_home(table: TomlTable, layout: Layout, fleet: FleetReader) -> Segment:
+    """Where a robot stands at first, as it may stand there for ever: on no sill, front or mouth, and by itself."""
+    home = layout.find(table, "home", spurs=True)
+    if home is None:
+        return _NOWHERE
+    if home in layout.kept:
+        remedy = "choose a segment where a robot may stand for ever"
+        table.bad("home", table.values["home"], f"{layout.kept[home]} there", remedy)
+    elif home in fleet.homes:
+        what = f"home of {fleet.homes[home]} already"
+        table.bad("home", table.values["home"], what, "give each robot a segment of its own")
+    fleet.homes.setdefault(home, path_text(table.path))
+    return home
+
+
+def read_stewards(table: TomlTable, layout: Layout, fleet: FleetReader) -> dict[int, int]:
+    """Node-ID of the steward of each track: the one named, else the nearest fixed machine.
+
+    Nearest is the lift for its own shaft, and otherwise by floors away, then by node-ID.
+    """
+    fixed = fleet.fixed()
+    stewards = {}
+    if not layout.known:
+        table.pass_over(str.isdecimal)
+    for number, track in layout.tracks.items():
+        if not table.has(str(number)):
+            if fixed:
+                stewards[number] = min((_distance(layout, one, track), one.node_id) for one in fixed)[1]
+            continue
+        name = table.text(str(number))
+        machine = fleet.by_name.get(name)
+        if machine in fixed and machine is not None:
+            stewards[number] = machine.node_id
+        elif name and (machine is not None or name not in fleet.by_name):
+            known = ", ".join(one.name for one in fixed)
+            table.bad(str(number), name, "no fixed machine of this name", f"fixed machines here: {known}")
+    return stewards
+
+
+def _distance(layout: Layout, machine: Machine, track: Track) -> int:
+    """Floors between a fixed machine and a track; -1 between a lift and its own shaft."""
+    if machine.home.track == track.number:
+        return -1
+    return min(
+        abs(one - other) for one in _floors(layout, machine.home.track) for other in _floors(layout, track.number)
+    )
+
+
+def _floors(layout: Layout, number: int) -> list[int]:
+    """The floors of a track; a lift's are those at which it stops."""
+    track = layout.tracks.get(number)
+    if track is None or number in layout.level:
+        return [layout.level.get(number, number)]
+    return [layout.level.get(sill.track, sill.track) for sill in track.joins] or [number]
