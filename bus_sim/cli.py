@@ -30,10 +30,11 @@ from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
 from onboard.config.site_report import site_report
 from onboard.core.site import Site
+from onboard.entry import INTERRUPTED
 from onboard.io.open_bus import BusOpenError
 from onboard.io.signals import terminated_as_interrupted
 from onboard.systems.registry import part
-from onboard.web.address import WebError
+from onboard.web.address import WebError, parse_address
 from onboard.web.address import is_installed as is_web_installed
 from onboard.wire.site_dbc import site_dbc
 
@@ -241,7 +242,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         return 1
     except KeyboardInterrupt:
-        return 130
+        print("bus-sim: interrupted", file=sys.stderr)
+        return INTERRUPTED
 
 
 def _sites(args: argparse.Namespace) -> int:
@@ -396,6 +398,10 @@ def _web(args: argparse.Namespace) -> str | None:
     if args.web is not None:
         if not is_web_installed():
             raise OptionError("--web: its libraries are missing; pip install 'onboard-fleet[web]'")
+        try:
+            parse_address(args.web)
+        except WebError as error:
+            raise OptionError(f"--web {error}") from error
         return str(args.web)
     plain = args.site is None and not args.no_web and not args.processes and args.speed is None
     return "127.0.0.1:0" if plain and is_web_installed() else None

@@ -22,7 +22,7 @@ PACKAGES = ("dbc", "onboard")
 COMMISSIONING = ("hil/__init__.py", "hil/__main__.py", "hil/cli.py", "hil/notice.py", "hil/commission")
 #: The first moment that a ZIP archive can name.
 _TIME = (1980, 1, 1, 0, 0, 0)
-_MAIN = b"import sys\n\nfrom onboard.cli import main\n\nsys.exit(main())\n"
+_MAIN = b"import sys\n\nfrom onboard.__main__ import main\n\nsys.exit(main())\n"
 #: Head of bytecode that is found by the hash of its source and never compared with it (PEP 552).
 _UNCHECKED = importlib.util.MAGIC_NUMBER + (1).to_bytes(4, "little")
 #: Docstrings of ours become a dot: nobody reads them on a board, and they take 0.4 MB of its memory. Without any, the

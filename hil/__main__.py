@@ -2,6 +2,16 @@
 
 import sys
 
-from hil.cli import main
+from onboard.entry import Interruptible
 
-sys.exit(main())
+
+def main(argv: list[str] | None = None) -> int:
+    """Entry point; returns the exit status."""
+    with Interruptible("python -m hil"):
+        from hil.cli import main as command_line  # noqa: PLC0415  # importing is what may be interrupted
+
+        return command_line(argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

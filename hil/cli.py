@@ -18,6 +18,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if argv is None else list(argv)
     if words[:1] == ["commission"]:
         return commission(words[1:])
-    asked = words[:1] in (["-h"], ["--help"])
-    print(_USAGE, end="", file=sys.stdout if asked else sys.stderr)
-    return 0 if asked else 2
+    if words[:1] in (["-h"], ["--help"]):
+        print(_USAGE, end="")
+        return 0
+    mistake = f'"{words[0]}" is no command' if words else "a command is missing"
+    print(f"python -m hil: {mistake}; write commission, or see python -m hil --help", file=sys.stderr)
+    return 2

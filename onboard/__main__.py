@@ -1,7 +1,17 @@
-"""``python -m onboard``."""
+"""``python -m onboard``, and the command ``onboard``."""
 
 import sys
 
-from onboard.cli import main
+from onboard.entry import Interruptible
 
-sys.exit(main())
+
+def main(argv: list[str] | None = None) -> int:
+    """Entry point; returns the exit status."""
+    with Interruptible("onboard"):
+        from onboard.cli import main as command_line  # noqa: PLC0415  # importing is what may be interrupted
+
+        return command_line(argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -101,7 +101,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if argv is None else list(argv)
     if words and words[0] in COMMANDS:
         return COMMANDS[words[0]](words[1:])
-    args = build_parser().parse_args(argv)
+    parser = build_parser()
+    if words and not words[0].startswith("-"):
+        parser.error(f'"{words[0]}" is no command; write {", ".join(COMMANDS)}, or --machine FILE')
+    args = parser.parse_args(argv)
     try:
         config = load_machine(args.machine)
         fleet_settings = bus_settings(args, config.fleet_bus)

@@ -251,7 +251,8 @@ def _trials(
         FaultPoint(number, one) for number, one in enumerate(points(site, Single(args.exhaustive), counts), start=1)
     ]
     chosen = every if args.sample is None else random.Random(0).sample(every, min(args.sample, len(every)))
-    console.print(f"{args.exhaustive}s on {site.name}: {len(chosen)} of {len(every)} points", highlight=False)
+    several = f"{args.exhaustive}es" if args.exhaustive.endswith("sh") else f"{args.exhaustive}s"
+    console.print(f"{several} on {site.name}: {len(chosen)} of {len(every)} points", highlight=False)
     chosen = chosen if ledger is None else [one for one in chosen if one.number not in ledger.done]
     if args.dask:
         return play_all(partial(run_point, plan), chosen), len(chosen)

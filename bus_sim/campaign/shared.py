@@ -6,6 +6,7 @@ comes of it played alone from the start (``runner.run_point``): the scene is set
 fault to come, and until that strikes nothing differs. A run writes no file, and its journals are in memory.
 """
 
+import contextlib
 import multiprocessing
 import os
 import signal
@@ -91,8 +92,14 @@ def _play_scene(
     there: Connection, scenario: FaultScenario, crashes: Sequence[Crash], usual_wait_s: float | None, jobs: int
 ) -> None:
     """The process of the scene; a copy of it never comes back from here."""
-    signal.signal(signal.SIGTERM, _end)
     copies = Copies(scenario, jobs, there)
+
+    def end(_number: int, _frame: FrameType | None) -> None:
+        # Not by an exception: it would end in whichever machine's task is running, and be told there.
+        copies.end()
+        os._exit(1)
+
+    signal.signal(signal.SIGTERM, end)
     try:
         report = _play(scenario, crashes, usual_wait_s, copies)
         if copies.mine is None:
@@ -111,10 +118,6 @@ def _play_scene(
     finally:
         copies.end()
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-
-def _end(_number: int, _frame: FrameType | None) -> None:
-    sys.exit(1)
 
 
 def _of(report: TrialReport, scenario: FaultScenario, crash: Crash) -> TrialReport:
@@ -214,8 +217,9 @@ class Copies:
         return True
 
     def answer(self, report: TrialReport) -> NoReturn:
-        """End the copy with this."""
-        self._to.send(report)
+        """End the copy with this; where nobody waits for it any more, too."""
+        with contextlib.suppress(BrokenPipeError):
+            self._to.send(report)
         os._exit(0)
 
     def collect(self, *, most: int) -> None:

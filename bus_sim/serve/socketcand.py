@@ -5,6 +5,7 @@ and not its own. python-can, SavvyCAN, Kayak and our own controllers speak this 
 """
 
 import asyncio
+import socket
 from collections import Counter
 from collections.abc import Callable
 
@@ -46,10 +47,9 @@ class SocketcandServer:
         try:
             self._server = await asyncio.get_running_loop().create_server(self._session, host, port)
         except OSError as error:
-            raise ServeError(
-                f"cannot serve on {host}:{port}: {error.strerror or error}; "
-                "another program may hold it, choose another port"
-            ) from error
+            is_unknown = isinstance(error, socket.gaierror)
+            remedy = "name this computer" if is_unknown else "another program may hold it, choose another port"
+            raise ServeError(f"cannot serve on {host}:{port}: {error.strerror or error}; {remedy}") from error
         bound: int = self._server.sockets[0].getsockname()[1]
         return bound
 

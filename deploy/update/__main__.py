@@ -13,6 +13,7 @@ from deploy.update.install import install
 from deploy.update.judge import judge
 from deploy.update.manifest import UpdateError
 from deploy.update.slots import UpdatePhase
+from onboard.config.arguments import Parser
 
 #: From the start of the controller's service until a system on trial has shown that it works.
 HEALTH_LIMIT_S = 180.0
@@ -33,7 +34,7 @@ otherwise the board goes back to the old one by itself.
 
 def build_parser() -> argparse.ArgumentParser:
     """The command line of ``onboard-update``."""
-    parser = argparse.ArgumentParser(
+    parser: argparse.ArgumentParser = Parser(
         prog="onboard-update",
         description="Update this board's system (deploy/README.md).",
         epilog=HELP,

@@ -6,7 +6,7 @@ import pytest
 
 from bus_sim.cli import main as bus_sim
 from bus_sim.sites import layout_names, site_names
-from deploy.__main__ import main as deploy
+from deploy.cli import main as deploy
 from onboard.cli import main as onboard
 from onboard.config.shipped import shipped_sites, site_source
 

@@ -107,7 +107,7 @@ def test_a_window_that_is_none_gets_one_clear_line(text: str) -> None:
         return
     with pytest.raises(DemandError) as caught:
         choose_window(whole, text)
-    assert str(caught.value).startswith(f"{text}: ") and "\n" not in str(caught.value)
+    assert f" {text}: " in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_a_window_over_midnight_tells_both_days() -> None:

@@ -13,8 +13,8 @@ from bus_sim.can.medium import Medium
 from bus_sim.serve.socketcand import SocketcandServer
 from bus_sim.sites import find_site
 from bus_sim.virtual_time import LoopClock
-from deploy.__main__ import main as deploy
 from deploy.archive import build_archive
+from deploy.cli import main as deploy
 from deploy.package import build_package
 from deploy.wheels import PINS, DeployError, pinned_wheels
 from onboard.cli import main as onboard_main

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.__main__ import build_parser, main
+from deploy.cli import build_parser, main
 from deploy.image import needs
 from deploy.image.needs import BASE_PACKAGES, PACKAGES, check_needs, missing_of
 from deploy.update.manifest import UpdateError

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.__main__ import main
+from deploy.cli import main
 from deploy.image.layer import FILES
 from onboard.config.machine import load_machine
 from onboard.contract.codes import MachineState

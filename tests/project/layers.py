@@ -117,7 +117,8 @@ def _is_part(place: Path) -> bool:
 #: The one file that loads modules by computed names: parts of systems.
 FINDER = "onboard/systems/folders.py"
 
-#: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli``, ``life``, ``__main__``.
+#: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli``, ``entry``, ``life`` and
+#: ``__main__``.
 LAYERS: dict[str, Layer] = {
     "onboard.contract": Layer(only_stdlib=PURE_STDLIB),
     # Writes the rest of it; runs where somebody changes a DBC, never on a board.
@@ -211,7 +212,7 @@ LAYERS: dict[str, Layer] = {
     "onboard": Layer(
         (
             *ALL_OF_ONBOARD,
-            *("onboard.cli", "onboard.life", "onboard.operate.cli", "onboard.trace.cli"),
+            *("onboard.cli", "onboard.entry", "onboard.life", "onboard.operate.cli", "onboard.trace.cli"),
             *("onboard.web.address", "onboard.web.cli"),
             *(f"onboard.gateway.{name}" for name in ("cli", "gateway", "options", "settings")),
         ),
@@ -219,20 +220,25 @@ LAYERS: dict[str, Layer] = {
     ),
     "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
     "bus_sim": Layer(
-        ("onboard", "onboard.gateway", "onboard.operate", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
+        (
+            *("onboard", "onboard.entry", "onboard.gateway", "onboard.operate", "onboard.trace", "onboard.web"),
+            *(*ALL_OF_ONBOARD, "dbc"),
+        ),
         ("distributed", "numpy", "ortools", "rich", "yaml"),
         not_stdlib=frozenset({"threading"}),
     ),
     # A board's updater listens for its own controller's heartbeats.
     "deploy": Layer(
         (
-            *("onboard", "onboard.config", *CORE_TYPES, "onboard.io.journal", "onboard.wire"),
+            *("onboard", "onboard.config", "onboard.entry", *CORE_TYPES, "onboard.io.journal", "onboard.wire"),
             *("hil.guest.effort", "hil.guest.initrd", "hil.guest.kernel"),
         ),
         ("pytest",),
     ),
     # A bench starts the programs themselves.
-    "hil": Layer(("onboard", "onboard.cli", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),
+    "hil": Layer(
+        ("onboard", "onboard.cli", "onboard.entry", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)
+    ),
 }
 
 #: What is said on a bus is everybody's to name; only ``dbc``, of which it is made, is below it.
@@ -289,7 +295,7 @@ def layer_of(module: str) -> str:
     """The layer that a module belongs to. Raises ``KeyError`` for a package that has no line in the table."""
     parts = module.split(".")
     if parts[0] == "onboard" and len(parts) > 1 and ".".join(parts[:2]) not in LAYERS:
-        if len(parts) > 2 or parts[1] not in ("cli", "life", "__main__"):
+        if len(parts) > 2 or parts[1] not in ("cli", "entry", "life", "__main__"):
             raise KeyError(f"{module}: no layer; add a line to the table and to docs/decisions.md")
         return "onboard"
     for length in range(len(parts), 0, -1):

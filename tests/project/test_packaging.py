@@ -92,8 +92,8 @@ def test_both_commands_are_installed(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         name = next(name for name in archive.namelist() if name.endswith(".dist-info/entry_points.txt"))
         text = archive.read(name).decode("utf-8")
-    assert "onboard = onboard.cli:main" in text
-    assert "bus-sim = bus_sim.cli:main" in text
+    assert "onboard = onboard.__main__:main" in text
+    assert "bus-sim = bus_sim.__main__:main" in text
 
 
 def make(*arguments: str) -> subprocess.CompletedProcess[str]:

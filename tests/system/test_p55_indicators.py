@@ -197,7 +197,7 @@ def test_what_is_played_where_little_is_said(
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--hour", "7"], "7: no time of day; write an hour as 06:30, busiest or two-way"),
+        (["--hour", "7"], "--hour 7: no time of day; write an hour as 06:30, busiest or two-way"),
         (["--hour", "06:30-07:30"], "--hour 06:30-07:30: one time of day"),
         (["--window", "06:30"], "--window 06:30: must be FROM-TO"),
         (["--speed", "quick"], "--speed quick: not a number"),
@@ -205,6 +205,10 @@ def test_what_is_played_where_little_is_said(
         (["--day", "2019-07-25..2019-07-24"], "the last day is before the first"),
         (["--day", "2019-07-24..soon"], "not a day; write it as 2019-07-24, several as"),
         (["--serve", "here"], "--serve here: must be HOST:PORT"),
+        (["level1", "--web", "99999"], "--web 99999: must be PORT or HOST:PORT"),
+        (["level1", "--random", "0", "1"], "--random 0 1: the mean must be above 0 s"),
+        (["level1", "--random", "9", "1", "--cars", "-1"], "--cars -1: must be 0 or more"),
+        (["level1", "--one-car", "-5"], "--one-car -5: must be seconds, 0 or more"),
         (["--serve", "127.0.0.1:0", "--without", "MR1", "--hour", "07:00"], "--without MR1: a window's warm-up"),
     ],
 )  # fmt: skip

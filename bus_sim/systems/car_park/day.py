@@ -88,6 +88,7 @@ def _days(text: str | None) -> tuple[date | None, date | None]:
 
 def asked_day(args: Namespace, *, live: bool) -> ParkingDay:
     """The day that the options ask for. Raises ``DemandError`` for those that do not go together."""
+    _check_numbers(args)
     window = _window(args, live=live)
     if args.by_hand and (window is not None or args.speed == "max"):
         what = f"--speed {args.speed}" if window is None else "--hour, --window"
@@ -139,6 +140,17 @@ def _check_together(args: Namespace) -> None:
     drawn = [option for option in given if option != "--sessions"]
     if args.inside is not None and drawn:
         raise DemandError(f"--inside {args.inside}: does not go with {drawn[0]}; leave one of them out")
+
+
+def _check_numbers(args: Namespace) -> None:
+    """Refuse what no demand can be made of, by the option's name."""
+    if args.one_car is not None and not args.one_car >= 0:
+        raise DemandError(f"--one-car {args.one_car:g}: must be seconds, 0 or more")
+    if args.cars < 0:
+        raise DemandError(f"--cars {args.cars}: must be 0 or more")
+    if args.random is not None and not (args.random[0] > 0 and args.random[1] >= 0):
+        mean, sigma = args.random
+        raise DemandError(f"--random {mean:g} {sigma:g}: the mean must be above 0 s, the deviation 0 s or more")
 
 
 def _window(args: Namespace, *, live: bool) -> str | None:

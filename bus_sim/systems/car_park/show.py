@@ -10,6 +10,7 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
+from bus_sim.systems.car_park.car_labels import bay_letters, car_labels
 from onboard.contract.codes import KindCode, MachineState, Side
 from onboard.core.site import Segment, Station
 from onboard.trace.view import SiteView
@@ -70,9 +71,11 @@ def cell_width(site: WaySite, width: int) -> int:
 def draw_floor(site: WaySite, view: SiteView, track: int, cell: int = CELLS[0]) -> list[Text]:
     """Three lines: far places, alley with machines, near places and compartments; ``cell`` columns a position.
 
-    A spur is drawn in round brackets beside its mouth, with whoever stands in it.
+    A spur is drawn in round brackets beside its mouth, with whoever stands in it. Cars have short names
+    (``car_labels``), the same on every floor.
     """
     taken = view.history.loads.standing()
+    labels = car_labels(taken.values(), bay_letters(site.compartments), 3 if cell >= CELLS[0] else cell)
     compartments = set(site.compartments.values())
     places = set(site.places)
     rows = []
@@ -83,9 +86,9 @@ def draw_floor(site: WaySite, view: SiteView, track: int, cell: int = CELLS[0]) 
             station = Station(track, index, side)
             car = taken.get(station.number)
             if station in compartments:
-                row.append(_boxed(str(car.number) if car else "I/O", "[]", cell), style="bold magenta")
+                row.append(_boxed(labels[car] if car else "I/O", "[]", cell), style="bold magenta")
             elif station in places:
-                row.append(_boxed(str(car.number) if car else "", "||", cell), style="cyan" if car else "dim")
+                row.append(_boxed(labels[car] if car else "", "||", cell), style="cyan" if car else "dim")
             elif site.spurs.get(station.segment) is not None and _is_at_spur(station, places | compartments):
                 row.append_text(_spur(view, Segment(site.spurs[station.segment], 1), cell))
             else:
@@ -233,7 +236,8 @@ def draw(
     The newest event, the ``line`` of figures and the page's ``address`` are always there, from seven lines on: floors
     shrink first. Where there is more room the events have it; without a height they are ten.
     """
-    head, bus = _headed(f"{site.name}  {clock.at(view.now_us)}", width), _headed("on the bus", width)
+    legend = "".join(f"  {letter} {view.name(node)}" for node, letter in bay_letters(site.compartments).items())
+    head, bus = _headed(f"{site.name}  {clock.at(view.now_us)}{legend}", width), _headed("on the bus", width)
     foot = [_line(line, "reverse")] + ([_line(f"picture at {address}")] if address is not None else [])
     states = _states(view, width)
     if height is None:

@@ -118,7 +118,7 @@ def choose_window(demand: Demand, text: str) -> DayWindow:
     begin, _, end = text.partition("-") if "T" not in text else (text, "", "")
     begin_us = _moment_us(demand, begin, text)
     if begin_us < 0:
-        raise DemandError(f"{text}: before the first day, {demand.zero:%Y-%m-%d}")
+        raise DemandError(f"{_option(text)}: before the first day, {demand.zero:%Y-%m-%d}")
     if not end:
         return DayWindow(begin_us, begin_us + HOUR_US)
     end_us = _clock_us(end, text)
@@ -144,11 +144,11 @@ def _moment_us(demand: Demand, text: str, whole: str) -> int:
     if "T" not in text:
         return _clock_us(text, whole)
     if demand.zero is None:
-        raise DemandError(f"{whole}: this demand has no date; write the hour as HH:MM")
+        raise DemandError(f"--hour {whole}: this demand has no date; write the hour as HH:MM")
     try:
         moment = datetime.fromisoformat(text)
     except ValueError as error:
-        raise DemandError(f"{whole}: not a time; write it as 2019-07-24T06:30") from error
+        raise DemandError(f"--hour {whole}: not a time; write it as 2019-07-24T06:30") from error
     if moment.tzinfo is None:
         moment = moment.replace(tzinfo=demand.zero.tzinfo)
     return round((moment - demand.zero).total_seconds()) * 1_000_000
@@ -160,4 +160,10 @@ def _clock_us(text: str, whole: str) -> int:
         time_us = int(hours) * HOUR_US + int(minutes) * MINUTE_US
         if time_us <= DAY_US:
             return time_us
-    raise DemandError(f"{whole}: no time of day; write an hour as 06:30, busiest or two-way, a window as 06:30-08:00")
+    told = _option(whole)
+    raise DemandError(f"{told}: no time of day; write an hour as 06:30, busiest or two-way, a window as 06:30-08:00")
+
+
+def _option(text: str) -> str:
+    """The option with which a person wrote this window."""
+    return f"--window {text}" if "-" in text and "T" not in text else f"--hour {text}"
