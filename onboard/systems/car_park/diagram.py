@@ -17,10 +17,10 @@ from onboard.core.site import Segment, Site
 from onboard.trace.chart.over_time import BOTTOM, GAP, LEFT, RIGHT, TOP, WIDTH, name_machines, time_axis
 from onboard.trace.chart.svg import SvgDrawing, colour, dashes
 from onboard.trace.listener import LoggedMessage
-from onboard.ways.site import way_site
+from onboard.ways.site import Track, TrackKind, WaySite, way_site
 
 #: Height of a segment's row, and of a lift's floor, pixels.
-_ROW, _MOST_HEIGHT = 14.0, 260.0
+_ROW, _LEAST_HEIGHT, _MOST_HEIGHT = 14.0, 42.0, 260.0
 
 
 class TrackPoint(NamedTuple):
@@ -186,10 +186,15 @@ def watch(
 
 
 def draw(site: Site, picture: TrackDiagram, start_us: int) -> SvgDrawing:
-    """The diagram: a panel for each floor, lift and spur; seconds since ``start_us`` along the top."""
+    """The diagram: a panel for each alley, spur and lift; seconds since ``start_us`` along the top.
+
+    The highest floor comes first, lifts last with their highest floor at the top; all panels have one scale.
+    """
     ways = way_site(site)
-    tracks = list(ways.tracks.values())
-    heights = [min(_MOST_HEIGHT, _ROW * max(3, track.length + 2)) for track in tracks]
+    tracks = sorted(ways.tracks.values(), key=lambda one: _order(ways, one))
+    longest_mm = max((track.length + 2) * track.pitch_mm for track in tracks)
+    px_mm = min(_ROW / min(track.pitch_mm for track in tracks), _MOST_HEIGHT / longest_mm)
+    heights = [max(_LEAST_HEIGHT, (track.length + 2) * track.pitch_mm * px_mm) for track in tracks]
     drawing = SvgDrawing(WIDTH, TOP + sum(heights) + GAP * len(tracks) + BOTTOM, f"{site.name}: time and space")
     numbers = {node: number for number, node in enumerate(sorted(site.machines))}
     moving = [site.machines[node] for node in sorted({node for node, _, _ in picture.runs} & set(site.machines))]
@@ -200,7 +205,8 @@ def draw(site: Site, picture: TrackDiagram, start_us: int) -> SvgDrawing:
     top = float(TOP)
     for track, height in zip(tracks, heights, strict=True):
         is_lift = track.number in ways.lifts
-        name = f"lift {site.machines[site.stewards[track.number]].name}" if is_lift else f"track {track.number}"
+        lift_name = next((one.name for one in site.machines.values() if one.home.track == track.number), "")
+        name = f"lift {lift_name}" if is_lift else f"track {track.number}"
         drawing.area([(LEFT, top), (WIDTH - RIGHT, top), (WIDTH - RIGHT, top + height), (LEFT, top + height)],
                      "#f3f3f3", opacity=1)  # fmt: skip
         drawing.text(8, top + 12, name)
@@ -208,13 +214,19 @@ def draw(site: Site, picture: TrackDiagram, start_us: int) -> SvgDrawing:
         panel = _Panel(
             drawing, picture, track.number, top, height, track.length, scale, track.pitch_mm, max(1, speed_mm_s)
         )
-        panel.rows(is_lift=is_lift)
+        panel.levels = [ways.level(sill.track) for sill in track.joins] if is_lift else []
+        panel.rows()
         panel.bands(picture.reservations, numbers, 0.22, "reserved", site)
         panel.bands(picture.authority, numbers, 0.38, "authority", site)
         panel.runs(numbers)
         top += height + GAP
     time_axis(drawing, picture.first_us, picture.last_us, start_us, top)
     return drawing
+
+
+def _order(ways: WaySite, track: Track) -> tuple[int, int]:
+    """Floors from the highest, each with its spurs, then lifts."""
+    return (0 if track.kind is TrackKind.LIFT else -ways.level(track.number)), track.number
 
 
 @dataclass
@@ -228,6 +240,8 @@ class _Panel:
     scale: float
     pitch_mm: int
     speed_mm_s: int
+    #: Of a lift: the floors of its stops; it has the highest at the top.
+    levels: list[int] = field(default_factory=list)
 
     def x(self, time_us: float) -> float:
         return min(WIDTH - RIGHT, max(LEFT, LEFT + (time_us - self.picture.first_us) * self.scale))
@@ -235,12 +249,13 @@ class _Panel:
     def y(self, place: float) -> float:
         """Platforms lie beside an alley, at both ends: places -1 and the length."""
         share = (place + 1.5) / (self.length + 2)
+        share = 1 - share if self.levels else share
         return self.top + self.height * min(1.0, max(0.0, share))
 
-    def rows(self, *, is_lift: bool) -> None:
+    def rows(self) -> None:
         every = max(1, round(12 / (self.height / (self.length + 2))))
         for index in range(1, self.length + 1, every):
-            label = f"floor {index}" if is_lift else f"p({self.track},{index})"
+            label = f"floor {self.levels[index - 1]}" if self.levels else f"p({self.track},{index})"
             self.drawing.text(LEFT - 4, self.y(index - 1) + 4, label, anchor="end", fill="#666666")
 
     def bands(self, bands: list[Band], numbers: dict[int, int], opacity: float, what: str, site: Site) -> None:
