@@ -17,9 +17,12 @@ from onboard.core.site import Segment, Site
 from onboard.trace.chart.over_time import BOTTOM, GAP, LEFT, RIGHT, TOP, WIDTH, name_machines, time_axis
 from onboard.trace.chart.svg import SvgDrawing, colour, dashes
 from onboard.trace.listener import LoggedMessage
+from onboard.ways.lifts import stop_mm
 from onboard.ways.site import Track, TrackKind, WaySite, way_site
 
-#: Height of a segment's row, and of a lift's floor, pixels.
+#: How far from a track's ends its drives may tell of, segments: a platform, and what is missed of its mark.
+_BEYOND = 1.5
+#: Height of a segment's row at most, of a panel at least, and of the longest at most, pixels.
 _ROW, _LEAST_HEIGHT, _MOST_HEIGHT = 14.0, 42.0, 260.0
 
 
@@ -107,6 +110,9 @@ class Watcher:
         if track is None:
             return
         place = progress.index - 1 + progress.offset_mm / track.pitch_mm
+        if not -_BEYOND <= place <= track.length - 1 + _BEYOND:
+            # On the way through a lift in line, told by the track that it left.
+            return
         point = TrackPoint(time_us, place, progress.speed_mm_s)
         run = self._open.get(progress.sender)
         if run is not None and run[0] == progress.track:
@@ -192,9 +198,10 @@ def draw(site: Site, picture: TrackDiagram, start_us: int) -> SvgDrawing:
     """
     ways = way_site(site)
     tracks = sorted(ways.tracks.values(), key=lambda one: _order(ways, one))
-    longest_mm = max((track.length + 2) * track.pitch_mm for track in tracks)
+    lengths = {track.number: _segments(ways, track) for track in tracks}
+    longest_mm = max((lengths[track.number] + 2) * track.pitch_mm for track in tracks)
     px_mm = min(_ROW / min(track.pitch_mm for track in tracks), _MOST_HEIGHT / longest_mm)
-    heights = [max(_LEAST_HEIGHT, (track.length + 2) * track.pitch_mm * px_mm) for track in tracks]
+    heights = [max(_LEAST_HEIGHT, (lengths[track.number] + 2) * track.pitch_mm * px_mm) for track in tracks]
     drawing = SvgDrawing(WIDTH, TOP + sum(heights) + GAP * len(tracks) + BOTTOM, f"{site.name}: time and space")
     numbers = {node: number for number, node in enumerate(sorted(site.machines))}
     moving = [site.machines[node] for node in sorted({node for node, _, _ in picture.runs} & set(site.machines))]
@@ -212,9 +219,19 @@ def draw(site: Site, picture: TrackDiagram, start_us: int) -> SvgDrawing:
         drawing.text(8, top + 12, name)
         speed_mm_s = (ways.lift if is_lift else ways.carrier).speed_mm_s
         panel = _Panel(
-            drawing, picture, track.number, top, height, track.length, scale, track.pitch_mm, max(1, speed_mm_s)
+            drawing,
+            picture,
+            track.number,
+            top,
+            height,
+            lengths[track.number],
+            scale,
+            track.pitch_mm,
+            max(1, speed_mm_s),
         )
-        panel.levels = [ways.level(sill.track) for sill in track.joins] if is_lift else []
+        if is_lift:
+            panel.levels = [ways.level(sill.track) for sill in track.joins]
+            panel.stops = [stop_mm(ways, track.number, stop) / track.pitch_mm for stop in range(1, track.length + 1)]
         panel.rows()
         panel.bands(picture.reservations, numbers, 0.22, "reserved", site)
         panel.bands(picture.authority, numbers, 0.38, "authority", site)
@@ -222,6 +239,13 @@ def draw(site: Site, picture: TrackDiagram, start_us: int) -> SvgDrawing:
         top += height + GAP
     time_axis(drawing, picture.first_us, picture.last_us, start_us, top)
     return drawing
+
+
+def _segments(ways: WaySite, track: Track) -> float:
+    """How long a track is in its pitches: a shaft from its lowest stop to its highest, and one floor."""
+    return (
+        1 + stop_mm(ways, track.number, track.length) / track.pitch_mm if track.number in ways.lifts else track.length
+    )
 
 
 def _order(ways: WaySite, track: Track) -> tuple[int, int]:
@@ -236,25 +260,34 @@ class _Panel:
     track: int
     top: float
     height: float
-    length: int
+    length: float
     scale: float
     pitch_mm: int
     speed_mm_s: int
-    #: Of a lift: the floors of its stops; it has the highest at the top.
+    #: Of a lift: the floors of its stops, and their heights in pitches; it has the highest at the top.
     levels: list[int] = field(default_factory=list)
+    stops: list[float] = field(default_factory=list)
 
     def x(self, time_us: float) -> float:
         return min(WIDTH - RIGHT, max(LEFT, LEFT + (time_us - self.picture.first_us) * self.scale))
 
     def y(self, place: float) -> float:
         """Platforms lie beside an alley, at both ends: places -1 and the length."""
-        share = (place + 1.5) / (self.length + 2)
-        share = 1 - share if self.levels else share
+        share = (self._along(place) + 1.5) / (self.length + 2)
+        share = 1 - share if self.stops else share
         return self.top + self.height * min(1.0, max(0.0, share))
+
+    def _along(self, place: float) -> float:
+        """Where a place is in pitches: between a lift's stops by their heights."""
+        if not self.stops:
+            return place
+        low = max(0, min(len(self.stops) - 1, int(place)))
+        high = min(len(self.stops) - 1, low + 1)
+        return self.stops[low] + (self.stops[high] - self.stops[low]) * min(1.0, max(0.0, place - low))
 
     def rows(self) -> None:
         every = max(1, round(12 / (self.height / (self.length + 2))))
-        for index in range(1, self.length + 1, every):
+        for index in range(1, (len(self.levels) or round(self.length)) + 1, every):
             label = f"floor {self.levels[index - 1]}" if self.levels else f"p({self.track},{index})"
             self.drawing.text(LEFT - 4, self.y(index - 1) + 4, label, anchor="end", fill="#666666")
 
