@@ -13,10 +13,10 @@ ARGS ?=
 PYTEST_ARGS ?=
 export REQUIRE
 
-.PHONY: help run check test coverage lint format models mutants bench docs clean
+.PHONY: help run check test test-long coverage lint format models mutants bench docs clean
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
 	@echo 'make run ARGS="..." hands options to bus-sim run; make PYTHON=/path/to/python ... chooses the interpreter'
 
 run: $(VENV)/.run ## set up, then show an hour of a real day on the standard site in about a minute
@@ -28,6 +28,9 @@ check: lint ## set up, lint and types (of the tests too), then the quick tests: 
 
 test: lint ## set up, lint, then all tests on all processors; REQUIRE=all makes a skipped test a failure
 	$(BIN)/python -m pytest --numprocesses auto $(PYTEST_ARGS)
+
+test-long: lint ## the same with every case of the long rows (tests/thinned.py): all moments, seeds and sizes
+	LONG=yes $(BIN)/python -m pytest --numprocesses auto $(PYTEST_ARGS)
 
 coverage: $(VENV)/.test ## all tests once more, with the lines that they ran; takes twice as long
 	$(BIN)/python -m pytest --numprocesses auto --cov --cov-report=term $(PYTEST_ARGS)

@@ -1,6 +1,6 @@
 """How soon a machine is on the bus: start of ``onboard`` to its first heartbeat, and the memory taken until then.
 
-    python bench/start.py [--runs N]
+    python bench/start.py [--runs N] [--python FILE]
 
 Each run is a new process with an empty journal; the bus is served over loopback in the socketcand protocol by this one.
 Wall time counts from just before the process is made to the arrival of the heartbeat; memory is the process's highest
@@ -27,7 +27,7 @@ from onboard.ports.bus import BusHealth, FrameHandler
 from onboard.wire.codec import fleet_codec
 
 ROOT = Path(__file__).parents[1]
-AIM_S, AIM_MB = 0.5, 40.0
+AIM_S, AIM_MB, AIM_PSS_MB = 0.5, 40.0, 20.0
 DEADLINE_S = 60.0
 MACHINE = """\
 [machine]
@@ -79,7 +79,7 @@ class Ear:
         """Nothing is held open for a client that leaves."""
 
 
-async def start_onboard(interface: str, *program: str) -> Start:
+async def start_onboard(interface: str, *program: str, python: str = sys.executable) -> Start:
     """Start one controller, as ``program`` where one is named, and wait for its first heartbeat."""
     ear = Ear()
     server = SocketcandServer(lambda _channel, _name: ear, lambda time_us: time_us, port=0)
@@ -89,7 +89,7 @@ async def start_onboard(interface: str, *program: str) -> Start:
         machine = Path(folder) / "mr1.toml"
         machine.write_text(MACHINE.format(site=site, interface=interface, port=port), encoding="utf-8")
         begun_s = time.perf_counter()
-        process = await _python(*(program or ("-m", "onboard")), "--machine", str(machine))
+        process = await _started(python, *(program or ("-m", "onboard")), "--machine", str(machine))
         try:
             async with asyncio.timeout(DEADLINE_S):
                 heard_s = await ear.heard
@@ -102,10 +102,10 @@ async def start_onboard(interface: str, *program: str) -> Start:
     return Start(heard_s - begun_s, peak_mb, pss_mb)
 
 
-async def start_script(script: str) -> Start:
+async def start_script(script: str, python: str = sys.executable) -> Start:
     """Start an interpreter that runs ``script`` and then waits for its input to end."""
     begun_s = time.perf_counter()
-    process = await _python("-c", f"{script}\nimport sys\nprint('here', flush=True)\nsys.stdin.read()")
+    process = await _started(python, "-c", f"{script}\nimport sys\nprint('here', flush=True)\nsys.stdin.read()")
     assert process.stdout is not None
     await process.stdout.readline()
     heard_s = time.perf_counter()
@@ -114,11 +114,11 @@ async def start_script(script: str) -> Start:
     return Start(heard_s - begun_s, peak_mb, pss_mb)
 
 
-async def _python(*words: str) -> asyncio.subprocess.Process:
+async def _started(python: str, *words: str) -> asyncio.subprocess.Process:
     pipe = asyncio.subprocess.PIPE
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     return await asyncio.create_subprocess_exec(
-        sys.executable, *words, env=environment, stdin=pipe, stdout=pipe, stderr=asyncio.subprocess.DEVNULL
+        python, *words, env=environment, stdin=pipe, stdout=pipe, stderr=asyncio.subprocess.DEVNULL
     )
 
 
@@ -133,24 +133,21 @@ def _memory_mb(pid: int) -> tuple[float, float]:
     return int(peak[1]) / 1024, int(pss[1]) / 1024
 
 
-async def measure(runs: int) -> None:
+async def measure(runs: int, python: str) -> None:
     """Start each process ``runs`` times; print median and worst of wall s and peak MB."""
-    print(f"median of {runs} runs, worst in brackets; aims {AIM_S} s and {AIM_MB:.0f} MB")
+    print(f"median of {runs} runs, worst in brackets; aims {AIM_S} s, {AIM_MB:.0f} MB and {AIM_PSS_MB:.0f} MB PSS")
     print("| process | wall s | peak MB | PSS MB |")
     print("|---|---|---|---|")
-    scripts = {
-        "an interpreter that does nothing": "",
-        "with asyncio imported": "import asyncio",
-        "with python-can imported": "import can",
-        "with cantools imported": "import cantools",
-    }
-    for name, script in scripts.items():
-        print(_row(name, [await start_script(script) for _ in range(runs + 1)]), flush=True)
-    for interface in ("socketcand-asyncio", "socketcand"):
+    scripts = {"an interpreter that does nothing": "", "with asyncio imported": "import asyncio"}
+    libraries = {"with python-can imported": "import can", "with cantools imported": "import cantools"}
+    is_own = python == sys.executable
+    for name, script in (scripts | libraries if is_own else scripts).items():
+        print(_row(name, [await start_script(script, python) for _ in range(runs + 1)]), flush=True)
+    for interface in ("socketcand-asyncio", "socketcand") if is_own else ():
         print(_row(f"onboard on {interface}", [await start_onboard(interface) for _ in range(runs + 1)]), flush=True)
     with tempfile.TemporaryDirectory() as folder:
         archive = str(build_archive(Path(folder) / "onboard.pyz"))
-        starts = [await start_onboard("socketcand-asyncio", "-I", archive) for _ in range(runs + 1)]
+        starts = [await start_onboard("socketcand-asyncio", "-I", archive, python=python) for _ in range(runs + 1)]
         print(_row("onboard.pyz, as boards have it, on socketcand-asyncio", starts), flush=True)
 
 
@@ -167,7 +164,9 @@ def main() -> None:
     """Read the options and measure."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--runs", type=int, default=7, help="starts for each row (default %(default)s)")
-    asyncio.run(measure(parser.parse_args().runs))
+    parser.add_argument("--python", default=sys.executable, metavar="FILE", help="interpreter (default: this one)")
+    args = parser.parse_args()
+    asyncio.run(measure(args.runs, args.python))
 
 
 if __name__ == "__main__":

@@ -51,7 +51,8 @@ SLOW = (
 _spent_s = pytest.StashKey[float]()
 
 
-def _processor_s() -> float:
+def processor_s() -> float:
+    """Of this process and of all that it has started and waited for, s."""
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     return time.process_time() + children.ru_utime + children.ru_stime
 
@@ -66,7 +67,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
     """Start the item's clock: what is before its first step counts."""
-    item.stash[_spent_s] = _processor_s()
+    item.stash[_spent_s] = processor_s()
     return (yield)
 
 
@@ -76,7 +77,7 @@ def pytest_runtest_makereport(
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """A test that was too slow fails when its work is done, by its name and what it took."""
     report = yield
-    spent_s = _processor_s() - item.stash[_spent_s]
+    spent_s = processor_s() - item.stash[_spent_s]
     if call.when == "call" and report.passed and spent_s > LIMIT_S:
         report.outcome = "failed"
         report.longrepr = (

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 
 _LONGEST_SHOWN = 60
 
@@ -71,6 +70,8 @@ class ConfigError(Exception):
 
 def nearest(name: str, known: Sequence[str]) -> str:
     """A remedy for an unknown name: the nearest known one, or all of them."""
+    from difflib import get_close_matches  # noqa: PLC0415  # a machine without a mistake must not carry it
+
     close = get_close_matches(name, known, n=1)
     if close:
         return f'did you mean "{close[0]}"?'

@@ -12,7 +12,17 @@ from operator import attrgetter
 from types import CodeType, FunctionType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-__all__ = ["NO_REFERENCE", "FrameCode", "Message", "OutOfRangeError", "Reference", "SetFrame", "Stamp", "message"]
+__all__ = [
+    "NO_REFERENCE",
+    "FrameCode",
+    "Message",
+    "OutOfRangeError",
+    "Reference",
+    "SetFrame",
+    "Stamp",
+    "message",
+    "refusal",
+]
 
 if TYPE_CHECKING:
     from dataclasses import dataclass as message
@@ -47,6 +57,19 @@ class OutOfRangeError(ValueError):
 
     def __init__(self, signal: str, value: int, minimum: int, maximum: int) -> None:
         super().__init__(f"{signal} = {value}: outside {minimum} to {maximum}")
+
+
+def refusal(message: object, *ranges: tuple[str, int, int]) -> ValueError:
+    """Why a message could not be packed: ``ranges`` are fields ("CarAt.car.number"), the least and the most they hold.
+
+    The generated functions leave to ``struct`` the checks that it makes anyway, and ask here what it did not like.
+    """
+    for where, minimum, maximum in ranges:
+        name, _, path = where.partition(".")
+        value = attrgetter(path)(message)
+        if not minimum <= value <= maximum:
+            return OutOfRangeError(f"{name}.{path.replace('.', '_')}", value, minimum, maximum)
+    return ValueError(f"{message}: a field is no whole number")
 
 
 class _Fields:

@@ -21,6 +21,8 @@ OUTSIDE = 0xFFFE
 MOBILE_KINDS = frozenset({KindCode.ROBOT, KindCode.VEHICLE, KindCode.ARM})
 #: States in which a machine that lives is an obstacle all the same.
 STILL = (MachineState.OBSTACLE, MachineState.STOPPED)
+#: States in which a machine takes part and nobody holds it.
+ACTING = (MachineState.IDLE, MachineState.WORKING)
 
 #: By class of message the kinds of machine that may say it; ``KindCode.OBSERVER`` stands for nodes 251 to 255.
 Speakers = Mapping[type[Message], frozenset[KindCode]]

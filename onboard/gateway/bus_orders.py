@@ -7,6 +7,7 @@ from onboard.contract.codes import KindCode
 from onboard.contract.messages import Message, Reference, SyncRequest
 from onboard.core.site import Site
 from onboard.gateway.order import GatewayOrder, OrderRequest
+from onboard.history.history import Fact
 
 #: After its start a gateway asks all what they vouch for, and knows the cars so much later, us: answers to one question
 #: come in less.
@@ -46,11 +47,11 @@ class BusOrders(Protocol):
     def say(self, order: GatewayOrder, sender: int, wall_us: int) -> OrderMessages:
         """Say an order, for the first time or again, at a wall time. Raises ``RefusedError``."""
 
-    def task_of(self, order: GatewayOrder, message: Message) -> Reference | None:
-        """The task that an order has become, where this message tells."""
+    def task_of(self, order: GatewayOrder, fact: Fact | None) -> Reference | None:
+        """The task that an order has become, where this tells it."""
 
-    def is_done(self, order: GatewayOrder, message: Message) -> bool:
-        """Whether this message tells that what the order asks for is so, whoever did it."""
+    def is_done(self, order: GatewayOrder, fact: Fact | None) -> bool:
+        """Whether this tells that what the order asks for is so, whoever did it."""
 
 
 class NoBusOrders:
@@ -76,11 +77,11 @@ class NoBusOrders:
         """Raises ``RefusedError``: no order can have been taken before."""
         raise RefusedError("UNSUPPORTED", "not of this site")
 
-    def task_of(self, order: GatewayOrder, message: Message) -> Reference | None:
-        """None: no message is about an order from outside."""
+    def task_of(self, order: GatewayOrder, fact: Fact | None) -> Reference | None:
+        """None: nothing that is told is about an order from outside."""
         return None
 
-    def is_done(self, order: GatewayOrder, message: Message) -> bool:
+    def is_done(self, order: GatewayOrder, fact: Fact | None) -> bool:
         """False: only a report of the task can say so."""
         return False
 

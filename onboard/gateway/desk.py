@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from onboard.contract.messages import CallForProposals, CarAt, ManualState, Message, TaskReport
+from onboard.contract.messages import Message
 from onboard.core.site import Site
 from onboard.gateway.actions import InstantActions
 from onboard.gateway.dialect import Json, timestamp
@@ -18,6 +18,11 @@ from onboard.gateway.records import OrderPhase
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import level
 from onboard.gateway.state import Subject
+from onboard.history.calls import CallOpened, CallRepeated
+from onboard.history.hands import HandTold
+from onboard.history.history import Fact
+from onboard.history.loads import LoadTold
+from onboard.history.tasks import TaskTold
 from onboard.ports.broker import Publication
 
 #: Publications that wait to be judged; of more the newest is counted and stays with the broker until the next session.
@@ -29,7 +34,7 @@ _ERRORS = {
     "MALFORMED": "validationError",
     **dict.fromkeys(("OLD_UPDATE", "NOT_CONTINUED", "ORDER_OVER", "NO_ORDER"), "orderUpdateError"),
 }
-_HEARD = (CallForProposals, CarAt, TaskReport)
+_HEARD = (CallOpened, CallRepeated, LoadTold, TaskTold)
 
 
 class GatewayDesk:
@@ -88,12 +93,12 @@ class GatewayDesk:
             self._send(message)
         self._close(closed, now_us)
 
-    async def feed(self, message: Message, now_us: int) -> None:
-        """Take up one message of the fleet bus."""
-        if isinstance(message, ManualState):
-            self._close(self.pauses.feed(message, now_us), now_us)
-        if isinstance(message, _HEARD) and self.orders.open:
-            await self._perform(self.orders.feed(message), now_us)
+    async def feed(self, fact: Fact | None, now_us: int) -> None:
+        """Take up what one message of the fleet bus has told."""
+        if isinstance(fact, HandTold):
+            self._close(self.pauses.feed(fact.word, now_us), now_us)
+        if isinstance(fact, _HEARD) and self.orders.open:
+            await self._perform(self.orders.feed(fact), now_us)
 
     # --- in ------------------------------------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ from onboard.core.site import Site
 from onboard.gateway.bus_orders import BusOrders, NoBusOrders
 from onboard.gateway.dialect import Json
 from onboard.gateway.positions import Tracker, TrackTracker
+from onboard.history.history import History
 from onboard.systems.registry import part
 from onboard.systems.words import words_of
 from onboard.trace.view import SiteView
@@ -39,9 +40,9 @@ class SystemEdge:
         """What orders become; ``view`` is what was heard, ``place`` names a station by its number."""
         return NoBusOrders(self.site)
 
-    def tracker(self) -> Tracker:
-        """What follows where machines are; the default reads places on tracks."""
-        return TrackTracker(self.site)
+    def tracker(self, history: History) -> Tracker:
+        """What tells where machines are; the default reads places on tracks."""
+        return TrackTracker(self.site, history)
 
     def place(self, number: int) -> str | None:
         """A station as topics name it; None for one that the site does not have."""

@@ -9,7 +9,7 @@ from dataclasses import fields
 from typing import Any
 
 from onboard.contract.codes import KindCode, Operation, Reason, TaskPhase
-from onboard.contract.messages import Heartbeat, Message, Progress, Reference, TaskReport
+from onboard.contract.messages import Message, Reference, TaskReport
 from onboard.core.site import Segment, Site
 from onboard.gateway.dialect import Json, timestamp
 from onboard.gateway.edge import edge_of
@@ -18,6 +18,8 @@ from onboard.gateway.settings import GatewaySettings
 from onboard.gateway.state import reference_text
 from onboard.history.calls import CallAnswered, CallHistory, CallOpened
 from onboard.history.history import Fact
+from onboard.history.lives import Beat
+from onboard.history.places import PlaceTold
 from onboard.history.tasks import TaskTold
 from onboard.trace.words import Words
 from onboard.ways.site import way_site
@@ -67,13 +69,12 @@ class FleetTopics:
                 yield from self._on_call(fact.call, now_us)
             case CallAnswered() if fact.call is not None and fact.is_end:
                 yield from self._on_end(fact.call, fact, now_us)
-        match message:
-            case TaskReport() if not isinstance(fact, TaskTold) or fact.before is not message.phase:
-                yield from self._on_report(message, now_us)
-            case Heartbeat() | Progress() if not self._is_mobile(message.sender):
+            case TaskTold() if fact.before is not fact.report.phase:
+                yield from self._on_report(fact.report, now_us)
+            case Beat() | PlaceTold() if not self._is_mobile(message.sender):
                 yield from self._fixed(message.sender, now_us)
         reason = _reason(message)
-        if reason is not None and not isinstance(fact, CallAnswered) and not isinstance(message, TaskReport):
+        if reason is not None and not isinstance(fact, CallAnswered | TaskTold):
             yield "event", self._event(message, reason, now_us)
 
     def indicators(self, now_us: int) -> Json:
@@ -159,7 +160,7 @@ class FleetTopics:
         state = view.history.lives.states.get(node)
         body: Json = {"kind": machine.kind.name.lower(), "state": state.name.lower() if state is not None else "silent"}
         if machine.kind is KindCode.LIFT:
-            segment, _ = view.positions[node]
+            segment = view.history.places.by_node[node].segment
             shaft = way_site(self.site).tracks.get(segment.track)
             floors = shaft.joins if shaft is not None else ()
             if 1 <= segment.index <= len(floors):

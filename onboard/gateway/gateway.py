@@ -132,9 +132,10 @@ class Gateway:
                 frame, time_us = self._inbox.popleft()
                 message = self._decoder.feed(frame, time_us)
                 if message is not None:
-                    self._post(self.publisher.feed(message, time_us))
+                    fact = self.publisher.history.feed(message, time_us)
+                    self._post(self.publisher.take(message, fact, time_us))
                     if self.desk is not None:
-                        await self.desk.feed(message, time_us)
+                        await self.desk.feed(fact, time_us)
             await self._keep_reports()
             await asyncio.sleep(0)
         now_us = self._now_us()

@@ -1,31 +1,24 @@
-"""What the fleet bus tells of each mobile machine, folded for one VDA 5050 state a machine."""
+"""What the history of a fleet bus tells of each mobile machine, for one VDA 5050 state a machine."""
 
 from dataclasses import dataclass, field
+from itertools import islice
 
-from onboard.contract.codes import CallResult, KindCode, MachineState, ManualMode, Reason, TaskPhase
-from onboard.contract.constants import ANY_STATION, MOBILE_KINDS
-from onboard.contract.messages import (
-    Blocked,
-    CarAt,
-    Clear,
-    EmergencyStop,
-    Halted,
-    Heartbeat,
-    Itinerary,
-    ManualState,
-    Message,
-    Reference,
-    TaskReport,
-    Waiting,
-)
+from onboard.contract.codes import CallResult, KindCode, MachineState, Reason, TaskPhase
+from onboard.contract.constants import MOBILE_KINDS
+from onboard.contract.messages import Blocked, Halted, Message, Reference, TaskReport, Waiting
 from onboard.core.site import Machine, Segment, Site
 from onboard.gateway.edge import edge_of
 from onboard.gateway.positions import MachinePosition, Tracker
 from onboard.history.calls import CallAnswered
-from onboard.history.history import Fact
+from onboard.history.halts import HaltTold
+from onboard.history.hands import HandTold
+from onboard.history.history import Fact, History
+from onboard.history.lives import SILENT_BEATS, Beat, WaitTold
+from onboard.history.loads import LoadTold
+from onboard.history.orders import SlotTold, StopTold
+from onboard.history.plans import PlanTold
+from onboard.history.tasks import TaskTold
 
-#: Three heartbeats missed, a machine counts as silent: as the machines themselves count (onboard/holon/presence.py).
-SILENT_BEATS = 3
 #: An arm stands where it is bolted down: it is no machine that VDA 5050 speaks of.
 TRAVELLERS = MOBILE_KINDS - {KindCode.ARM}
 #: Blocked segments that are told of; more than so many are one too many for a person as well.
@@ -51,31 +44,51 @@ class TaskInHand:
 
 @dataclass(slots=True)
 class MobileMachine:
-    """What is known of one mobile machine: when it was heard (loop time, us), its state, task and load."""
+    """One mobile machine as its history tells it, and its newest task."""
 
     machine: Machine
-    heard_us: int | None = None
-    state: MachineState | None = None
+    history: History
     task: TaskInHand | None = None
-    load: Reference | None = None
-    wait: Waiting | None = None
-    wait_us: int = 0
-    is_held: bool = False
-    #: By its own word: held, and come to rest.
-    is_paused: bool = False
-    #: Why it does not act, by its own word or another's, and when that was said last.
-    halted: Halted | None = None
-    halted_us: int = 0
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether it was ever heard."""
+        return self.machine.node_id in self.history.lives.heard_us
+
+    @property
+    def state(self) -> MachineState | None:
+        """By its last heartbeat. One that was let go since stood in the way because it was held: not known."""
+        node = self.machine.node_id
+        return None if node in self.history.hands.let_go else self.history.lives.states.get(node)
+
+    @property
+    def load(self) -> Reference | None:
+        """The load aboard by the newest word of it, None for none."""
+        return self.history.loads.aboard.get(self.machine.node_id)
+
+    @property
+    def wait(self) -> tuple[int, Waiting] | None:
+        """What it waits for, and when it said so, us of the loop."""
+        return self.history.lives.waits.get(self.machine.node_id)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a person holds it."""
+        return self.machine.node_id in self.history.hands.held
+
+    @property
+    def is_paused(self) -> bool:
+        """By its own word: held, and come to rest."""
+        return self.history.hands.is_at_rest(self.machine.node_id)
 
 
 @dataclass
 class Machines:
-    """A fold: feed every message of the fleet bus in order. ``changed`` are node-IDs whose state may be another."""
+    """A view of a history. ``changed`` are node-IDs whose state may be another."""
 
     site: Site
+    history: History
     bodies: dict[int, MobileMachine] = field(init=False)
-    blocked: dict[Segment, Blocked] = field(default_factory=dict)
-    emergency: EmergencyStop | None = None
     changed: set[int] = field(default_factory=set)
     #: Machines that said where they are since this was last emptied.
     moved: set[int] = field(default_factory=set)
@@ -83,104 +96,74 @@ class Machines:
 
     def __post_init__(self) -> None:
         mobile = sorted(node for node, one in self.site.machines.items() if one.kind in TRAVELLERS)
-        self.bodies = {node: MobileMachine(self.site.machines[node]) for node in mobile}
-        self._tracker = edge_of(self.site).tracker()
+        self.bodies = {node: MobileMachine(self.site.machines[node], self.history) for node in mobile}
+        self._tracker = edge_of(self.site).tracker(self.history)
+
+    @property
+    def blocked(self) -> dict[Segment, Blocked]:
+        """Segments that nobody can pass, the first so many."""
+        return dict(islice(self.history.orders.blocked.items(), MOST_BLOCKED))
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether an emergency stop holds all."""
+        return self.history.orders.stop is not None
 
     def where(self, node_id: int) -> MachinePosition:
         """Where a mobile machine is."""
         return self._tracker.where(node_id)
 
-    def feed(self, message: Message, now_us: int, fact: Fact | None = None) -> None:
+    def take(self, message: Message, fact: Fact | None, now_us: int) -> None:
         """Take up one message, and what the history made of it."""
-        self._on_site(message)
         body = self.bodies.get(message.sender)
-        if body is not None:
-            body.heard_us = now_us
-        if self._tracker.feed(message) and body is not None:
+        if self._tracker.take(message, fact) and body is not None:
             self.changed.add(message.sender)
             self.moved.add(message.sender)
-            if self.where(message.sender).driving:
-                body.wait = None
         if body is not None:
-            self._on_word(body, message, now_us)
-        if isinstance(fact, CallAnswered) and fact.award.result is CallResult.WITHDRAWN:
-            self._on_withdrawal(fact)
-        match message:
-            case CarAt():
-                self._on_car(message)
-            case Halted():
-                self._on_halted(message, now_us)
+            self._on_word(body, fact)
+        match fact:
+            case Beat(ends_stop=True) | SlotTold() | StopTold():
+                self.changed.update(self.bodies)
+            case CallAnswered() if fact.award.result is CallResult.WITHDRAWN:
+                self._on_withdrawal(fact)
+            case LoadTold(changed=changed):
+                self.changed |= changed & self.bodies.keys()
+            case HaltTold():
+                self._on_halt(fact, now_us)
 
     def halted(self, node_id: int, now_us: int) -> Halted | None:
         """Why a machine does not act, as long as that is said, in each heartbeat period."""
-        body = self.bodies[node_id]
-        is_said = now_us - body.halted_us <= SILENT_BEATS * self.site.timing.heartbeat_us
-        return body.halted if is_said else None
+        return self.history.halts.last(node_id, now_us, self._patience_us)
 
-    def _on_halted(self, word: Halted, now_us: int) -> None:
-        body = self.bodies.get(word.machine)
-        is_false = word.reason is Reason.FALSE_STATEMENT
-        if body is None or not (word.sender == word.machine or is_false or self.is_silent(word.machine, now_us)):
-            return
-        before = self.halted(word.machine, now_us)
-        body.halted, body.halted_us = word, now_us
-        if before is None or (before.reason, before.needs_person) != (word.reason, word.needs_person):
+    @property
+    def _patience_us(self) -> int:
+        return SILENT_BEATS * self.site.timing.heartbeat_us
+
+    def _on_halt(self, told: HaltTold, now_us: int) -> None:
+        word = told.word
+        told_us, before = told.before or (0, None)
+        is_same = before is not None and now_us - told_us <= self._patience_us
+        is_same &= before is not None and (before.reason, before.needs_person) == (word.reason, word.needs_person)
+        if word.machine in self.bodies and not is_same:
             self.changed.add(word.machine)
 
     def is_silent(self, node_id: int, now_us: int) -> bool:
         """Whether a machine was never heard, or not for three of its heartbeats."""
-        return self.bodies[node_id].heard_us is None or now_us >= self.silent_us(node_id)
+        return self.history.lives.is_silent(node_id, now_us)
 
     def silent_us(self, node_id: int) -> int:
         """When a machine that is not heard again counts as silent, us."""
-        return (self.bodies[node_id].heard_us or 0) + SILENT_BEATS * self.site.timing.heartbeat_us + 1
+        return self.history.lives.silent_us(node_id)
 
-    def _on_word(self, body: MobileMachine, message: Message, now_us: int) -> None:
+    def _on_word(self, body: MobileMachine, fact: Fact | None) -> None:
         """What a mobile machine says of itself."""
-        match message:
-            case Heartbeat():
-                self._on_heartbeat(body, message)
-            case TaskReport():
-                self._on_report(body, message)
-            case Waiting():
-                body.wait, body.wait_us = message, now_us
-                self.changed.add(message.sender)
-            case ManualState():
-                was_held, body.is_held = body.is_held, message.manual_mode is not ManualMode.AUTOMATIC
-                # It stood in the way because it was held; what it is now, its next heartbeat says.
-                body.state = body.state if body.is_held or not was_held else None
-                body.is_paused = body.is_held and message.at_rest
-                self.changed.add(message.sender)
-            case Itinerary() if body.task is not None:
+        match fact:
+            case Beat(is_news=True) | WaitTold() | HandTold():
+                self.changed.add(body.machine.node_id)
+            case TaskTold(report=report):
+                self._on_report(body, report)
+            case PlanTold() if body.task is not None:
                 body.task.updates += 1
-
-    def _on_site(self, message: Message) -> None:
-        """What concerns all machines."""
-        match message:
-            case Blocked() if len(self.blocked) < MOST_BLOCKED:
-                self.blocked[Segment(message.track, message.index)] = message
-            case Clear():
-                self.blocked.pop(Segment(message.track, message.index), None)
-            case EmergencyStop():
-                self.emergency = message
-            case _:
-                return
-        self.changed.update(self.bodies)
-
-    def _on_heartbeat(self, body: MobileMachine, message: Heartbeat) -> None:
-        if body.state is not message.state:
-            body.state = message.state
-            self.changed.add(message.sender)
-        if message.state in (MachineState.IDLE, MachineState.WORKING):
-            # None that stands because it is held says so: its word that it was let go may have been lost.
-            body.is_held = body.is_paused = False
-            if body.halted is not None and body.halted.sender == message.sender:
-                body.halted = None
-                self.changed.add(message.sender)
-        if message.state in (MachineState.IDLE, MachineState.WORKING) and self.emergency is not None:
-            # Whoever is held by an emergency stop says OBSTACLE: one that works was let go, or the stop is old.
-            self.emergency = None
-            self.changed.update(self.bodies)
 
     def _on_report(self, body: MobileMachine, report: TaskReport) -> None:
         task = body.task
@@ -198,11 +181,4 @@ class Machines:
         for node, body in self.bodies.items():
             if body.task is not None and body.task.task == award.task and not body.task.is_over:
                 body.task.phase, body.task.reason = TaskPhase.FORFEITED, award.reason
-                self.changed.add(node)
-
-    def _on_car(self, message: CarAt) -> None:
-        for node, body in self.bodies.items():
-            aboard = message.station == ANY_STATION and node == message.sender
-            if aboard != (body.load == message.car):
-                body.load = message.car if aboard else None
                 self.changed.add(node)

@@ -21,6 +21,8 @@ from onboard.gateway.inbox import Incoming
 from onboard.gateway.order import RANK, GatewayOrder, OrderRequest, order_of, same_content, with_number
 from onboard.gateway.records import OrderPhase, WishRecord
 from onboard.gateway.schema import TRANSPORT
+from onboard.history.history import Fact
+from onboard.history.tasks import TaskTold
 from onboard.ports.journal import Entry
 
 #: Orders that are over are remembered, the newest so many, so that their names are known when they come again.
@@ -198,21 +200,21 @@ class OrderBook:
 
     # --- the bus and the clock -----------------------------------------------------------------------------------
 
-    def feed(self, message: Message) -> OrderEffects:
-        """Take up one message of the fleet bus."""
+    def feed(self, fact: Fact | None) -> OrderEffects:
+        """Take up what one message of the fleet bus has told."""
         outcome = OrderEffects()
         for order in self.open:
             task = (
-                self._bus_orders.task_of(order, message)
+                self._bus_orders.task_of(order, fact)
                 if order.life in (OrderPhase.ACCEPTED, OrderPhase.CALLED)
                 else None
             )
             if task is not None and (task != order.task or order.life is OrderPhase.ACCEPTED):
                 order.task, order.life, order.due_us = task, OrderPhase.CALLED, None
                 outcome.changed.append(order)
-            elif isinstance(message, TaskReport) and message.task == self._task(order):
-                self._on_report(order, message, outcome)
-            elif self._bus_orders.is_done(order, message):
+            elif isinstance(fact, TaskTold) and fact.report.task == self._task(order):
+                self._on_report(order, fact.report, outcome)
+            elif self._bus_orders.is_done(order, fact):
                 outcome.changed.append(self._end(order, OrderPhase.DONE, "", ""))
         return outcome
 

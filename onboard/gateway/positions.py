@@ -5,13 +5,16 @@ a map is one track, x along it in metres from index 1; other systems say in thei
 site file has no coordinates there is no position.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import pi
 from typing import Protocol
 
-from onboard.contract.codes import Grade, LegAction
-from onboard.contract.messages import Itinerary, Message, Progress
+from onboard.contract.codes import LegAction
+from onboard.contract.messages import Message
 from onboard.core.site import Segment, Site
+from onboard.history.history import Fact, History
+from onboard.history.places import PlaceTold
+from onboard.history.plans import PlanTold
 from onboard.ways.site import TrackKind, way_site
 
 
@@ -35,10 +38,10 @@ class MachinePosition:
 
 
 class Tracker(Protocol):
-    """A fold over the fleet bus."""
+    """A view of a history: where machines are."""
 
-    def feed(self, message: Message) -> bool:
-        """Take up one message; whether the sender's position may have changed."""
+    def take(self, message: Message, fact: Fact | None) -> bool:
+        """Take up one message, and what it told; whether the sender's position may have changed."""
 
     def where(self, node_id: int) -> MachinePosition:
         """What is known of a mobile machine of the site."""
@@ -47,61 +50,36 @@ class Tracker(Protocol):
 class TrackTracker:
     """Machines that move along the tracks of a site."""
 
-    def __init__(self, site: Site) -> None:
-        self._site = site
-        self._at: dict[int, MachinePosition] = {}
-        self._plans: dict[int, Itinerary] = {}
-        self._legs: dict[int, int] = {}
-        for machine in site.machines.values():
-            self._at[machine.node_id] = self._place(machine.home, 0, 0, 0)
+    def __init__(self, site: Site, history: History) -> None:
+        self._ways = way_site(site)
+        self._history = history
 
-    def feed(self, message: Message) -> bool:
-        """Follow progress and firm plans; True where a machine's place or way has changed."""
-        match message:
-            case Progress():
-                old = self._at.get(message.sender)
-                if old is None:
-                    return False
-                segment = Segment(message.track, message.index)
-                passed = old.passed + (old.node != str(segment))
-                self._at[message.sender] = self._place(segment, message.offset_mm, message.speed_mm_s, passed)
-                plan = self._plans.get(message.sender)
-                if plan is not None and plan.version == message.itinerary_version:
-                    self._legs[message.sender] = message.leg
-                return True
-            case Itinerary() if message.grade is Grade.FIRM:
-                self._plans[message.sender] = message
-                self._legs[message.sender] = 0
-                return True
-        return False
+    def take(self, message: Message, fact: Fact | None) -> bool:
+        """True where a machine's place or way is told."""
+        return isinstance(fact, PlaceTold) or (isinstance(fact, PlanTold) and fact.is_firm)
 
     def where(self, node_id: int) -> MachinePosition:
         """The segment where the machine is, and those of its plan that lie ahead."""
-        at, plan = self._at[node_id], self._plans.get(node_id)
-        if plan is None:
-            return at
+        place = self._history.places.by_node[node_id]
+        segment, node = place.segment, str(place.segment)
         ahead: list[str] = []
-        for leg in plan.legs[self._legs[node_id] :]:
-            node = str(Segment(leg.track, leg.to_index))
-            if leg.action in (LegAction.TRAVEL, LegAction.RIDE) and node != (ahead[-1] if ahead else at.node):
-                ahead.append(node)
-        return replace(at, ahead=tuple(ahead))
-
-    def _place(self, segment: Segment, offset_mm: int, speed_mm_s: int, passed: int) -> MachinePosition:
-        track = way_site(self._site).tracks.get(segment.track)
-        node, driving = str(segment), speed_mm_s != 0
+        for leg in self._history.plans.ahead(node_id):
+            then = str(Segment(leg.track, leg.to_index))
+            if leg.action in (LegAction.TRAVEL, LegAction.RIDE) and then != (ahead[-1] if ahead else node):
+                ahead.append(then)
+        track = self._ways.tracks.get(segment.track)
         if track is None:
-            return MachinePosition(node, (), passed, driving)
+            return MachinePosition(node, tuple(ahead), place.passed, place.speed_mm_s != 0)
         return MachinePosition(
             node,
-            (),
-            passed,
-            driving,
+            tuple(ahead),
+            place.passed,
+            place.speed_mm_s != 0,
             map_of(track.kind, track.number),
-            (way_site(self._site).position_mm(segment) + offset_mm) / 1000,
+            (self._ways.position_mm(segment) + place.offset_mm) / 1000,
             pi / 2 if track.kind is TrackKind.SPUR else 0.0,
-            abs(offset_mm) / 1000,
-            speed_mm_s / 1000,
+            abs(place.offset_mm) / 1000,
+            place.speed_mm_s / 1000,
         )
 
 

@@ -19,6 +19,7 @@ from onboard.gateway.fleet import WHOLE, FleetTopics
 from onboard.gateway.machines import Machines
 from onboard.gateway.settings import GatewaySettings, level
 from onboard.history.history import Fact
+from onboard.history.tasks import TaskTold
 from onboard.ports.broker import Publication
 
 #: The link of the fleet's own topics.
@@ -54,8 +55,9 @@ class Publisher:
     def __init__(self, site: Site, settings: GatewaySettings, now_us: int = 0) -> None:
         self.site = site
         self.settings = settings
-        self.machines = Machines(site)
         self.fleet = FleetTopics(site, settings)
+        self.history = self.fleet.picture.history
+        self.machines = Machines(site, self.history)
         #: What is known of a machine's order from outside the bus, by node-ID.
         self.subjects: dict[int, vda.Subject] = {}
         self._headers: Counter[tuple[int, str]] = Counter()
@@ -101,7 +103,11 @@ class Publisher:
 
     def feed(self, message: Message, now_us: int) -> list[Outgoing]:
         """Take up one message of the fleet bus."""
-        return list(self._feed(message, now_us))
+        return self.take(message, self.history.feed(message, now_us), now_us)
+
+    def take(self, message: Message, fact: Fact | None, now_us: int) -> list[Outgoing]:
+        """Take up one message that the history was fed with, and what it made of it."""
+        return list(self._take(message, fact, now_us))
 
     def wake(self, now_us: int) -> list[Outgoing]:
         """All publications that are due at loop time ``now_us``."""
@@ -136,9 +142,8 @@ class Publisher:
 
     # --- inner works -------------------------------------------------------------------------------------------
 
-    def _feed(self, message: Message, now_us: int) -> Iterator[Outgoing]:
-        fact = self.fleet.picture.history.feed(message, now_us)
-        self.machines.feed(message, now_us, fact)
+    def _take(self, message: Message, fact: Fact | None, now_us: int) -> Iterator[Outgoing]:
+        self.machines.take(message, fact, now_us)
         body = self._of_fleet(message, fact, now_us)
         if not self.settings.serials:
             yield from body
@@ -175,8 +180,8 @@ class Publisher:
             if retain:
                 self._fixed[topic] = body
             yield Outgoing(FLEET, self.publication(topic, body, retain=retain))
-        if isinstance(message, TaskReport) and message.phase in _TERMINAL:
-            yield from self._report(message, now_us)
+        if isinstance(fact, TaskTold) and fact.report.phase in _TERMINAL:
+            yield from self._report(fact.report, now_us)
 
     def _report(self, report: TaskReport, now_us: int) -> Iterator[Outgoing]:
         """The end of a task, under a name by which who keeps reports tells that the bus says it twice."""
@@ -231,7 +236,7 @@ class Publisher:
                 yield Outgoing(self._serial(node), self._link_state(self._serial(node), connection, now_us))
 
     def _connection_of(self, node: int, now_us: int) -> Connection:
-        if self.machines.bodies[node].heard_us is None:
+        if not self.machines.bodies[node].is_heard:
             return Connection.OFFLINE
         return Connection.BROKEN if self.machines.is_silent(node, now_us) else Connection.ONLINE
 

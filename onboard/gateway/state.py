@@ -65,7 +65,7 @@ def state(
             in_service=body.state is MachineState.OBSTACLE and not body.is_held,
         ),
         **dialect.power(),
-        **dialect.safety(stopped=machines.emergency is not None),
+        **dialect.safety(stopped=machines.is_stopped),
         **_place(dialect, where),
     }
     actions = _actions(task, does)
@@ -174,8 +174,8 @@ def _error(kind: str, level: str, description: str) -> Json:
 
 
 def _information(machines: Machines, body: MobileMachine, now_us: int) -> list[Json]:
-    wait = body.wait
-    if wait is None or now_us - body.wait_us > WAIT_TOLD_US:
+    told_us, wait = body.wait or (0, None)
+    if wait is None or now_us - told_us > WAIT_TOLD_US:
         return []
     segment = Segment(wait.track, wait.index)
     references = [

@@ -6,11 +6,8 @@ from onboard.contract.codes import CallResult, Criterion, Grade, Operation, Reas
 from onboard.contract.messages import (
     Award,
     Bid,
-    BusTime,
     CallForProposals,
-    Heartbeat,
     Itinerary,
-    Message,
     Progress,
     Reference,
     TaskReport,
@@ -73,6 +70,13 @@ class CallOpened:
 
 
 @dataclass(frozen=True, slots=True)
+class CallRepeated:
+    """A call is said again."""
+
+    call: CallHistory
+
+
+@dataclass(frozen=True, slots=True)
 class BidMade:
     """A bid; ``call`` None where its call was not heard."""
 
@@ -92,47 +96,22 @@ class CallAnswered:
     is_end: bool
 
 
-CallFact = CallOpened | BidMade | CallAnswered
+CallFact = CallOpened | CallRepeated | BidMade | CallAnswered
 
 
 class Calls:
-    """A fold over the fleet bus: feed every message in the order of the log. ``most`` calls are kept, None for all.
+    """A fold over what was said of calls, in the order of the log. ``most`` calls are kept, None for all."""
 
-    ``clock`` is fed here.
-    """
-
-    def __init__(self, most: int | None = None, clock: LoggedBusTime | None = None) -> None:
+    def __init__(self, most: int | None, clock: LoggedBusTime) -> None:
         #: The newest of each number of each caller.
         self.by_key: dict[tuple[int, int], CallHistory] = {}
         #: All of them where ``most`` is None.
         self.all: list[CallHistory] = []
         self._most = most
         self._going: list[CallHistory] = []
-        self._boots: dict[int, int] = {}
-        self._clock = clock if clock is not None else LoggedBusTime()
+        self._clock = clock
         #: Whose tentative itinerary of which version goes with which call's bid.
         self._offers: dict[tuple[int, int], CallHistory] = {}
-
-    def feed(self, message: Message, time_us: int) -> CallFact | None:
-        """Take up one message; what it told of a call, if anything."""
-        match message:
-            case CallForProposals():
-                return self._on_call(message, time_us)
-            case Bid():
-                return self._on_bid(message, time_us)
-            case Award():
-                return self._on_award(message, time_us)
-            case BusTime():
-                self._clock.feed(message, time_us)
-            case Itinerary():
-                self._on_itinerary(message)
-            case TaskReport():
-                self._on_report(message, time_us)
-            case Progress():
-                self._on_progress(message, time_us)
-            case Heartbeat():
-                self._on_heartbeat(message, time_us)
-        return None
 
     def finish(self, task: Reference, time_us: int) -> None:
         """A task is done, where no report tells it."""
@@ -147,12 +126,13 @@ class Calls:
             return None
         return near_us + 1000 * ms_after(bus_ms, (near_us - offset_us) // 1000)
 
-    def _on_call(self, terms: CallForProposals, time_us: int) -> CallFact | None:
+    def on_call(self, terms: CallForProposals, time_us: int) -> CallOpened | CallRepeated:
+        """A call, for the first time or again."""
         key = (terms.sender, terms.call)
         known = self.by_key.get(key)
         if known is not None and known.terms == terms:
             known.messages += 1
-            return None
+            return CallRepeated(known)
         call = CallHistory(terms, time_us)
         self.by_key[key] = call
         if self._most is None:
@@ -163,7 +143,8 @@ class Calls:
         self._going.append(call)
         return CallOpened(call)
 
-    def _on_bid(self, bid: Bid, time_us: int) -> CallFact:
+    def on_bid(self, bid: Bid, time_us: int) -> BidMade:
+        """A bid, whether its call was heard or not."""
         call = self.by_key.get((bid.initiator, bid.call))
         if call is not None:
             call.messages += 1
@@ -172,7 +153,8 @@ class Calls:
                 self._offers[bid.sender, bid.itinerary_version] = call
         return BidMade(call, bid)
 
-    def _on_award(self, award: Award, time_us: int) -> CallFact:
+    def on_award(self, award: Award, time_us: int) -> CallAnswered:
+        """An award, whether its call was heard or not."""
         call = self.by_key.get((award.sender, award.call))
         if call is None:
             return CallAnswered(None, award, is_end=False)
@@ -188,7 +170,8 @@ class Calls:
                 call.promised_us = self.moment_us(cost, time_us)
         return CallAnswered(call, award, is_end)
 
-    def _on_itinerary(self, itinerary: Itinerary) -> None:
+    def on_itinerary(self, itinerary: Itinerary) -> None:
+        """A plan goes with the bid that offers it, or with the award that it follows."""
         if itinerary.grade is Grade.FIRM:
             call = next((one for one in self._going if _is_stamped(one, itinerary)), None)
         else:
@@ -196,14 +179,15 @@ class Calls:
         if call is not None:
             call.messages += 1
 
-    def _on_report(self, report: TaskReport, time_us: int) -> None:
+    def on_report(self, report: TaskReport, time_us: int) -> None:
+        """The winner's word on what it has won."""
         for call in self._going:
             if call.terms.task == report.task and call.winner == report.sender and not call.is_over:
                 call.messages += 1
                 if is_task(call.terms) and report.phase is TaskPhase.DONE:
                     call.finished_us = time_us
 
-    def _on_progress(self, progress: Progress, time_us: int) -> None:
+    def on_progress(self, progress: Progress, time_us: int) -> None:
         """A ride is over when the caller says, on the platform, that it is at the floor that it asked for."""
         for call in self._going:
             terms = call.terms
@@ -214,14 +198,11 @@ class Calls:
             elif call.is_aboard and (progress.track, progress.index) == _platform(terms.to_station):
                 call.finished_us = time_us
 
-    def _on_heartbeat(self, beat: Heartbeat, time_us: int) -> None:
-        before = self._boots.get(beat.sender)
-        self._boots[beat.sender] = beat.boot
-        if before is None or before == beat.boot:
-            return
+    def on_restart(self, node: int, time_us: int) -> None:
+        """A machine has started anew, in the middle of what is going on."""
         for call in self._going:
-            if not call.is_over and beat.sender in (call.terms.sender, call.winner):
-                call.restarts.append((time_us, beat.sender))
+            if not call.is_over and node in (call.terms.sender, call.winner):
+                call.restarts.append((time_us, node))
 
 
 def _platform(number: int) -> tuple[int, int]:

@@ -42,18 +42,21 @@ class TaskHistory:
 
 @dataclass(frozen=True, slots=True)
 class TaskTold:
-    """A report on a task that was heard of; its phase ``before``, and whether this one is told for the first time."""
+    """A report; its phase ``before``, and whether this one is told for the first time.
 
-    task: TaskHistory
+    Of a task that nobody has heard of ``task`` and ``before`` are None, and nothing is its first.
+    """
+
+    task: TaskHistory | None
     report: TaskReport
-    before: TaskPhase
+    before: TaskPhase | None
     is_first: bool
 
 
 class TaskFold:
-    """A fold over what calls and reports tell; ``most`` tasks are kept."""
+    """A fold over what calls and reports tell; ``most`` tasks are kept, None for all."""
 
-    def __init__(self, most: int) -> None:
+    def __init__(self, most: int | None) -> None:
         self.by_name: dict[Reference, TaskHistory] = {}
         self._most = most
 
@@ -62,7 +65,8 @@ class TaskFold:
         if reference in self.by_name:
             return False
         self.by_name[reference] = TaskHistory(operation, phase_us={TaskPhase.OPEN: time_us})
-        drop_oldest(self.by_name, self._most, lambda task: not task.is_waiting)
+        if self._most is not None:
+            drop_oldest(self.by_name, self._most, lambda task: not task.is_waiting)
         return True
 
     def own(self, reference: Reference, owner: int) -> None:
@@ -98,11 +102,11 @@ class TaskFold:
             if call.criterion is Criterion.FINISH_TIME:
                 task.promised_ms = fact.call.cost_of(award.winner)
 
-    def on_report(self, report: TaskReport, time_us: int) -> TaskTold | None:
-        """What its owner or its caller says of it; None for a task that nobody has heard of."""
+    def on_report(self, report: TaskReport, time_us: int) -> TaskTold:
+        """What its owner or its caller says of it."""
         task = self.by_name.get(report.task)
         if task is None:
-            return None
+            return TaskTold(None, report, None, is_first=False)
         is_first, before = report.phase not in task.phase_us, task.phase
         task.phase = report.phase
         if is_first and report.phase is TaskPhase.AWARDED and not task.owner:

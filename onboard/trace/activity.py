@@ -8,12 +8,15 @@ from collections import Counter
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from onboard.contract.codes import CallResult, Grade, KindCode, LegAction, Operation, TaskPhase
-from onboard.contract.constants import ANY_STATION
-from onboard.contract.messages import CarAt, Itinerary, Message, Progress, Reference, TaskReport, Waiting
+from onboard.contract.codes import CallResult, KindCode, LegAction, Operation, TaskPhase
+from onboard.contract.messages import Itinerary, Reference, TaskReport
 from onboard.core.site import Segment, Site
 from onboard.history.calls import CallAnswered, CallHistory
-from onboard.history.history import Fact
+from onboard.history.history import Fact, History
+from onboard.history.lives import WaitTold
+from onboard.history.places import PlaceTold
+from onboard.history.plans import PlanTold
+from onboard.history.tasks import TaskTold
 from onboard.ways.site import way_site
 
 #: Operations whose winner has a task until it reports the end.
@@ -48,7 +51,6 @@ class MachineActivity:
     #: Before its first word a machine is taken to be at home; getting there is no travel.
     heard: bool = False
     moving: bool = False
-    car: Reference | None = None
     works: list[Segment] = field(default_factory=list)
     tasks: set[Reference] = field(default_factory=set)
     rides: Counter[int] = field(default_factory=Counter)
@@ -62,12 +64,13 @@ class MachineActivity:
 
 
 class Activities:
-    """Give it every message of the fleet bus in the order of the log, and what a history was told by it."""
+    """Give it what a history was told by every message of the fleet bus, in the order of the log."""
 
-    def __init__(self, site: Site, begin_us: int = 0) -> None:
+    def __init__(self, site: Site, history: History, begin_us: int = 0) -> None:
         ways = way_site(site)
         self.bodies: dict[int, MachineActivity] = {}
         self._site = site
+        self._loads = history.loads
         self._begin_us = begin_us
         for machine in site.machines.values():
             if machine.kind in (KindCode.ROBOT, KindCode.LIFT):
@@ -85,23 +88,19 @@ class Activities:
             body.spent_us = Counter()
             body.busy_us = body.travel_mm = body.empty_mm = body.longest_wait_us = 0
 
-    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
-        """Take up one message."""
-        if isinstance(fact, CallAnswered) and fact.call is not None and fact.is_end:
-            self._on_end(fact.call, fact, time_us)
-        match message:
-            case Progress():
-                self._on_progress(message, time_us)
-            case Waiting():
-                self._on_waiting(message, time_us)
-            case TaskReport():
-                self._on_report(message, time_us)
-            case CarAt() if (body := self.bodies.get(message.sender)) and message.station == ANY_STATION:
-                body.car = message.car
-            case CarAt():
-                self._put_down(message.car)
-            case Itinerary() if message.grade is Grade.FIRM and message.sender in self.bodies:
-                self._on_itinerary(self.bodies[message.sender], message, time_us)
+    def take(self, fact: Fact | None, time_us: int) -> None:
+        """Take up what one message has told."""
+        match fact:
+            case CallAnswered() if fact.call is not None and fact.is_end:
+                self._on_end(fact.call, fact, time_us)
+            case PlaceTold():
+                self._on_place(fact, time_us)
+            case WaitTold():
+                self._on_waiting(fact, time_us)
+            case TaskTold():
+                self._on_report(fact.report, time_us)
+            case PlanTold() if fact.is_firm and fact.plan.sender in self.bodies:
+                self._on_itinerary(self.bodies[fact.plan.sender], fact.plan, time_us)
 
     def settle_all(self, time_us: int) -> None:
         """Bring all times up to ``time_us``."""
@@ -112,18 +111,17 @@ class Activities:
 
     # --- messages ----------------------------------------------------------------------------------------------
 
-    def _on_progress(self, message: Progress, time_us: int) -> None:
-        body = self.bodies.get(message.sender)
-        if body is None or message.track not in way_site(self._site).tracks:
+    def _on_place(self, told: PlaceTold, time_us: int) -> None:
+        body, place = self.bodies.get(told.node), told.place
+        if body is None or place.segment.track not in way_site(self._site).tracks:
             return
-        at = Segment(message.track, message.index)
-        position_mm = way_site(self._site).position_mm(at) + message.offset_mm
+        position_mm = way_site(self._site).position_mm(place.segment) + place.offset_mm
         left = self._platform_of(body)
-        if body.heard and at.track == body.at.track:
+        if body.heard and place.segment.track == body.at.track:
             self._travel(body, abs(position_mm - body.position_mm))
-        moved = at != body.at or message.speed_mm_s != 0
+        moved = place.segment != body.at or place.speed_mm_s != 0
         body.heard = True
-        body.at, body.position_mm, body.moving = at, position_mm, message.speed_mm_s != 0
+        body.at, body.position_mm, body.moving = place.segment, position_mm, place.speed_mm_s != 0
         if moved and body.waiting_since_us is not None:
             self._note_wait(body, time_us)
             body.waiting_since_us = None
@@ -135,12 +133,12 @@ class Activities:
 
     def _travel(self, body: MachineActivity, way_mm: int) -> None:
         body.travel_mm += way_mm
-        loaded = body.car is not None if body.kind is KindCode.ROBOT else self._passengers(body)
+        loaded = body.node in self._loads.aboard if body.kind is KindCode.ROBOT else self._passengers(body)
         if not loaded:
             body.empty_mm += way_mm
 
-    def _on_waiting(self, message: Waiting, time_us: int) -> None:
-        body = self.bodies.get(message.sender)
+    def _on_waiting(self, told: WaitTold, time_us: int) -> None:
+        body = self.bodies.get(told.word.sender)
         if body is not None and body.waiting_since_us is None:
             body.waiting_since_us = time_us
 
@@ -168,11 +166,6 @@ class Activities:
         if report.phase in (TaskPhase.DONE, TaskPhase.FORFEITED):
             body.tasks.discard(report.task)
         self._settle(body, time_us)
-
-    def _put_down(self, car: Reference) -> None:
-        for body in self.bodies.values():
-            if body.car == car:
-                body.car = None
 
     def _end_ride(self, lift: int, robot: MachineActivity, time_us: int) -> None:
         body = self.bodies.get(self._site.stewards[lift])

@@ -122,9 +122,9 @@ class Indicators:
 
     def __init__(self, site: Site, begin_us: int = 0, history: History | None = None) -> None:
         self._site = site
-        self._history = history if history is not None else History()
+        self._history = history if history is not None else History(site)
         self._begin_us = begin_us
-        self._activities = Activities(site, begin_us)
+        self._activities = Activities(site, self._history, begin_us)
         self._negotiations = NegotiationFold(self._history)
 
     def feed(self, message: Message, time_us: int) -> None:
@@ -134,7 +134,7 @@ class Indicators:
     def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Take up one message, and what the history made of it."""
         self._negotiations.take(message, fact, time_us)
-        self._activities.take(message, fact, time_us)
+        self._activities.take(fact, time_us)
 
     def begin(self, time_us: int) -> None:
         """Measure from now on: open tasks, plans and places are kept, sums begin anew."""

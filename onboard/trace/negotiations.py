@@ -7,11 +7,13 @@ for a part of it (a ride) are sub-calls.
 from collections import Counter
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import CallResult, Grade, LegAction, Operation, TaskPhase
-from onboard.contract.messages import CallForProposals, Itinerary, Leg, Message, Stamp, Waiting
+from onboard.contract.codes import CallResult, LegAction, Operation, TaskPhase
+from onboard.contract.messages import CallForProposals, Leg, Message
 from onboard.core.serial import ms_after
 from onboard.history.calls import BidMade, CallAnswered, CallHistory, CallOpened
 from onboard.history.history import Fact, History
+from onboard.history.lives import WaitTold
+from onboard.history.plans import PlanTold
 from onboard.history.tasks import TaskTold
 
 TASKS = (Operation.PARK, Operation.RETRIEVE)
@@ -20,16 +22,6 @@ TASKS = (Operation.PARK, Operation.RETRIEVE)
 ANSWER_US = 50_000
 #: Why a plan was told anew: in answer to another's.
 ANSWER = "another's plan"
-
-
-@dataclass
-class FirmPlan:
-    """The last firm itinerary of one machine, and what was heard since that may change it."""
-
-    version: int
-    stamp: Stamp
-    legs: tuple[Leg, ...]
-    waited: str | None = None
 
 
 @dataclass
@@ -59,7 +51,9 @@ class NegotiationFold:
     def __init__(self, history: History) -> None:
         self.counts = NegotiationCounts()
         self._tasks = history.tasks
-        self._plans: dict[int, FirmPlan] = {}
+        self._plans = history.plans
+        #: What each has waited for since it told its plan.
+        self._waited: dict[int, str] = {}
         #: Stamps of awards whose winner has not told its plan yet.
         self._fresh: set[tuple[int, int, int]] = set()
         self._told_us: tuple[int, int] = (0, -ANSWER_US)
@@ -72,14 +66,11 @@ class NegotiationFold:
     def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Take up one message."""
         self.counts.messages[type(message).__name__] += 1
-        match message:
-            case Waiting():
-                plan = self._plans.get(message.sender)
-                if plan is not None:
-                    plan.waited = message.reason.name
-            case Itinerary() if message.grade is Grade.FIRM:
-                self._on_plan(message, time_us)
         match fact:
+            case WaitTold(word=word) if word.sender in self._plans.firm:
+                self._waited[word.sender] = word.reason.name
+            case PlanTold() if fact.is_firm:
+                self._on_plan(fact, time_us)
             case CallOpened():
                 self._on_call(fact.call.terms)
             case BidMade():
@@ -106,7 +97,7 @@ class NegotiationFold:
 
     def _on_done(self, statement: TaskTold, time_us: int) -> None:
         task = statement.task
-        if task.operation not in TASKS:
+        if task is None or task.operation not in TASKS:
             return
         done = self.counts.parked_us if task.operation is Operation.PARK else self.counts.fetched_us
         done.append(time_us)
@@ -115,11 +106,11 @@ class NegotiationFold:
 
     # --- plans -------------------------------------------------------------------------------------------------
 
-    def _on_plan(self, itinerary: Itinerary, time_us: int) -> None:
-        old = self._plans.get(itinerary.sender)
+    def _on_plan(self, fact: PlanTold, time_us: int) -> None:
+        itinerary, old = fact.plan, fact.before
         if old is not None and old.version == itinerary.version:
             return
-        self._plans[itinerary.sender] = FirmPlan(itinerary.version, itinerary.stamp, itinerary.legs)
+        waited = self._waited.pop(itinerary.sender, None)
         teller, told_us = self._told_us
         self._told_us = (itinerary.sender, time_us)
         award = (itinerary.sender, itinerary.stamp.initiator, itinerary.stamp.call)
@@ -128,7 +119,7 @@ class NegotiationFold:
             return
         if old is None:
             return
-        why = "own time" if old.waited is None else f"wait: {old.waited}"
+        why = "own time" if waited is None else f"wait: {waited}"
         if teller != itinerary.sender and time_us - told_us <= ANSWER_US:
             why = ANSWER
         what = "times" if _is_rest_of(itinerary.legs, old.legs) else "way"

@@ -6,24 +6,15 @@ simulated one or a recorded log alike.
 
 from collections import Counter, deque
 
-from onboard.contract.codes import CallResult, Grade, ManualMode, Operation, Reason, TaskPhase
-from onboard.contract.constants import ANY_STATION, OUTSIDE, STILL
-from onboard.contract.messages import (
-    Blocked,
-    CarAt,
-    Clear,
-    Halted,
-    Heartbeat,
-    Itinerary,
-    ManualState,
-    Message,
-    Progress,
-    Reference,
-    Waiting,
-)
-from onboard.core.site import Segment, Site
+from onboard.contract.codes import CallResult, ManualMode, Operation, TaskPhase
+from onboard.contract.messages import Message, Reference
+from onboard.core.site import Site
 from onboard.history.calls import BidMade, CallAnswered, CallHistory, CallOpened
+from onboard.history.halts import HaltTold
+from onboard.history.hands import HandTold
 from onboard.history.history import Fact, History
+from onboard.history.lives import WaitTold
+from onboard.history.orders import SlotTold
 from onboard.history.tasks import TaskHistory, TaskTold
 from onboard.systems.words import words_of
 
@@ -46,12 +37,8 @@ class SiteView:
 
     def __init__(self, site: Site, history: History | None = None) -> None:
         self.site = site
-        self.history = history if history is not None else History()
+        self.history = history if history is not None else History(site)
         self.now_us = 0
-        self.positions: dict[int, tuple[Segment, int]] = {}
-        self.cars: dict[Reference, int] = {}
-        self.aboard: dict[int, Reference | None] = {}
-        self.itineraries: dict[int, Itinerary] = {}
         self.messages: Counter[str] = Counter()
         self.bids = 0
         self.calls_opened = 0
@@ -61,27 +48,12 @@ class SiteView:
         self.done = 0
         #: From the first call for each to its end, all tasks that are done together.
         self.done_us = 0
-        self.blocked: set[Segment] = set()
-        #: Why each machine that does not act does not, by its own last word, or by a neighbour's.
-        self.halts: dict[int, Halted] = {}
         self.words = words_of(site)
         self.events: deque[tuple[int, str]] = deque(maxlen=EVENT_LIMIT)
-        for machine in site.machines.values():
-            self.positions[machine.node_id] = (machine.home, 0)
 
     def name(self, node: int) -> str:
         """A machine's name, or its node-ID where the site has none for it."""
         return self.words.machine(node)
-
-    def _on_halted(self, halted: Halted, time_us: int) -> None:
-        before = self.halts.get(halted.machine)
-        self.halts[halted.machine] = halted
-        what = halted.reason, halted.cause, halted.needs_person
-        if before is not None and what == (before.reason, before.cause, before.needs_person):
-            return
-        why = self.words.reason(halted.reason) + (f", by {self.name(halted.cause)}" if halted.cause else "")
-        person = "; a person must decide" if halted.needs_person else ""
-        self.say(time_us, f"{self.name(halted.machine)} does not act: {why}{person}")
 
     @property
     def calls(self) -> dict[tuple[int, int], CallHistory]:
@@ -102,18 +74,16 @@ class SiteView:
         self.now_us = time_us
         self.words.hear(message)
         self.messages[type(message).__name__] += 1
-        match message:
-            case Heartbeat():
-                self._on_heartbeat(message)
-            case Progress():
-                self._on_progress(message)
-            case CarAt():
-                self._on_car(message)
-            case Itinerary() if message.grade is Grade.FIRM:
-                self.itineraries[message.sender] = message
-            case Waiting() | Blocked() | Clear() | ManualState() | Halted():
-                self._on_word(message, time_us)
         self._deal(fact, time_us)
+        match fact:
+            case HaltTold():
+                self._on_halt(fact, time_us)
+            case WaitTold():
+                self.say(time_us, self._wait(fact))
+            case SlotTold():
+                self.say(time_us, self._slot(fact))
+            case HandTold(word=word):
+                self.say(time_us, f"{self.name(word.sender)} {_HANDS[word.manual_mode, word.at_rest]}")
 
     def _deal(self, fact: Fact | None, time_us: int) -> None:
         match fact:
@@ -131,55 +101,29 @@ class SiteView:
             case TaskTold() if fact.is_first:
                 self._on_phase(fact, time_us)
 
-    def _on_progress(self, statement: Progress) -> None:
-        here, word = (Segment(statement.track, statement.index), statement.offset_mm), self.halts.get(statement.sender)
-        if word is not None and word.reason is Reason.FALSE_STATEMENT and here != self.positions.get(statement.sender):
-            # Said by others, because it stood: it moves.
-            del self.halts[statement.sender]
-        self.positions[statement.sender] = here
-
-    def _on_heartbeat(self, beat: Heartbeat) -> None:
-        word = self.halts.get(beat.sender)
-        if word is not None and beat.state not in STILL and word.reason is not Reason.FALSE_STATEMENT:
-            del self.halts[beat.sender]
-
-    def _on_word(self, message: Waiting | Blocked | Clear | ManualState | Halted, time_us: int) -> None:
-        if isinstance(message, Halted):
-            self._on_halted(message, time_us)
+    def _on_halt(self, statement: HaltTold, time_us: int) -> None:
+        halted, before = statement.word, statement.before[1] if statement.before is not None else None
+        what = halted.reason, halted.cause, halted.needs_person
+        if before is not None and what == (before.reason, before.cause, before.needs_person):
             return
-        if isinstance(message, Blocked):
-            self.blocked.add(Segment(message.track, message.index))
-        elif isinstance(message, Clear):
-            self.blocked.discard(Segment(message.track, message.index))
-        self.say(time_us, self._told_of(message))
+        why = self.words.reason(halted.reason) + (f", by {self.name(halted.cause)}" if halted.cause else "")
+        person = "; a person must decide" if halted.needs_person else ""
+        self.say(time_us, f"{self.name(halted.machine)} does not act: {why}{person}")
 
-    def _told_of(self, message: Waiting | Blocked | Clear | ManualState) -> str:
-        """What is said of one segment, or of a person's hand in a machine, in words."""
-        if isinstance(message, ManualState):
-            return f"{self.name(message.sender)} {_HANDS[message.manual_mode, message.at_rest]}"
-        where, why = self.words.slot(message.track, message.index), self.words.reason(message.reason)
-        if isinstance(message, Waiting):
-            blocker = f" of {self.name(message.blocker)}" if message.blocker else ""
-            return f"{self.name(message.sender)} waits for {where}{blocker}: {why}"
-        return f"{where} is {'blocked' if isinstance(message, Blocked) else 'clear again'}: {why}"
+    def _wait(self, statement: WaitTold) -> str:
+        word = statement.word
+        where, why = self.words.slot(word.track, word.index), self.words.reason(word.reason)
+        blocker = f" of {self.name(word.blocker)}" if word.blocker else ""
+        return f"{self.name(word.sender)} waits for {where}{blocker}: {why}"
 
-    def places_taken(self) -> dict[int, Reference]:
-        """Car by station number, for cars that stand at one."""
-        return {station: car for car, station in self.cars.items() if station not in (ANY_STATION, OUTSIDE)}
+    def _slot(self, statement: SlotTold) -> str:
+        word = statement.word
+        where, why = self.words.slot(word.track, word.index), self.words.reason(word.reason)
+        return f"{where} is {'blocked' if statement.is_blocked else 'clear again'}: {why}"
 
     def say(self, time_us: int, text: str) -> None:
         """One more event in words."""
         self.events.append((time_us, text))
-
-    def _on_car(self, message: CarAt) -> None:
-        if message.station == ANY_STATION:
-            self.aboard[message.sender] = message.car
-        else:
-            self.aboard = {node: car for node, car in self.aboard.items() if car != message.car}
-        if message.station == OUTSIDE:
-            self.cars.pop(message.car, None)
-        else:
-            self.cars[message.car] = message.station
 
     def end(self, reference: Reference, time_us: int) -> None:
         """A task is done, where no report tells it."""
@@ -201,6 +145,7 @@ class SiteView:
 
     def _on_phase(self, statement: TaskTold, time_us: int) -> None:
         task, report = statement.task, statement.report
+        assert task is not None, "who is first tells of a task that is known"
         if report.phase is TaskPhase.DONE:
             self._count_done(task, time_us)
             self.parked += task.operation is Operation.PARK

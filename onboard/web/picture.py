@@ -13,6 +13,7 @@ from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.history.calls import CallHistory
 from onboard.history.history import Fact
+from onboard.history.lives import SILENT_BEATS
 from onboard.trace.frame_bits import frame_bits
 from onboard.trace.indicators import Indicators
 from onboard.trace.scene.scenes import scene_of
@@ -24,8 +25,6 @@ CALLS_SHOWN = 12
 EVENTS_SHOWN = 40
 #: A wait is shown as long as nothing newer is told, at most so long, us.
 WAIT_SHOWN_US = 30_000_000
-#: A machine is silent once so many of its heartbeats are missing; whether others do without it is theirs to tell.
-SILENT_BEATS = 3
 #: A sample of the small charts each, us, and how many are kept: half an hour.
 SAMPLE_US = 10_000_000
 SAMPLES = 180
@@ -68,7 +67,7 @@ class LivePicture:
     def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """One message of the fleet bus that the history was fed with, and what it made of it."""
         self.view.take(message, fact, time_us)
-        self.scene.feed(message, time_us)
+        self.scene.take(message, fact, time_us)
         self.indicators.take(message, fact, time_us)
         self._sample(time_us)
 
@@ -150,7 +149,7 @@ class LivePicture:
 
     def _state(self, node: int) -> str:
         """What its last heartbeat said, unless that is too long ago."""
-        heard_us = self._lives.heard_us.get(node)
+        heard_us = self._lives.beats_us.get(node)
         if heard_us is None or self.view.now_us - heard_us > SILENT_BEATS * self.site.timing.heartbeat_us:
             return "silent"
         return self._lives.states[node].name.lower()

@@ -3,13 +3,17 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.tools import DEADLINE_S
+
 ROOT = Path(__file__).parents[2]
 
 
 def log(hash_seed: str) -> bytes:
     command = [sys.executable, "-m", "tests.can.busy_day", "400000"]
     environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
-    return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, check=True, timeout=120).stdout
+    return subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, check=True, timeout=DEADLINE_S
+    ).stdout
 
 
 def test_two_processes_with_different_hash_seeds_write_the_same_bytes() -> None:

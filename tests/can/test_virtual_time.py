@@ -9,6 +9,7 @@ import pytest
 
 from bus_sim import virtual_time
 from bus_sim.virtual_time import DeadlockError, LoopClock, VirtualTimeLoop, now_us, run
+from tests.tools import DEADLINE_S
 
 
 @pytest.fixture
@@ -199,7 +200,7 @@ def test_sockets_work_at_a_pace() -> None:
         ticks: list[float] = []
         loop.call_later(0.001, lambda: ticks.append(loop.time()))
         server = await asyncio.start_server(echo, "127.0.0.1", 0)
-        async with server, asyncio.timeout(60):
+        async with server, asyncio.timeout(DEADLINE_S):
             reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname()[:2])
             await asyncio.sleep(0.01)
             writer.write(b"hello\n")

@@ -18,7 +18,7 @@ from onboard.systems.cell.contracts import part_token
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.records import ContractRecord, ContractStage, StageRecord
 from onboard.systems.cell.robot import ArmRobot
-from onboard.systems.cell.steps import CHOOSING, TABLE, Deed, Finding
+from onboard.systems.cell.steps import CHOOSING, TABLE, ArmDeed, ArmFinding
 from onboard.systems.registry import factory_for
 from tests.cell.playing import cell
 
@@ -71,36 +71,36 @@ def say(behaviour: ArmRobot, words: Words) -> None:
     behaviour.sense(GripState(ARM, behaviour.gripper.sequence, words.grip, words.part), NOW_US)
 
 
-def meant(phase: ArmPhase, words: Words) -> Finding:
+def meant(phase: ArmPhase, words: Words) -> ArmFinding:
     """What the words come to for a part in hand, told once more."""
     match phase:
         case ArmPhase.TO_PART:
-            return Finding.THERE if words.place == "start" else Finding.ELSEWHERE
+            return ArmFinding.THERE if words.place == "start" else ArmFinding.ELSEWHERE
         case ArmPhase.CARRYING:
-            return Finding.THERE if words.place == "end" else Finding.ELSEWHERE
+            return ArmFinding.THERE if words.place == "end" else ArmFinding.ELSEWHERE
         case ArmPhase.PUTTING:
-            return Finding.GRIPPED if words.grip is GripMode.OPEN else Finding.THERE
+            return ArmFinding.GRIPPED if words.grip is GripMode.OPEN else ArmFinding.THERE
     if words.grip is GripMode.BUSY:
-        return Finding.GRIPPING
+        return ArmFinding.GRIPPING
     if (words.grip, words.part) == (GripMode.HOLDING, PART):
-        return Finding.GRIPPED
+        return ArmFinding.GRIPPED
     if words.grip is GripMode.OPEN and words.place == "end" and not words.is_ordered:
-        return Finding.LIES
-    return Finding.THERE if words.place == "start" else Finding.ELSEWHERE
+        return ArmFinding.LIES
+    return ArmFinding.THERE if words.place == "start" else ArmFinding.ELSEWHERE
 
 
 #: What is ordered, written and told; a new phase is told besides.
-SAID: dict[Deed, list[object]] = {
-    Deed.WAIT: [],
-    Deed.CHOOSE: [],
-    Deed.TO_START: [PLACES["start"]],
-    Deed.TO_END: [PLACES["end"]],
-    Deed.BEGIN: [ContractStage.TAKEN],
-    Deed.TAKE: [GripAction.TAKE],
-    Deed.LIFTED: ["aboard"],
-    Deed.REST: [],
-    Deed.PUT: [GripAction.PUT],
-    Deed.PUT_DOWN: [ContractStage.PUT, "lies", ContractStage.OVER, "DONE"],
+SAID: dict[ArmDeed, list[object]] = {
+    ArmDeed.WAIT: [],
+    ArmDeed.CHOOSE: [],
+    ArmDeed.TO_START: [PLACES["start"]],
+    ArmDeed.TO_END: [PLACES["end"]],
+    ArmDeed.BEGIN: [ContractStage.TAKEN],
+    ArmDeed.TAKE: [GripAction.TAKE],
+    ArmDeed.LIFTED: ["aboard"],
+    ArmDeed.REST: [],
+    ArmDeed.PUT: [GripAction.PUT],
+    ArmDeed.PUT_DOWN: [ContractStage.PUT, "lies", ContractStage.OVER, "DONE"],
 }
 
 
@@ -121,7 +121,7 @@ def told(effects: list[Effect]) -> Iterator[object]:
                 yield progress.arm_phase
 
 
-def line(phase: ArmPhase, finding: Finding) -> tuple[ArmPhase, list[object]]:
+def line(phase: ArmPhase, finding: ArmFinding) -> tuple[ArmPhase, list[object]]:
     following, deed = TABLE[phase, finding]
     return following, SAID[deed] + ([following] if following is not phase else [])
 
@@ -150,19 +150,19 @@ def test_without_a_part_in_hand_the_next_is_chosen(
         say(one, words)
         finding = choice(stage, is_custodian=is_custodian)
         following, said = line(phase, finding)
-        if TABLE[phase, finding][1] is Deed.CHOOSE:
+        if TABLE[phase, finding][1] is ArmDeed.CHOOSE:
             # What was chosen is begun at once.
             following, then = line(following, meant(following, words))
             said += then
         assert (list(told(one.advance(LATER_US))), one.phase) == (said, following), words
 
 
-def choice(stage: ContractStage | None, *, is_custodian: bool) -> Finding:
+def choice(stage: ContractStage | None, *, is_custodian: bool) -> ArmFinding:
     if stage is None:
-        return Finding.NOTHING
+        return ArmFinding.NOTHING
     if not is_custodian:
-        return Finding.NO_RIGHT
-    return Finding.HALF_TAKEN if stage is ContractStage.TAKEN else Finding.MAY_TAKE
+        return ArmFinding.NO_RIGHT
+    return ArmFinding.HALF_TAKEN if stage is ContractStage.TAKEN else ArmFinding.MAY_TAKE
 
 
 def test_a_line_of_the_table_is_for_what_can_be() -> None:

@@ -11,15 +11,16 @@ from bus_sim.systems.car_park.compare.plays import MIP, POLICIES, Play, play
 from bus_sim.systems.car_park.compare.policies import AnyFirst, JointChoice, NearestFirst
 from bus_sim.systems.car_park.compare.table import BOUND, tabulate
 from bus_sim.systems.car_park.demand import Demand
+from tests.thinned import is_long
 
 SITE = find_site("small")
 #: One car a minute in and one out: the compartment of this site serves fewer, so queues grow.
-SEEDS = (1, 2, 3)
-CARS = 8
+SEEDS = (1, 2, 3) if is_long() else (1,)
+CARS, APART_S = (8, 60.0) if is_long() else (5, 40.0)
 
 
 def demand(seed: int) -> Demand:
-    return Demand.by_mean(60.0, 30.0, seed, count=CARS)
+    return Demand.by_mean(APART_S, APART_S / 2, seed, count=CARS)
 
 
 @cache
@@ -52,10 +53,11 @@ def test_p56_the_joint_choice_beats_nearest_first_and_random() -> None:
 
 def test_p56_the_joint_choice_is_far_better_where_there_is_more_to_choose() -> None:
     """Three compartments and four robots: nearest-first and random took 1.3 times as long over ten seeds."""
-    site, seeds = find_site("standard"), (1, 3)
+    site = find_site("standard")
+    seeds, cars, apart_s = ((1, 3), 8, 30.0) if is_long() else ((1,), 5, 20.0)
 
     def mean_of(policy: str) -> float:
-        plays = [play(site, Demand.by_mean(30.0, 15.0, seed, count=8), policy, seed) for seed in seeds]
+        plays = [play(site, Demand.by_mean(apart_s, apart_s / 2, seed, count=cars), policy, seed) for seed in seeds]
         assert [(one.left, one.faults) for one in plays] == [(0, ())] * len(seeds)
         waits = [us for one in plays for us in one.in_us + one.out_us]
         return sum(waits) / len(waits)

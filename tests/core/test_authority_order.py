@@ -7,6 +7,7 @@ from onboard.contract.codes import Reason
 from onboard.contract.messages import SyncRequest, TokenRefusal
 from onboard.ways.mirror import way_mirror
 from tests.core.walkers import Alley
+from tests.thinned import is_long
 
 LEFT, RIGHT = 11, 12
 
@@ -78,7 +79,7 @@ def test_differing_views_are_refused_and_mended_by_statements() -> None:
     alley.assert_in_order()
 
 
-@settings(max_examples=25)
+@settings(max_examples=25 if is_long() else 8)
 @given(
     st.integers(0, 2**32 - 1),
     st.lists(st.integers(2, 11), min_size=4, max_size=4),

@@ -25,11 +25,10 @@ from onboard.core.frame import Frame
 from onboard.io.endings import ExitStatus
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
-from tests.tools import require_tool, run_tool
+from tests.tools import DEADLINE_S, require_tool, run_tool
 
 ROOT = Path(__file__).parents[2]
 SITE = ROOT / "bus_sim" / "sites" / "small.toml"
-DEADLINE_S = 60
 
 
 @pytest.fixture(scope="module")

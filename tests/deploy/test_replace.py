@@ -17,7 +17,8 @@ from onboard.io.journal import FILE_NAME, FileJournal
 from onboard.io.open_bus import BusSettings, open_bus
 from tests.io.test_socketcand import free_port
 from tests.system.test_cli import Listener
-from tests.system.test_late_interface import DEADLINE_S, ended, machine_file, site, start
+from tests.system.test_late_interface import ended, machine_file, site, start
+from tests.tools import DEADLINE_S
 
 TAKING_PART = (MachineState.IDLE, MachineState.WORKING, MachineState.WAITING)
 

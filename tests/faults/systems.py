@@ -17,12 +17,14 @@ from onboard.trace.check.systems import rules_for
 PLANTS = Path(bus_sim.__file__).parent / "data" / "plants"
 
 
-def withstands(site: Site, seed: int, span_s: tuple[float, float], limit_s: float) -> TrialReport:
-    """Play the site's own orders under faults of the bus or crashes, turn and turn about, begun in a span of time.
+def withstands(
+    site: Site, seed: int, span_s: tuple[float, float], limit_s: float, profiles: tuple[str, ...] = ("bus", "crash")
+) -> TrialReport:
+    """Play the site's own orders under faults of the profiles, turn and turn about, begun in a span of time.
 
     Nothing unsafe happens, nobody halts, every order is carried out, and all mirrors are equal in the end.
     """
-    faults = draw_faults(("bus", "crash")[seed % 2], seed, site, span_s)
+    faults = draw_faults(profiles[seed % len(profiles)], seed, site, span_s)
     report = play(site, FaultScenario(site.name, seed, limit_s, faults=faults))
     assert report.verdict is RunVerdict.SERVED, (report.why(), [str(fault) for fault in faults])
     assert report.halted == ()

@@ -19,6 +19,7 @@ from bus_sim.faults.injection import Injection, parse_injection
 from bus_sim.faults.scenario import FaultScenario
 from bus_sim.sites import find_site
 from bus_sim.virtual_time import VirtualTimeLoop
+from tests.thinned import is_long
 
 SITE = "level1"
 pytestmark = pytest.mark.skipif(not shared.can_share(), reason="no process can be copied on this platform")
@@ -44,7 +45,7 @@ def rows(plan: CampaignSettings, results: Iterator[TrialResult]) -> tuple[list[s
 def test_both_ways_come_to_the_same_table_and_rows(single: Single, counts: SceneCounts) -> None:
     plan, chosen = (
         CampaignSettings(SITE, single, 3_600.0, usual_wait_s=counts.longest_wait_s),
-        spread(single, counts, 9),
+        spread(single, counts, 9 if is_long() else 3),
     )
     assert all(isinstance(one.fault, Injection) and is_shared(one.fault) for one in chosen)
     both = rows(plan, run_points(plan, chosen, 2))

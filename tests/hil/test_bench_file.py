@@ -13,6 +13,7 @@ from hil.play import missing
 from hil.scenarios.registry import SCENARIOS
 from onboard.config.problems import ConfigError
 from tests.hil.bench_files import BENCHES, write_bench
+from tests.tools import DEADLINE_S
 
 ROOT = Path(__file__).parents[2]
 
@@ -81,7 +82,7 @@ def run_bench(file: Path, *words: str) -> subprocess.CompletedProcess[str]:
         env={**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=DEADLINE_S,
         check=False,
     )
 

@@ -19,9 +19,9 @@ from hil.play import ScenarioOutcome, play
 from hil.scenarios.registry import SCENARIOS
 from onboard.ports.bus import BusHealth, ErrorState
 from tests.hil.bench_files import write_bench
+from tests.tools import DEADLINE_S
 
 ROOT = Path(__file__).parents[2]
-DEADLINE_S = 30
 LINK = {
     "ifname": "can0",
     "linkinfo": {

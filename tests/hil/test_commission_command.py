@@ -17,10 +17,10 @@ from hil.cli import main
 from hil.play import stop_fleet
 from onboard.config.site import parse_site
 from tests.hil.bench_files import BENCHES
+from tests.tools import DEADLINE_S
 
 Capture = pytest.CaptureFixture[str]
 ROOT = Path(__file__).parents[2]
-DEADLINE_S = 120
 #: Name, termination, the fleet is on, drive and shuttle tell the truth, three times somebody in the way, controller on.
 ANSWERS = "A. Person\n60,1\ny\ny\ny\nn\nn\nn\n\n"
 

@@ -6,9 +6,7 @@ from dataclasses import dataclass, field
 
 from onboard.core.frame import Frame
 from onboard.ports.bus import BusHealth, FrameHandler
-
-#: How long a test waits for something that will come, s.
-DEADLINE_S = 20.0
+from tests.tools import DEADLINE_S
 
 
 @dataclass

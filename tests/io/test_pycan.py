@@ -18,7 +18,8 @@ from onboard.io import transmit
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, cast, open_bus
 from onboard.io.pycan import PythonCanBus
 from onboard.ports.bus import ErrorState
-from tests.io.hub import DEADLINE_S, Ears, until
+from tests.io.hub import Ears, until
+from tests.tools import DEADLINE_S
 
 FRAMES = [Frame(0x18FF0200 + number, bytes([number] * (number % 9))) for number in range(50)]
 _numbers = itertools.count()

@@ -20,7 +20,8 @@ from onboard.io import socketcand
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, open_bus
 from onboard.ports.bus import ErrorState
 from onboard.trace.candump_reader import CandumpReader
-from tests.io.hub import DEADLINE_S, Ears, Hub, until
+from tests.io.hub import Ears, Hub, until
+from tests.tools import DEADLINE_S
 from tests.tools import DEADLINE_S as TOOL_DEADLINE_S
 
 #: What the server adds to the bus's time: 2026-11-21 00:00 UTC, us.

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from onboard.io.watchdog import SystemdWatchdog
+from tests.tools import DEADLINE_S
 
 
 @pytest.mark.parametrize("abstract", [False, True])
@@ -14,7 +15,7 @@ def test_the_manager_hears_each_state(tmp_path: Path, abstract: bool) -> None:
     name = f"@onboard-{os.getpid()}" if abstract else str(tmp_path / "notify")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind("\0" + name[1:] if abstract else name)
-        manager.settimeout(10)
+        manager.settimeout(DEADLINE_S)
         watchdog = SystemdWatchdog({"NOTIFY_SOCKET": name})
         watchdog.ready()
         watchdog.alive()

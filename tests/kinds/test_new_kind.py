@@ -31,7 +31,7 @@ DESK, OLD, NEW = 1, 21, 22
 
 @dataclass(frozen=True, kw_only=True)
 class Shop(Site):
-    system: ClassVar[str] = "polishing"
+    system: ClassVar[str] = "workshop"
 
 
 @dataclass
@@ -82,7 +82,7 @@ def written() -> dict[str, Any]:
 @pytest.fixture
 def shop() -> Iterator[Shop]:
     factory = written()["PolisherFactory"]()
-    add_system(System("polishing", {KindCode.LATHE: factory, KindCode.DESK: DeskFactory()}))
+    add_system(System("workshop", {KindCode.LATHE: factory, KindCode.DESK: DeskFactory()}))
     machines = {
         DESK: Machine(DESK, "Desk", KindCode.DESK, Segment(0, 0)),
         OLD: Machine(OLD, "Old", KindCode.LATHE, Segment(0, 0)),
@@ -90,7 +90,7 @@ def shop() -> Iterator[Shop]:
     }
     timing = find_site("level1").timing
     yield Shop(name="shop", digest=1, bitrate=500_000, machines=machines, timing=timing)
-    remove_system("polishing")
+    remove_system("workshop")
 
 
 def test_p22_the_machine_of_the_tutorial_works_as_it_is_written(shop: Shop) -> None:

@@ -11,12 +11,10 @@ from pathlib import Path
 
 from onboard.io.broker_address import BrokerAddress
 from onboard.io.mqtt import MqttBroker
-from tests.tools import require_tool, run_tool
+from tests.tools import DEADLINE_S, require_tool, run_tool
 
 DEPLOY = Path(__file__).parents[2] / "deploy" / "mqtt"
 ROLES = ("gateway", "dispatcher", "viewer")
-#: What a foreign process may take to do as it is told, s.
-DEADLINE_S = 20.0
 
 
 def free_port() -> int:

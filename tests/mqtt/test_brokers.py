@@ -12,6 +12,7 @@ from onboard.io.mqtt import MqttBroker, MqttSession
 from onboard.ports.broker import Broker, BrokerError, BrokerSession, Publication
 from tests.mqtt.double import DoubleBroker, DoubleSession, fits
 from tests.mqtt.mosquitto import Mosquitto
+from tests.tools import DEADLINE_S
 
 
 class Case(Protocol):
@@ -89,7 +90,7 @@ def said(text: str, topic: str = "a/b", **options: Any) -> Publication:
 
 async def arrives(session: BrokerSession, count: int) -> list[Publication]:
     found: list[Publication] = []
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(DEADLINE_S):
         async for one in session.incoming():
             session.taken(one)
             found.append(one)
@@ -99,7 +100,7 @@ async def arrives(session: BrokerSession, count: int) -> list[Publication]:
 
 
 async def open_and_close(case: Case, name: str) -> None:
-    async with asyncio.timeout(15), case.broker.session(name, None, ()):
+    async with asyncio.timeout(DEADLINE_S), case.broker.session(name, None, ()):
         pass
 
 
@@ -171,7 +172,7 @@ async def test_a_broker_that_is_frozen_is_noticed_and_takes_up_again(case: Case)
     async def goes_on() -> None:
         async with case.broker.session("writer", None, ()) as writer:
             await case.freeze()
-            async with asyncio.timeout(15):
+            async with asyncio.timeout(DEADLINE_S):
                 await writer.publish(said("unheard", qos=1))
 
     with pytest.raises(BrokerError):

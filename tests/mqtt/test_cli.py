@@ -17,8 +17,8 @@ import pytest
 from bus_sim.cli import main as bus_sim
 from bus_sim.sites import site_text
 from onboard.cli import main as onboard
-from tests.mqtt.mosquitto import DEADLINE_S, Mosquitto
-from tests.tools import require_tool, run_tool
+from tests.mqtt.mosquitto import Mosquitto
+from tests.tools import DEADLINE_S, require_tool, run_tool
 
 ROOT = Path(__file__).parents[2]
 

@@ -11,6 +11,7 @@ from onboard.io.broker_address import BrokerAddress
 from onboard.io.mqtt import MqttBroker
 from onboard.ports.broker import BrokerError, Publication
 from tests.mqtt.mosquitto import ROLES, Mosquitto, certificates
+from tests.tools import DEADLINE_S
 
 TOLD = ("status", "task", "report", "call", "event", "indicators", "machine/ER1", "log/MR1")
 MACHINE = ("connection", "state", "visualization", "factsheet")
@@ -54,7 +55,7 @@ async def mosquitto(tmp_path: Path, keys: Path) -> AsyncIterator[Mosquitto]:
 async def heard_until(broker: MqttBroker, patterns: tuple[str, ...], last: bytes, ready: asyncio.Event) -> set[str]:
     """Topics heard by one that subscribes, up to a payload that ends it."""
     found: set[str] = set()
-    async with asyncio.timeout(20), broker.session("listener", None, patterns) as session:
+    async with asyncio.timeout(DEADLINE_S), broker.session("listener", None, patterns) as session:
         ready.set()
         async for one in session.incoming():
             session.taken(one)
@@ -86,7 +87,7 @@ async def test_each_role_reads_what_it_may_and_nothing_else(mosquitto: Mosquitto
                 for topic in sorted(topics):
                     await session.publish(Publication(topic, b"x", 1))
         found: set[str] = set()
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(DEADLINE_S):
             while len(found) < len(MAY_READ[role]):
                 one = await anext(reader.incoming())
                 # More than 20 that are not taken, and the broker brings no more.

@@ -18,8 +18,9 @@ from onboard.io.journal import FileJournal
 from onboard.io.mqtt import MqttBroker
 from onboard.wire.codec import fleet_codec
 from tests.mqtt.logs import EPOCH_US
-from tests.mqtt.mosquitto import DEADLINE_S, Mosquitto
+from tests.mqtt.mosquitto import Mosquitto
 from tests.mqtt.played import frames
+from tests.tools import DEADLINE_S
 
 REPORT = "onboard/small/report"
 

@@ -20,11 +20,12 @@ from onboard.contract.messages import Heartbeat, ManualOrder, ManualState
 from onboard.core.site import Site
 from onboard.gateway.machines import Machines
 from onboard.gateway.pauses import Pauses
+from onboard.history.history import History
 from tests.graph.sites import hall, made
+from tests.graph.test_named_orders import header, order, topic
 from tests.mapd.sites import made as made_floor
 from tests.mqtt.logs import VERSIONS, validator
 from tests.mqtt.ordered import NODE, Ordered, park_and_order, said
-from tests.mqtt.test_named_orders import header, order, topic
 from tests.sites import one_floor
 from tests.system.scene import play as play_park
 from tests.system.scene import stays
@@ -174,11 +175,12 @@ def test_a_machine_whose_word_was_lost_is_asked_again_whether_it_has_come_to_res
 @pytest.mark.parametrize("state", [MachineState.IDLE, MachineState.WORKING])
 def test_a_machine_that_works_is_not_told_as_paused_though_its_word_was_lost(state: MachineState) -> None:
     site = one_floor()
-    machines = Machines(site)
+    history = History(site)
+    machines = Machines(site, history)
     node = site.machine("MR1").node_id
-    machines.feed(ManualState(node, 1, ManualMode.HELD, True), 0)
+    history.feed(ManualState(node, 1, ManualMode.HELD, True), 0)
     beat = Heartbeat(node, CONTRACT_VERSION, site.digest, 0, 1, KindCode.ROBOT, MachineState.OBSTACLE)
-    machines.feed(beat, 1)
+    history.feed(beat, 1)
     assert machines.bodies[node].is_paused
-    machines.feed(replace(beat, state=state), 2)
+    history.feed(replace(beat, state=state), 2)
     assert not machines.bodies[node].is_paused

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 from onboard.gateway.schema import Schema, schema
+from tests.graph.test_named_orders import action, order
 from tests.mqtt.logs import OWN
-from tests.mqtt.test_named_orders import action, order
 
 NAMES = ("transport", "2.1.0/order", "2.1.0/instantActions", "3.0.0/order", "3.0.0/instantActions")
 ODD = st.recursive(

@@ -20,19 +20,25 @@ MR1 = SITE.machine("MR1")
 STEWARD = SITE.stewards[1]
 
 
-def played(*orders: tuple[float, Maker], without: frozenset[str] = frozenset()) -> tuple[Scene, list[Played]]:
+def played(
+    *orders: tuple[float, Maker], without: frozenset[str] = frozenset(), limit_s: float = 200
+) -> tuple[Scene, list[Played]]:
+    """``limit_s``: short where a machine is off, as its devices say everything again and again to nobody."""
     told: list[Played] = []
 
     def before(simulation: Simulation) -> None:
         told.extend(operates(simulation, at_s, make) for at_s, make in orders)
 
     last_s = max(at_s for at_s, _ in orders) + 100
-    scene = play(SITE, stays((0, None)), before=before, limit_s=200, extra_s=last_s - 60, without=without)
+    extra_s = 5 if without else last_s - 60
+    scene = play(SITE, stays((0, None)), before=before, limit_s=limit_s, extra_s=extra_s, without=without)
     return scene, told
 
 
 def test_status_tells_who_lives_and_who_does_not_and_says_nothing() -> None:
-    scene, (told,) = played((30, lambda park, node: Status(park, node, 4_000_000)), without=frozenset({"MR2"}))
+    scene, (told,) = played(
+        (30, lambda park, node: Status(park, node, 4_000_000)), without=frozenset({"MR2"}), limit_s=40
+    )
     assert "MR1   works, at p(" in told.text or "MR1   is idle, at p(" in told.text
     assert "MR2   is not heard: off, or not on this bus" in told.text
     assert told.status == 1, "somebody is missing"
@@ -62,7 +68,9 @@ def test_a_machine_is_held_and_released_by_its_own_word() -> None:
 
 
 def test_a_machine_that_is_off_does_not_confirm_and_is_named() -> None:
-    scene, (told,) = played((21, partial(HoldCommand, machine=MR1, holds=True, seed=5)), without=frozenset({"MR1"}))
+    scene, (told,) = played(
+        (21, partial(HoldCommand, machine=MR1, holds=True, seed=5)), without=frozenset({"MR1"}), limit_s=40
+    )
     assert told.status == 1
     assert told.lines[-2][1] == "MR1 does not answer; it is not heard: off, or not on this bus"
     assert told.lines[-1][1] == "not confirmed by MR1"
@@ -105,5 +113,5 @@ def test_to_clear_what_was_never_blocked_is_confirmed_too() -> None:
 def test_a_block_that_its_steward_does_not_keep_is_told() -> None:
     keeper = SITE.machines[STEWARD].name
     block = partial(Mark, segment=Segment(1, 4), reason=Reason.OPERATOR, blocks=True)
-    _, (told,) = played((21, block), without=frozenset({keeper}))
+    _, (told,) = played((21, block), without=frozenset({keeper}), limit_s=40)
     assert told.status == 1 and told.lines[-1][1] == f"not confirmed by {keeper}"

@@ -9,6 +9,7 @@ from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import Reason, RegenerationPhase, TaskPhase
 from onboard.contract.messages import Halted, Heartbeat, Regeneration, TaskReport
 from tests.system.scene import Scene, play, stays
+from tests.thinned import some
 
 SITE = find_site("small")
 CARS = stays((0, 400), (60, 500), (120, 600), (300, None))
@@ -23,7 +24,7 @@ def played(*faults: str) -> Scene:
     return play(SITE, CARS, plant=plant, limit_s=1_500)
 
 
-@pytest.mark.parametrize(("name", "at_s", "body"), LOSSES)
+@pytest.mark.parametrize(("name", "at_s", "body"), some(LOSSES, 3))
 def test_a_lost_journal_is_a_matter_of_minutes(name: str, at_s: int, body: str) -> None:
     came_s = at_s + 20
     crash = f"crash:target={name},at_s={at_s},restart_s=5,journal=lost"

@@ -23,13 +23,14 @@ from onboard.contract.messages import (
 )
 from onboard.core.journal_state import JournalState
 from tests.system.scene import Scene, play, stays
+from tests.thinned import some
 
 SITE = find_site("small")
 CARS = stays((0, 400), (60, 500), (120, 600), (300, None))
 MR2 = SITE.machine("MR2").node_id
 
 
-def played(*faults: str, tool: bool = False) -> Scene:
+def played(*faults: str, tool: bool = False, limit_s: float = 1_500) -> Scene:
     """``tool``: some tool says FREEZE at 90 s, whatever is so."""
 
     def plant(simulation: Simulation) -> None:
@@ -40,7 +41,7 @@ def played(*faults: str, tool: bool = False) -> Scene:
         for frame in simulation.codecs.fleet.encode(Regeneration(251, RegenerationPhase.FREEZE, 1, MR2, 0, 0, 0)):
             simulation.loop.call_at(90.0, bus.send, frame)
 
-    return play(SITE, CARS, plant=plant, before=before if tool else None, limit_s=1_500)
+    return play(SITE, CARS, plant=plant, before=before if tool else None, limit_s=limit_s)
 
 
 def said_by(scene: Scene, node: int, from_s: float, bus: str = "fleet") -> list[Message]:
@@ -66,11 +67,13 @@ def told(scene: Scene) -> list[str]:
     return [line for _, who, line in scene.simulation.log.lines if who == "operator"]
 
 
+#: A machine whose journal gets short, when, and where it stands then.
+SHORT = (("MR1", 50, ",body=p(1;5)"), ("MR2", 20, ",body=p(3;8)"), ("IOC1", 190, ""), ("ER1", 50, ""))
+
+
 @pytest.mark.parametrize(
-    ("name", "at_s", "body"),
-    [("MR1", 50, ",body=p(1;5)"), ("MR2", 20, ",body=p(3;8)"), ("IOC1", 190, ""), ("ER1", 50, "")],
+    ("name", "at_s", "body", "again"), some([(*one, again) for one in SHORT for again in (False, True)], 5)
 )
-@pytest.mark.parametrize("again", [False, True], ids=["once", "and started again while it holds"])
 def test_a_short_journal_is_brought_back_by_the_operator(name: str, at_s: int, body: str, again: bool) -> None:
     came_s, node = at_s + 30, SITE.machine(name).node_id
     faults = [f"crash:target={name},at_s={at_s},restart_s=5,journal=unsealed"]
@@ -132,7 +135,7 @@ def test_a_foreign_journal_that_is_taken_out_is_a_lost_one() -> None:
 
 def test_who_was_told_that_its_journal_is_old_vouches_for_nothing_any_more() -> None:
     """Point 9,159 of `small --exhaustive journal --scene overlap`: it put a car back into its bay that had left."""
-    scene = played("crash:target=IOC1,at_s=190,restart_s=5,journal=rolled_back,entries=10")
+    scene = played("crash:target=IOC1,at_s=190,restart_s=5,journal=rolled_back,entries=10", limit_s=300)
     assert_safe(scene)
     node = SITE.machine("IOC1").node_id
     at_us, word = scene.first(Halted, lambda one: one.sender == node)

@@ -93,13 +93,15 @@ def _parts_of(system: str) -> Iterator[tuple[str, Layer]]:
         (*CORE_TYPES, own, "onboard.history", "onboard.trace", "onboard.ways", "onboard.wire"),
         not_stdlib=frozenset({"asyncio", "random", "threading"}),
     )
+    fold = Layer((*CORE_TYPES, own, "onboard.history"), only_stdlib=PURE_STDLIB, pure=True)
     words = Layer((*CORE_TYPES, own, "onboard.systems.words"), only_stdlib=PURE_STDLIB, pure=True)
     edge = Layer(
-        (*CORE_TYPES, own, "onboard.gateway", "onboard.trace.view"),
+        (*CORE_TYPES, own, "onboard.gateway", "onboard.history", "onboard.trace.view"),
         not_stdlib=frozenset({"random", "socket", "threading", "time"}),
     )
     parts = {
         "gateway": edge,
+        "history": fold,
         "words": words,
         **dict.fromkeys(("constants", "layout", "machines", "missions_reader", "reader", "report", "room"), config),
         **dict.fromkeys(("building", "chart", "checks", "diagram", "scene", "traffic"), history),
@@ -130,7 +132,7 @@ LAYERS: dict[str, Layer] = {
     "onboard.systems.contract": Layer(("onboard.core.site", "onboard.systems.registry", "onboard.wire")),
     **{layer: rule for system in SYSTEMS for layer, rule in _parts_of(system)},
     # The one fold of the bus: whoever shows, counts or publishes it is a view of this.
-    "onboard.history": Layer(CORE_TYPES, only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.history": Layer((*CORE_TYPES, *REGISTRY), only_stdlib=PURE_STDLIB, pure=True),
     "onboard.wire": Layer((*CORE_TYPES, "dbc"), ("cantools",), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.ports": Layer(CORE_TYPES, not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.config": Layer(
@@ -182,7 +184,8 @@ LAYERS: dict[str, Layer] = {
             "onboard.wire",
         )
     ),
-    # What a person says is decided from the decoded bus alone; the gateway's words for a held machine are its words.
+    # What a person says is decided from the history of the bus alone; the gateway's words for a held machine are its
+    # own.
     "onboard.operate": Layer(
         (
             *CORE_TYPES,
@@ -194,6 +197,7 @@ LAYERS: dict[str, Layer] = {
             "onboard.ways.tokens",
             "onboard.gateway.pauses",
             "onboard.gateway.positions",
+            "onboard.history",
             "onboard.ports",
             "onboard.wire",
         ),

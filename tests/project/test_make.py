@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.tools import DEADLINE_S
+
 ROOT = Path(__file__).parents[2]
 #: A Python that makes environments, and whose pip reaches nobody.
 OFFLINE = """\
@@ -33,7 +35,7 @@ def make(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
         env=environment,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=DEADLINE_S,
         check=False,
     )
 

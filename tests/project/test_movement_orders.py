@@ -6,7 +6,7 @@ import re
 import pytest
 
 from onboard.core.site import Site
-from onboard.systems.registry import part, system_names
+from onboard.systems.registry import own_names, part
 from tests.project.rows import ROOT
 
 #: Where each of these is made, and nowhere else in the product: an order, what permits it, and what that looks at.
@@ -44,10 +44,10 @@ def test_what_a_controller_says_to_its_devices_moves_something_or_is_known_not_t
         for path in sorted((ROOT / "dbc").glob("*.dbc"))
         for name in re.findall(r"^BO_ \d+ (\w+): \d Controller$", path.read_text(encoding="utf-8"), re.MULTILINE)
     }
-    modules = {module.__name__ for name in system_names() if (module := part(name, "site")) is not None}
+    modules = {module.__name__ for name in own_names() if (module := part(name, "site")) is not None}
     sites = [one for one in _kinds_of(Site) if one.__module__ in modules]
     moving = {name for site in sites for name in site.moved_by}
-    assert len(sites) == len(system_names()) and all(site.moved_by for site in sites)
+    assert len(sites) == len(own_names()) and all(site.moved_by for site in sites)
     assert said == moving | STILL and not moving & STILL
 
 

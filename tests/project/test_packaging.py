@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import onboard
+from tests.tools import DEADLINE_S
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("bus_sim", "dbc", "hil", "onboard")
@@ -26,7 +27,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
         cwd=ROOT,
         check=True,
         capture_output=True,
-        timeout=120,
+        timeout=DEADLINE_S,
     )
     return next(folder.glob("*.whl"))
 
@@ -55,7 +56,12 @@ def test_the_wheel_holds_every_source_and_data_file_and_nothing_else(wheel: Path
 def test_the_wire_contract_is_found_inside_the_wheel(wheel: Path) -> None:
     code = f"import sys; sys.path.insert(0, {str(wheel)!r}); import dbc; print(dbc.__file__, dbc.fleet_dbc_text()[:7])"
     run = subprocess.run(
-        [sys.executable, "-I", "-c", code], cwd=wheel.parent, check=True, capture_output=True, text=True, timeout=60
+        [sys.executable, "-I", "-c", code],
+        cwd=wheel.parent,
+        check=True,
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
     )
     assert ".whl" in run.stdout
     assert "VERSION" in run.stdout
@@ -96,7 +102,7 @@ def make(*arguments: str) -> subprocess.CompletedProcess[str]:
         pytest.skip("make is not installed")
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))}
     return subprocess.run(
-        ["make", *arguments], cwd=ROOT, env=environment, check=False, capture_output=True, text=True, timeout=60
+        ["make", *arguments], cwd=ROOT, env=environment, check=False, capture_output=True, text=True, timeout=DEADLINE_S
     )
 
 
@@ -111,6 +117,20 @@ def test_make_without_a_usable_python_says_what_to_do(tmp_path: Path) -> None:
 def test_make_help_lists_every_target() -> None:
     run = make("help")
     assert run.returncode == 0
-    assert [line.split()[1] for line in run.stdout.splitlines()[:12]] == [
-        *("help", "run", "check", "test", "coverage", "lint", "format", "models", "mutants", "bench", "docs", "clean"),
+    assert [line.split()[1] for line in run.stdout.splitlines()[:13]] == [
+        *(
+            "help",
+            "run",
+            "check",
+            "test",
+            "test-long",
+            "coverage",
+            "lint",
+            "format",
+            "models",
+            "mutants",
+            "bench",
+            "docs",
+        ),
+        "clean",
     ]

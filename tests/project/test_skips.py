@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.tools import DEADLINE_S
+
 ROOT = Path(__file__).parents[2]
 
 SUITE = {
@@ -29,7 +31,7 @@ def run_pytest(folder: Path, source: str, require: str) -> subprocess.CompletedP
         env=environment | {"REQUIRE": require},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=DEADLINE_S,
         check=False,
     )
 

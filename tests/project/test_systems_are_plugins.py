@@ -10,11 +10,10 @@ import pytest
 
 from tests.project import plugins
 from tests.project.plugins import ROOT, SYSTEMS
+from tests.tools import DEADLINE_S
 
 PLUGIN = ROOT / "tests" / "plugin"
 PAGE = ROOT / "docs" / "new-system.md"
-#: A command that has not ended until then hangs, s.
-DEADLINE_S = 120
 #: A site file of version 0.1 does not say what it is: the one place outside that may name a system.
 ONE = "onboard/systems/registry.py"
 
@@ -55,7 +54,7 @@ def ordinary(program: str, *words: str, folder: Path) -> subprocess.CompletedPro
     command = [sys.executable, "-m", program, *words]
     environment = {**os.environ, "PYTHONPATH": paths}
     return subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=DEADLINE_S, check=False
     )
 
 

@@ -20,8 +20,7 @@ from onboard.core.frame import Frame
 from onboard.io.open_bus import BusSettings, open_bus
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
-
-DEADLINE_S = 150
+from tests.tools import DEADLINE_S
 
 
 def run_program(*words: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:

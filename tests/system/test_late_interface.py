@@ -14,10 +14,10 @@ from onboard.contract.messages import Heartbeat
 from onboard.io.open_bus import BusSettings, open_bus
 from tests.io.test_socketcand import free_port
 from tests.system.test_cli import Listener
+from tests.tools import DEADLINE_S
 
 ROOT = Path(__file__).parents[2]
 #: Only where something hangs.
-DEADLINE_S = 120.0
 
 
 async def start(folder: Path, *words: str) -> Process:

@@ -88,19 +88,19 @@ def test_p54_the_picture_shows_the_plant_as_it_is(run: tuple[Simulation, list[st
     simulation, pictures, _ = run
     world, view = simulation.plant.world, simulation.view
     standing = {where.number for where in world.where.values() if isinstance(where, Station)}
-    assert set(view.places_taken()) == standing and len(standing) == 2
+    assert set(view.history.loads.standing()) == standing and len(standing) == 2
     assert not any(isinstance(where, Aboard) for where in world.where.values())
     for node, machine in SITE.machines.items():
         if machine.kind is KindCode.ROBOT:
-            segment, offset_mm = view.positions[node]
+            place = view.history.places.by_node[node]
             body = world.robots[node]
-            assert segment == world.standing_position(node)
-            assert offset_mm == 0 and body.track == segment.track
+            assert place.segment == world.standing_position(node)
+            assert place.offset_mm == 0 and body.track == place.segment.track
         if machine.kind is KindCode.LIFT:
-            index = view.positions[node][0].index
+            index = view.history.places.by_node[node].segment.index
             assert SITE.tracks[machine.home.track].joins[index - 1].track == world.platform_floor(node)
     last = pictures[-1]
-    for car in view.cars:
+    for car in view.history.loads.stations:
         assert f"|{car.number:^3}|" in last
     assert last.count("MR1") >= 2 and "idle" in last
 

@@ -22,10 +22,10 @@ from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.check.checks import Checks, check_records
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
+from tests.tools import DEADLINE_S
 
 Capture = pytest.CaptureFixture[str]
 
-DEADLINE_S = 300
 #: Machines so fast that a car is parked in less than a minute.
 SITE = """
 [site]

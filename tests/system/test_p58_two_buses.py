@@ -40,6 +40,7 @@ from onboard.systems.registry import factory_for
 from onboard.wire.codec import Codec, device_codec, fleet_codec
 from onboard.wire.decoder import Decoder
 from tests.sites import one_floor
+from tests.tools import DEADLINE_S
 
 M = TypeVar("M", bound=Message)
 
@@ -48,7 +49,6 @@ Join = Callable[[str], Awaitable[Bus]]
 #: What was said on the fleet bus and on the device bus.
 Stories = tuple[list[str], list[str]]
 BAY, ROBOT = 1, 11
-DEADLINE_S = 20.0
 
 
 class Ears:

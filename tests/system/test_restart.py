@@ -9,6 +9,7 @@ from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import TaskPhase
 from onboard.contract.messages import TaskReport
 from tests.system.scene import Scene, play, stays
+from tests.thinned import some
 
 #: The robot that wins both tasks of the scene on the small site, and the lift that it rides.
 ROBOT, LIFT = "MR1", "ER1"
@@ -52,17 +53,17 @@ BAY_S = (12, 18, 24, 26, 27, 28, 30, 34, 38, 42, 46, 50, 54, 205, 209, 213, 221,
 RIDE_S = (27, 28, 30, 33, 36, 50, 54, 57, 214, 218, 222, 280)
 
 
-@pytest.mark.parametrize("at_s", BAY_S)
+@pytest.mark.parametrize("at_s", some(BAY_S, 8))
 def test_p50_a_compartment_killed_at_any_step_goes_on_with_its_customer(at_s: int) -> None:
     assert_served(killed("IOC1", at_s))
 
 
-@pytest.mark.parametrize("at_s", RIDE_S)
+@pytest.mark.parametrize("at_s", some(RIDE_S, 5))
 def test_p50_a_lift_killed_with_a_carrier_aboard_ends_its_ride(at_s: int) -> None:
     assert_served(killed(LIFT, at_s))
 
 
-@pytest.mark.parametrize("at_s", ENTRY_S + EXIT_S)
+@pytest.mark.parametrize("at_s", some(ENTRY_S + EXIT_S, 12))
 def test_p50_a_robot_killed_at_any_step_finds_its_place_and_the_car_arrives(at_s: int) -> None:
     scene = killed(ROBOT, at_s)
     assert_served(scene)

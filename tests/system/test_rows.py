@@ -203,7 +203,7 @@ def test_p52_an_operators_order_takes_the_same_path_as_a_customers_press() -> No
         simulation.loop.call_at(200.0, send, bus, simulation)
 
     def send(bus: object, simulation: Simulation) -> None:
-        (parked,) = simulation.view.cars
+        (parked,) = simulation.view.history.loads.stations
         order = OperatorOrder(251, 1, OperatorAction.INSERT_TICKET, parked)
         for frame in fleet_codec().encode(order):
             bus.send(frame)  # type: ignore[attr-defined]  # a SimulatedBus
@@ -238,7 +238,7 @@ def test_p20_p49_a_compartment_is_a_participant_too_asked_twice() -> None:
                 bus.send(frame)
 
         def call() -> None:
-            (parked,) = simulation.view.cars
+            (parked,) = simulation.view.history.loads.stations
             deadline_ms = simulation.loop.now_us() // 1000 + 1_000
             task = Reference(251, 1)
             say(
@@ -266,7 +266,7 @@ def test_p20_p49_a_compartment_is_a_participant_too_asked_twice() -> None:
 def test_a_drive_without_fresh_orders_stops_inside_its_machines_authority(under_way_s: float) -> None:
     """The controller dies while the robot moves: the drive brakes by itself, on segments whose tokens it holds."""
     site = one_floor()
-    moving_us, _ = play(site, stays((0, None))).first(DriveState, lambda m: m.mode is DriveMode.MOVING)
+    moving_us, _ = play(site, stays((0, None)), limit_s=60).first(DriveState, lambda m: m.mode is DriveMode.MOVING)
     killed_s = moving_us / 1e6 + under_way_s
 
     def kill(simulation: Simulation) -> None:
@@ -276,7 +276,8 @@ def test_a_drive_without_fresh_orders_stops_inside_its_machines_authority(under_
 
         simulation.loop.call_at(killed_s, pull_the_plug)
 
-    scene = play(site, stays((0, None)), before=kill, limit_s=60)
+    # Soon after it stands: a drive that hears nobody says everything again and again.
+    scene = play(site, stays((0, None)), before=kill, extra_s=15)
     body = scene.simulation.plant.world.robots[11]
     position_mm, speed_mm_s = body.motion.at(scene.simulation.loop.now_us())
     assert speed_mm_s == 0

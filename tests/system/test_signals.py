@@ -19,11 +19,9 @@ from onboard.cli import main as onboard
 from onboard.trace import cli as trace
 from onboard.trace.candump_reader import CandumpReader
 from tests.dispositions import SENT
-from tests.tools import require_tool, run_tool
+from tests.tools import DEADLINE_S, require_tool, run_tool
 
 ROOT = Path(__file__).parents[2]
-#: Only where something hangs.
-DEADLINE_S = 240.0
 
 
 @contextmanager

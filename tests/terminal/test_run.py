@@ -31,7 +31,6 @@ from onboard.systems.terminal.vehicle import Vehicle, terminal
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.check.checks import Checks, check_records
 from onboard.trace.check.holds import LetGoAgain
-from tests.faults.systems import withstands
 from tests.terminal.seeds import short
 
 M = TypeVar("M", bound=Message)
@@ -225,8 +224,3 @@ def test_the_command_runs_the_terminal_and_says_how_it_went(
     assert all(line in shown for line in summary_lines(SITE, seen.outcome))
     assert trace.read_bytes() == seen.trace.read_bytes(), "the same seed, the same log"
     assert '"good": true' in told.read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("seed", range(16))
-def test_under_faults_all_is_delivered_and_nothing_breaks(seed: int) -> None:
-    withstands(short(), seed, (16.0, 80.0), 900)

@@ -12,7 +12,7 @@ from onboard.trace.dump.formats import log_line
 from onboard.trace.raw import RawFrame
 from onboard.trace.readers.open_log import Log
 from onboard.trace.readers.pcapng_writer import PcapngWriter
-from tests.tools import require_tool, run_tool
+from tests.tools import DEADLINE_S, require_tool, run_tool
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 
@@ -189,7 +189,7 @@ def test_a_closed_pipe_ends_the_dump_quietly(tmp_path: Path) -> None:
         process.stdout.readline()
         process.stdout.close()
         assert process.stderr.read() == b""
-        assert process.wait(timeout=30) == 1
+        assert process.wait(timeout=DEADLINE_S) == 1
 
 
 class _Terminal(io.StringIO):

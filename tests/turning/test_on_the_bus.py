@@ -15,8 +15,8 @@ from bus_sim.systems.turning.nc import ProgramError, run_program
 from bus_sim.systems.turning.plant import TurningPlant
 from bus_sim.systems.turning.show import board
 from onboard.contract.codes import Criterion, KindCode, Operation, OrderResult
-from onboard.contract.messages import Bid, CallForProposals, Message, Reference, TaskReport
-from onboard.contract.turning import BillBar, BillCutting, LathePhase, LatheProgress, TurningOrder
+from onboard.contract.messages import Bid, CallForProposals
+from onboard.contract.turning import BillBar, LathePhase, LatheProgress, TurningOrder
 from onboard.holon.holon import Holon
 from onboard.systems.turning.checks import RULES
 from onboard.systems.turning.generation import LatheGeneration
@@ -24,7 +24,7 @@ from onboard.systems.turning.lathe import LatheState, TurningJob
 from onboard.systems.turning.machine import LatheMachine
 from onboard.systems.turning.process import generate
 from onboard.systems.turning.site import BatchDemand, Turning
-from tests.faults.systems import judged, withstands
+from tests.faults.systems import judged
 
 
 def _site(*orders: BatchDemand) -> Turning:
@@ -144,28 +144,3 @@ def test_what_no_lathe_can_make_is_refused() -> None:
     _sound(played)
     assert [one.result for one in _plant(played).entries] == [OrderResult.REFUSED]
     assert not any(isinstance(one, Bid) for _, one in played.messages)
-
-
-def test_each_checker_finds_what_it_is_for() -> None:
-    site, task = _site(), Reference(9, 1)
-    broken: dict[str, list[Message]] = {
-        "bills-add-up": [BillCutting(1, 9, 1, 100, 0), BillBar(1, 9, 1, 50, 900)],
-        "one-lathe": [TaskReport(1, task, 1, 0, 0), TaskReport(2, task, 1, 0, 0)],  # type: ignore[arg-type]  # as numbers
-    }
-    from onboard.contract.turning import BillWaiting
-
-    broken["bills-add-up"].insert(1, BillWaiting(1, 9, 1, 10, 10))
-    for name, messages in broken.items():
-        verdict = judged(site, [(1_000_000 * number, one) for number, one in enumerate(messages, 1)])
-        assert verdict.counts[name] == 1, name
-
-
-@pytest.mark.parametrize("seed", range(16))
-def test_the_turning_cell_under_faults(seed: int) -> None:
-    site = _site(
-        BatchDemand(0, TurningJob(1, 2, 14, 2)),
-        BatchDemand(5_000, TurningJob(2, 1, 45, 1)),
-        BatchDemand(20_000, TurningJob(1, 1, 16, 2)),
-    )
-    # Half of them strike while calls are open, half over the whole of the work.
-    withstands(site, seed, (10.0, 36.4) if seed % 4 < 2 else (10.0, 714.0), 20_000)

@@ -11,9 +11,10 @@ from typing import Any
 
 from playwright.sync_api import Page
 
+from tests.tools import DEADLINE_S
 from tests.web.logs import environment
 
-DEADLINE_MS = 60_000
+DEADLINE_MS = 1_000 * DEADLINE_S
 
 
 def start(words: list[str], folder: Path) -> tuple[subprocess.Popen[str], str]:
@@ -37,7 +38,7 @@ def start(words: list[str], folder: Path) -> tuple[subprocess.Popen[str], str]:
 def end(process: subprocess.Popen[str], how: signal.Signals = signal.SIGINT) -> int:
     """End the program that serves; its exit status."""
     process.send_signal(how)
-    process.communicate(timeout=30)
+    process.communicate(timeout=DEADLINE_S)
     return process.returncode
 
 

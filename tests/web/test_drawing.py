@@ -7,11 +7,12 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.thinned import some
 from tests.web.browser import drawn, rows, served
 from tests.web.logs import log_of
 
-#: Twelve moments of a log, in the slider's thousandths.
-MOMENTS = range(80, 1000, 80)
+#: Moments of a log, in the slider's thousandths.
+MOMENTS = some(range(80, 1000, 80), 6)
 
 
 def at(page: Page, moment: int) -> None:

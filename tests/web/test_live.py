@@ -21,13 +21,14 @@ from onboard.trace.view import SiteView
 from onboard.web.app import CommandError
 from onboard.web.live import LiveSource
 from onboard.web.serve import WebServer
+from tests.tools import DEADLINE_S
 from tests.web.browser import end, served
 from tests.web.logs import SITE_FILES, contract, environment, frames_of
 
 
 def until(socket: ClientConnection, key: str) -> Any:
     """What comes next of one kind."""
-    while key not in (told := json.loads(socket.recv(timeout=30))):
+    while key not in (told := json.loads(socket.recv(timeout=DEADLINE_S))):
         pass
     return told
 

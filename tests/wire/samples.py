@@ -11,7 +11,7 @@ from cantools.database.can import Database
 
 from onboard.contract.base import FrameCode, Message, Reference, Stamp
 from onboard.contract.packing import calls, device, plans, presence, rights
-from onboard.systems.registry import part, system_names
+from onboard.systems.registry import own_names, part
 from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts
 
 #: Frames that every system has.
@@ -28,7 +28,7 @@ def frames_of(system: str) -> tuple[FrameCode, ...]:
 
 #: Every frame of the tree by name; no two files have one of the same name.
 CODES: dict[str, FrameCode] = {
-    code.name: code for code in (*SHARED, *(code for name in system_names() for code in frames_of(name)))
+    code.name: code for code in (*SHARED, *(code for name in own_names() for code in frames_of(name)))
 }
 
 

@@ -21,11 +21,10 @@ from onboard.core.frame import Frame
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.codec import fleet_codec
 from onboard.wire.site_dbc import site_dbc
-from tests.tools import require_tool, run_tool
+from tests.tools import DEADLINE_S, require_tool, run_tool
 from tests.wire.samples import signal_values
 
 ROOT = Path(__file__).parents[2]
-DEADLINE_S = 150
 
 
 @pytest.fixture(scope="module")

@@ -75,7 +75,7 @@ def draw_floor(site: WaySite, view: SiteView, track: int, cell: int = CELLS[0]) 
 
     A spur is drawn in round brackets beside its mouth, with whoever stands in it.
     """
-    taken = view.places_taken()
+    taken = view.history.loads.standing()
     compartments = set(site.compartments.values())
     places = set(site.places)
     rows = []
@@ -104,7 +104,7 @@ def _is_at_spur(station: Station, stations: set[Station]) -> bool:
 
 
 def _spur(view: SiteView, inside: Segment, cell: int) -> Text:
-    node = next((node for node, (segment, _) in view.positions.items() if segment == inside), None)
+    node = next((node for node, place in view.history.places.by_node.items() if place.segment == inside), None)
     if node is None:
         return Text(boxed("", "()", cell), style="dim")
     return Text(boxed(view.name(node)[-3:], "()", cell), style=style(view, [node]))
@@ -114,8 +114,8 @@ def _alley(site: WaySite, view: SiteView, track: int, cell: int) -> Text:
     row = Text(" " * _LABEL, no_wrap=True, overflow="crop")
     row.append_text(_shaft(site, view, track, 0, cell))
     here: dict[int, list[int]] = {}
-    for node, (segment, _) in view.positions.items():
-        machine = site.machines.get(node)
+    for node, place in view.history.places.by_node.items():
+        machine, segment = site.machines.get(node), place.segment
         if machine is None or machine.kind is KindCode.COMPARTMENT:
             continue
         # Index 0 of a spur is its mouth: whoever is there turns.
@@ -148,18 +148,18 @@ def _shaft(site: WaySite, view: SiteView, track: int, index: int, cell: int) -> 
     lift = lift_at(site, Segment(track, index))
     if lift is None:
         return Text(" " * width)
-    node = site.stewards[lift]
-    at = view.positions[node][0].index
+    node, places = site.stewards[lift], view.history.places.by_node
+    at = places[node].segment.index
     if sill(site, lift, at).track != track:
         return Text(f"{':':^{width}}", style="dim")
-    aboard = [view.name(n) for n, (segment, _) in view.positions.items() if segment == Segment(track, index)]
+    aboard = [view.name(n) for n, place in places.items() if place.segment == Segment(track, index)]
     return Text(f"[{aboard[0][-(width - 2) :] if aboard else '=':^{width - 2}}]", style="bold yellow")
 
 
 def _alley_line(site: WaySite, view: SiteView, track: int, cell: int) -> Text:
     """A floor in one line, where there is no room for three: where nobody is, its cars as marks above and below."""
     row = _alley(site, view, track, cell)
-    taken, desks = view.places_taken(), set(site.compartments.values())
+    taken, desks = view.history.loads.standing(), set(site.compartments.values())
     plain = list(row.plain)
     first = _LABEL + _shaft_width(site, cell)
     for index in range(1, site.tracks[track].length + 1):

@@ -77,7 +77,7 @@ class _FloorPicture:
 
     def _places(self, cell: int) -> dict[Spot, tuple[str, str]]:
         """Places and compartments, each in the spot next to its slot."""
-        taken = self.view.places_taken()
+        taken = self.view.history.loads.standing()
         found = {}
         bays = set(self.site.compartments.values())
         for station in (*self.site.places, *bays):
@@ -98,7 +98,7 @@ class _FloorPicture:
     def _platforms(self, cell: int) -> dict[Spot, tuple[str, str]]:
         found = {}
         for lift in self.outlines.lifts_on(self.level):
-            at = self.view.positions[self.site.stewards[lift]][0].index
+            at = self.view.history.places.by_node[self.site.stewards[lift]].segment.index
             is_here = self.site.level(sill(self.site, lift, at).track) == self.level
             box = self.outlines.platform(lift)
             spot = self._spot((box.left + box.right) / 2, (box.low + box.high) / 2)
@@ -107,10 +107,10 @@ class _FloorPicture:
 
     def _machines(self, cell: int) -> dict[Spot, tuple[str, str]]:
         found = {}
-        for node, (segment, _) in self.view.positions.items():
+        for node, place in self.view.history.places.by_node.items():
             machine = self.site.machines.get(node)
-            if machine is not None and machine.kind is KindCode.ROBOT and self._is_here(segment):
-                found[self._at(segment)] = named(self.view, node, cell), style(self.view, [node])
+            if machine is not None and machine.kind is KindCode.ROBOT and self._is_here(place.segment):
+                found[self._at(place.segment)] = named(self.view, node, cell), style(self.view, [node])
         return found
 
     def _is_here(self, segment: Segment) -> bool:
@@ -118,5 +118,5 @@ class _FloorPicture:
         lift = lift_at(self.site, segment)
         if lift is None:
             return self.site.level(segment.track) == self.level
-        at = self.view.positions[self.site.stewards[lift]][0].index
+        at = self.view.history.places.by_node[self.site.stewards[lift]].segment.index
         return self.site.level(sill(self.site, lift, at).track) == self.level

@@ -9,7 +9,7 @@ _WALLED = 5
 
 def style(view: SiteView, nodes: list[int]) -> str:
     """Of machines drawn in one place: whether any of them carries a car."""
-    return _LOADED if any(view.aboard.get(node) is not None for node in nodes) else "bold green"
+    return _LOADED if any(node in view.history.loads.aboard for node in nodes) else "bold green"
 
 
 def boxed(text: str, box: str, cell: int) -> str:

@@ -15,8 +15,10 @@ from onboard.contract.cell import (
     OfferLow,
 )
 from onboard.contract.codes import CallResult, TaskPhase
-from onboard.contract.messages import Message, Reference, TaskReport
-from onboard.history.calls import CallAnswered, CallOpened, Calls
+from onboard.contract.messages import Message, Reference
+from onboard.history.calls import CallAnswered, CallOpened
+from onboard.history.history import History
+from onboard.history.tasks import TaskTold
 from onboard.systems.cell.fields import from_halves
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.site import Cell
@@ -48,13 +50,16 @@ class CellView:
     positions: dict[int, ArmProgress] = field(default_factory=dict)
     goal_messages: int = 0
     deepest: int = 0
-    _calls: Calls = field(default_factory=Calls)
+    _history: History = field(init=False)
     _highs: dict[tuple[int, Reference], int] = field(default_factory=dict)
     _offers: dict[tuple[int, Reference], float] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        self._history = History(self.site, is_bounded=False)
+
     def feed(self, message: Message, time_us: int = 0) -> None:
         """Take up one message of the fleet bus."""
-        match self._calls.feed(message, time_us):
+        match self._history.feed(message, time_us):
             case CallOpened(call):
                 self.goal_messages += 1
                 self.deepest = max(self.deepest, call.terms.depth)
@@ -62,6 +67,8 @@ class CellView:
                 told = self.goals.setdefault(award.task, Told())
                 told.contractor = award.winner
                 told.cost = self._offers.get((award.winner, award.task), 0.0)
+            case TaskTold(report=report):
+                self.goals.setdefault(report.task, Told()).phase = report.phase
         match message:
             case GoalStart():
                 self._goal(message.sender, message.goal).start = Point(message.x_mm, message.y_mm)
@@ -72,8 +79,6 @@ class CellView:
             case OfferLow():
                 key = (message.sender, Reference(message.manager, message.goal))
                 self._offers[key] = from_halves(self._highs.get(key, 0), message.bits)
-            case TaskReport():
-                self.goals.setdefault(message.task, Told()).phase = message.phase
             case ArmProgress():
                 self.positions[message.sender] = message
             case MoveFrom() | MoveTo() | MoveCostHigh() | MoveCostLow():

@@ -10,14 +10,9 @@ from pathlib import Path
 
 from dbc import device_dbc_text, fleet_dbc_text, system_dbc_text, systems
 from onboard.contract.generate.classes import HEAD, enumerations, message_class, set_classes, uses, version
+from onboard.contract.generate.decoding import function_name, reader, table_name, unpack_function
+from onboard.contract.generate.encoding import pack_function, tools
 from onboard.contract.generate.model import TUPLES, ContractError, DbcFile, DbcMessage, FrameSet, read_contract
-from onboard.contract.generate.packing import (
-    function_name,
-    pack_function,
-    shapes,
-    table_name,
-    unpack_function,
-)
 
 PACKAGE = "onboard.contract"
 #: The module of the enumerations of the two contracts of all.
@@ -125,9 +120,11 @@ def _packing(
     tuples = used & set(TUPLES)
     enums = {name for name in used if name in where}
     first = {one.frames[0].layout.name: one.name for one in sets}
+    packs = [pack_function(frame) for frame in frames]
     lines = [HEAD.format(what=f"Bytes of the messages in ``{PACKAGE}.{module}``, and back.", file=contract.name)]
-    lines.append("from struct import Struct\n\n")
-    lines.append(_import("base", {"FrameCode", "OutOfRangeError", *tuples}))
+    lines.append("import struct\n\n")
+    helpers = {name for name in ("OutOfRangeError", "refusal") if any(name in text for text in packs)}
+    lines.append(_import("base", {"FrameCode", *helpers, *tuples}))
     for place in sorted({where[name] for name in enums}):
         names = {name for name in enums if where[name] == place}
         if place != module:
@@ -138,8 +135,9 @@ def _packing(
     if tuples:
         lines.append("_new = tuple.__new__\n")
     lines += [f"{table_name(name)} = tuple({name})\n" for name in sorted(enums)]
-    lines.append(shapes(frames))
-    blocks = [text for frame in frames for text in (pack_function(frame), unpack_function(frame))]
+    made = {one for frame in frames for one in (*tools(frame), reader(frame))}
+    lines += [f"{name} = {value}\n" for name, value in sorted(made)]
+    blocks = [text for pack, frame in zip(packs, frames, strict=True) for text in (pack, unpack_function(frame))]
     return "".join(lines) + "\n\n" + "\n\n".join([*blocks, _frames(frames, first)])
 
 

@@ -3,9 +3,9 @@
 Written by ``make docs`` from ``dbc/cell.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError, Reference
+from onboard.contract.base import FrameCode, OutOfRangeError, Reference, refusal
 from onboard.contract.cell import (
     ArmPhase,
     ArmProgress,
@@ -25,28 +25,37 @@ from onboard.contract.cell import (
 
 _new = tuple.__new__
 _ARM_PHASE = tuple(ArmPhase)
-_BHBBBBB = Struct("<BHBBBBB")
-_BHIX = Struct("<BHIx")
-_HBBBBBX = Struct("<HBBBBBx")
-_HIBX = Struct("<HIBx")
-_Q = Struct("<Q")
+_PACK_BHBBBBB = struct.Struct("<BHBBBBB").pack
+_PACK_BHBI = struct.Struct("<BHBI").pack
+_PACK_BHBSI = struct.Struct("<BHBi").pack
+_PACK_BHIX = struct.Struct("<BHIx").pack
+_PACK_BSIBH = struct.Struct("<BiBH").pack
+_PACK_HBBBBBX = struct.Struct("<HBBBBBx").pack
+_PACK_HBSHBSH = struct.Struct("<HBhBh").pack
+_PACK_HIH = struct.Struct("<HIH").pack
+_UNPACK_BHBBBBB = struct.Struct("<BHBBBBB").unpack_from
+_UNPACK_BHIX = struct.Struct("<BHIx").unpack_from
+_UNPACK_HBBBBBX = struct.Struct("<HBBBBBx").unpack_from
+_UNPACK_HIBX = struct.Struct("<HIBx").unpack_from
+_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_goal_start(message: GoalStart) -> bytes:
-    goal = message.goal
-    if not 0 <= goal <= 65535:
-        raise OutOfRangeError("GoalStart.goal", goal, 0, 65535)
     x_mm = message.x_mm
-    if not -8388608 <= x_mm <= 8388607:
-        raise OutOfRangeError("GoalStart.x_mm", x_mm, -8388608, 8388607)
     y_mm = message.y_mm
-    if not -8388608 <= y_mm <= 8388607:
-        raise OutOfRangeError("GoalStart.y_mm", y_mm, -8388608, 8388607)
-    return _Q.pack(goal + (x_mm & 0xFFFFFF) * 0x10000 + (y_mm & 0xFFFFFF) * 0x10000000000)
+    try:
+        return _PACK_HBSHBSH(message.goal, x_mm & 0xFF, x_mm >> 8, y_mm & 0xFF, y_mm >> 8)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("GoalStart.goal", 0, 65535),
+            ("GoalStart.x_mm", -8388608, 8388607),
+            ("GoalStart.y_mm", -8388608, 8388607),
+        ) from error
 
 
 def unpack_goal_start(sender: int, data: bytes) -> GoalStart | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     goal = word_0 & 0xFFFF
     x_mm = ((word_0 >> 16 & 0xFFFFFF) ^ 0x800000) - 0x800000
     y_mm = ((word_0 >> 40) ^ 0x800000) - 0x800000
@@ -54,20 +63,21 @@ def unpack_goal_start(sender: int, data: bytes) -> GoalStart | None:
 
 
 def pack_goal_end(message: GoalEnd) -> bytes:
-    goal = message.goal
-    if not 0 <= goal <= 65535:
-        raise OutOfRangeError("GoalEnd.goal", goal, 0, 65535)
     x_mm = message.x_mm
-    if not -8388608 <= x_mm <= 8388607:
-        raise OutOfRangeError("GoalEnd.x_mm", x_mm, -8388608, 8388607)
     y_mm = message.y_mm
-    if not -8388608 <= y_mm <= 8388607:
-        raise OutOfRangeError("GoalEnd.y_mm", y_mm, -8388608, 8388607)
-    return _Q.pack(goal + (x_mm & 0xFFFFFF) * 0x10000 + (y_mm & 0xFFFFFF) * 0x10000000000)
+    try:
+        return _PACK_HBSHBSH(message.goal, x_mm & 0xFF, x_mm >> 8, y_mm & 0xFF, y_mm >> 8)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("GoalEnd.goal", 0, 65535),
+            ("GoalEnd.x_mm", -8388608, 8388607),
+            ("GoalEnd.y_mm", -8388608, 8388607),
+        ) from error
 
 
 def unpack_goal_end(sender: int, data: bytes) -> GoalEnd | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     goal = word_0 & 0xFFFF
     x_mm = ((word_0 >> 16 & 0xFFFFFF) ^ 0x800000) - 0x800000
     y_mm = ((word_0 >> 40) ^ 0x800000) - 0x800000
@@ -75,20 +85,17 @@ def unpack_goal_end(sender: int, data: bytes) -> GoalEnd | None:
 
 
 def pack_goal_terms(message: GoalTerms) -> bytes:
-    goal = message.goal
-    if not 0 <= goal <= 65535:
-        raise OutOfRangeError("GoalTerms.goal", goal, 0, 65535)
-    time_limit_ms = message.time_limit_ms
-    if not 0 <= time_limit_ms <= 4294967295:
-        raise OutOfRangeError("GoalTerms.time_limit_ms", time_limit_ms, 0, 4294967295)
     level = message.level
     if not 0 <= level <= 5:
         raise OutOfRangeError("GoalTerms.level", level, 0, 5)
-    return _HIBX.pack(goal, time_limit_ms, level)
+    try:
+        return _PACK_HIH(message.goal, message.time_limit_ms, level)
+    except struct.error as error:
+        raise refusal(message, ("GoalTerms.goal", 0, 65535), ("GoalTerms.time_limit_ms", 0, 4294967295)) from error
 
 
 def unpack_goal_terms(sender: int, data: bytes) -> GoalTerms | None:
-    goal, time_limit_ms, level = _HIBX.unpack_from(data)
+    goal, time_limit_ms, level = _UNPACK_HIBX(data)
     level = level & 0xF
     if level > 5:
         return None
@@ -96,47 +103,39 @@ def unpack_goal_terms(sender: int, data: bytes) -> GoalTerms | None:
 
 
 def pack_goal_path(message: GoalPath) -> bytes:
-    goal = message.goal
-    if not 0 <= goal <= 65535:
-        raise OutOfRangeError("GoalPath.goal", goal, 0, 65535)
-    node1 = message.node1
-    if not 0 <= node1 <= 255:
-        raise OutOfRangeError("GoalPath.node1", node1, 0, 255)
-    node2 = message.node2
-    if not 0 <= node2 <= 255:
-        raise OutOfRangeError("GoalPath.node2", node2, 0, 255)
-    node3 = message.node3
-    if not 0 <= node3 <= 255:
-        raise OutOfRangeError("GoalPath.node3", node3, 0, 255)
-    node4 = message.node4
-    if not 0 <= node4 <= 255:
-        raise OutOfRangeError("GoalPath.node4", node4, 0, 255)
-    node5 = message.node5
-    if not 0 <= node5 <= 255:
-        raise OutOfRangeError("GoalPath.node5", node5, 0, 255)
-    return _HBBBBBX.pack(goal, node1, node2, node3, node4, node5)
+    try:
+        return _PACK_HBBBBBX(message.goal, message.node1, message.node2, message.node3, message.node4, message.node5)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("GoalPath.goal", 0, 65535),
+            ("GoalPath.node1", 0, 255),
+            ("GoalPath.node2", 0, 255),
+            ("GoalPath.node3", 0, 255),
+            ("GoalPath.node4", 0, 255),
+            ("GoalPath.node5", 0, 255),
+        ) from error
 
 
 def unpack_goal_path(sender: int, data: bytes) -> GoalPath | None:
-    goal, node1, node2, node3, node4, node5 = _HBBBBBX.unpack_from(data)
+    goal, node1, node2, node3, node4, node5 = _UNPACK_HBBBBBX(data)
     return GoalPath(sender, goal, node1, node2, node3, node4, node5)
 
 
 def pack_offer_high(message: OfferHigh) -> bytes:
     manager = message.manager
-    if not 1 <= manager <= 255:
+    if manager < 1:
         raise OutOfRangeError("OfferHigh.manager", manager, 1, 255)
-    goal = message.goal
-    if not 0 <= goal <= 65535:
-        raise OutOfRangeError("OfferHigh.goal", goal, 0, 65535)
-    bits = message.bits
-    if not 0 <= bits <= 4294967295:
-        raise OutOfRangeError("OfferHigh.bits", bits, 0, 4294967295)
-    return _BHIX.pack(manager, goal, bits)
+    try:
+        return _PACK_BHIX(manager, message.goal, message.bits)
+    except struct.error as error:
+        raise refusal(
+            message, ("OfferHigh.manager", 1, 255), ("OfferHigh.goal", 0, 65535), ("OfferHigh.bits", 0, 4294967295)
+        ) from error
 
 
 def unpack_offer_high(sender: int, data: bytes) -> OfferHigh | None:
-    manager, goal, bits = _BHIX.unpack_from(data)
+    manager, goal, bits = _UNPACK_BHIX(data)
     if manager < 1:
         return None
     return OfferHigh(sender, manager, goal, bits)
@@ -144,19 +143,18 @@ def unpack_offer_high(sender: int, data: bytes) -> OfferHigh | None:
 
 def pack_offer_low(message: OfferLow) -> bytes:
     manager = message.manager
-    if not 1 <= manager <= 255:
+    if manager < 1:
         raise OutOfRangeError("OfferLow.manager", manager, 1, 255)
-    goal = message.goal
-    if not 0 <= goal <= 65535:
-        raise OutOfRangeError("OfferLow.goal", goal, 0, 65535)
-    bits = message.bits
-    if not 0 <= bits <= 4294967295:
-        raise OutOfRangeError("OfferLow.bits", bits, 0, 4294967295)
-    return _BHIX.pack(manager, goal, bits)
+    try:
+        return _PACK_BHIX(manager, message.goal, message.bits)
+    except struct.error as error:
+        raise refusal(
+            message, ("OfferLow.manager", 1, 255), ("OfferLow.goal", 0, 65535), ("OfferLow.bits", 0, 4294967295)
+        ) from error
 
 
 def unpack_offer_low(sender: int, data: bytes) -> OfferLow | None:
-    manager, goal, bits = _BHIX.unpack_from(data)
+    manager, goal, bits = _UNPACK_BHIX(data)
     if manager < 1:
         return None
     return OfferLow(sender, manager, goal, bits)
@@ -164,31 +162,27 @@ def unpack_offer_low(sender: int, data: bytes) -> OfferLow | None:
 
 def pack_offer_nodes(message: OfferNodes) -> bytes:
     manager = message.manager
-    if not 1 <= manager <= 255:
+    if manager < 1:
         raise OutOfRangeError("OfferNodes.manager", manager, 1, 255)
-    goal = message.goal
-    if not 0 <= goal <= 65535:
-        raise OutOfRangeError("OfferNodes.goal", goal, 0, 65535)
-    node1 = message.node1
-    if not 0 <= node1 <= 255:
-        raise OutOfRangeError("OfferNodes.node1", node1, 0, 255)
-    node2 = message.node2
-    if not 0 <= node2 <= 255:
-        raise OutOfRangeError("OfferNodes.node2", node2, 0, 255)
-    node3 = message.node3
-    if not 0 <= node3 <= 255:
-        raise OutOfRangeError("OfferNodes.node3", node3, 0, 255)
-    node4 = message.node4
-    if not 0 <= node4 <= 255:
-        raise OutOfRangeError("OfferNodes.node4", node4, 0, 255)
-    node5 = message.node5
-    if not 0 <= node5 <= 255:
-        raise OutOfRangeError("OfferNodes.node5", node5, 0, 255)
-    return _BHBBBBB.pack(manager, goal, node1, node2, node3, node4, node5)
+    try:
+        return _PACK_BHBBBBB(
+            manager, message.goal, message.node1, message.node2, message.node3, message.node4, message.node5
+        )
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("OfferNodes.manager", 1, 255),
+            ("OfferNodes.goal", 0, 65535),
+            ("OfferNodes.node1", 0, 255),
+            ("OfferNodes.node2", 0, 255),
+            ("OfferNodes.node3", 0, 255),
+            ("OfferNodes.node4", 0, 255),
+            ("OfferNodes.node5", 0, 255),
+        ) from error
 
 
 def unpack_offer_nodes(sender: int, data: bytes) -> OfferNodes | None:
-    manager, goal, node1, node2, node3, node4, node5 = _BHBBBBB.unpack_from(data)
+    manager, goal, node1, node2, node3, node4, node5 = _UNPACK_BHBBBBB(data)
     if manager < 1:
         return None
     return OfferNodes(sender, manager, goal, node1, node2, node3, node4, node5)
@@ -196,22 +190,23 @@ def unpack_offer_nodes(sender: int, data: bytes) -> OfferNodes | None:
 
 def pack_move_from(message: MoveFrom) -> bytes:
     manager = message.manager
-    if not 1 <= manager <= 255:
+    if manager < 1:
         raise OutOfRangeError("MoveFrom.manager", manager, 1, 255)
-    goal = message.goal
-    if not 0 <= goal <= 65535:
-        raise OutOfRangeError("MoveFrom.goal", goal, 0, 65535)
     x_mm = message.x_mm
     if not -524288 <= x_mm <= 524287:
         raise OutOfRangeError("MoveFrom.x_mm", x_mm, -524288, 524287)
-    y_mm = message.y_mm
-    if not -524288 <= y_mm <= 524287:
-        raise OutOfRangeError("MoveFrom.y_mm", y_mm, -524288, 524287)
-    return _Q.pack(manager + goal * 0x100 + (x_mm & 0xFFFFF) * 0x1000000 + (y_mm & 0xFFFFF) * 0x100000000000)
+    if x_mm < 0:
+        x_mm += 0x100000
+    try:
+        return _PACK_BHBSI(manager, message.goal, x_mm & 0xFF, (x_mm >> 8) + message.y_mm * 0x1000)
+    except struct.error as error:
+        raise refusal(
+            message, ("MoveFrom.manager", 1, 255), ("MoveFrom.goal", 0, 65535), ("MoveFrom.y_mm", -524288, 524287)
+        ) from error
 
 
 def unpack_move_from(sender: int, data: bytes) -> MoveFrom | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     manager = word_0 & 0xFF
     if manager < 1:
         return None
@@ -223,22 +218,23 @@ def unpack_move_from(sender: int, data: bytes) -> MoveFrom | None:
 
 def pack_move_to(message: MoveTo) -> bytes:
     manager = message.manager
-    if not 1 <= manager <= 255:
+    if manager < 1:
         raise OutOfRangeError("MoveTo.manager", manager, 1, 255)
-    goal = message.goal
-    if not 0 <= goal <= 65535:
-        raise OutOfRangeError("MoveTo.goal", goal, 0, 65535)
     x_mm = message.x_mm
     if not -524288 <= x_mm <= 524287:
         raise OutOfRangeError("MoveTo.x_mm", x_mm, -524288, 524287)
-    y_mm = message.y_mm
-    if not -524288 <= y_mm <= 524287:
-        raise OutOfRangeError("MoveTo.y_mm", y_mm, -524288, 524287)
-    return _Q.pack(manager + goal * 0x100 + (x_mm & 0xFFFFF) * 0x1000000 + (y_mm & 0xFFFFF) * 0x100000000000)
+    if x_mm < 0:
+        x_mm += 0x100000
+    try:
+        return _PACK_BHBSI(manager, message.goal, x_mm & 0xFF, (x_mm >> 8) + message.y_mm * 0x1000)
+    except struct.error as error:
+        raise refusal(
+            message, ("MoveTo.manager", 1, 255), ("MoveTo.goal", 0, 65535), ("MoveTo.y_mm", -524288, 524287)
+        ) from error
 
 
 def unpack_move_to(sender: int, data: bytes) -> MoveTo | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     manager = word_0 & 0xFF
     if manager < 1:
         return None
@@ -250,19 +246,21 @@ def unpack_move_to(sender: int, data: bytes) -> MoveTo | None:
 
 def pack_move_cost_high(message: MoveCostHigh) -> bytes:
     manager = message.manager
-    if not 1 <= manager <= 255:
+    if manager < 1:
         raise OutOfRangeError("MoveCostHigh.manager", manager, 1, 255)
-    goal = message.goal
-    if not 0 <= goal <= 65535:
-        raise OutOfRangeError("MoveCostHigh.goal", goal, 0, 65535)
-    bits = message.bits
-    if not 0 <= bits <= 4294967295:
-        raise OutOfRangeError("MoveCostHigh.bits", bits, 0, 4294967295)
-    return _BHIX.pack(manager, goal, bits)
+    try:
+        return _PACK_BHIX(manager, message.goal, message.bits)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("MoveCostHigh.manager", 1, 255),
+            ("MoveCostHigh.goal", 0, 65535),
+            ("MoveCostHigh.bits", 0, 4294967295),
+        ) from error
 
 
 def unpack_move_cost_high(sender: int, data: bytes) -> MoveCostHigh | None:
-    manager, goal, bits = _BHIX.unpack_from(data)
+    manager, goal, bits = _UNPACK_BHIX(data)
     if manager < 1:
         return None
     return MoveCostHigh(sender, manager, goal, bits)
@@ -270,19 +268,21 @@ def unpack_move_cost_high(sender: int, data: bytes) -> MoveCostHigh | None:
 
 def pack_move_cost_low(message: MoveCostLow) -> bytes:
     manager = message.manager
-    if not 1 <= manager <= 255:
+    if manager < 1:
         raise OutOfRangeError("MoveCostLow.manager", manager, 1, 255)
-    goal = message.goal
-    if not 0 <= goal <= 65535:
-        raise OutOfRangeError("MoveCostLow.goal", goal, 0, 65535)
-    bits = message.bits
-    if not 0 <= bits <= 4294967295:
-        raise OutOfRangeError("MoveCostLow.bits", bits, 0, 4294967295)
-    return _BHIX.pack(manager, goal, bits)
+    try:
+        return _PACK_BHIX(manager, message.goal, message.bits)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("MoveCostLow.manager", 1, 255),
+            ("MoveCostLow.goal", 0, 65535),
+            ("MoveCostLow.bits", 0, 4294967295),
+        ) from error
 
 
 def unpack_move_cost_low(sender: int, data: bytes) -> MoveCostLow | None:
-    manager, goal, bits = _BHIX.unpack_from(data)
+    manager, goal, bits = _UNPACK_BHIX(data)
     if manager < 1:
         return None
     return MoveCostLow(sender, manager, goal, bits)
@@ -292,19 +292,21 @@ def pack_arm_progress(message: ArmProgress) -> bytes:
     x_mm = message.x_mm
     if not -524288 <= x_mm <= 524287:
         raise OutOfRangeError("ArmProgress.x_mm", x_mm, -524288, 524287)
-    y_mm = message.y_mm
-    if not -524288 <= y_mm <= 524287:
-        raise OutOfRangeError("ArmProgress.y_mm", y_mm, -524288, 524287)
+    if x_mm < 0:
+        x_mm += 0x100000
     goal = message.goal
     if not 0 <= goal <= 65535:
         raise OutOfRangeError("ArmProgress.goal", goal, 0, 65535)
-    return _Q.pack(
-        (x_mm & 0xFFFFF) + ((y_mm & 0xFFFFF) + message.arm_phase * 0x100000) * 0x100000 + goal * 0x100000000000
-    )
+    try:
+        return _PACK_BSIBH(
+            x_mm & 0xFF, (x_mm >> 8) + message.y_mm * 0x1000, message.arm_phase + (goal & 0xF) * 0x10, goal >> 4
+        )
+    except struct.error as error:
+        raise refusal(message, ("ArmProgress.y_mm", -524288, 524287)) from error
 
 
 def unpack_arm_progress(sender: int, data: bytes) -> ArmProgress | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     x_mm = ((word_0 & 0xFFFFF) ^ 0x80000) - 0x80000
     y_mm = ((word_0 >> 20 & 0xFFFFF) ^ 0x80000) - 0x80000
     arm_phase = word_0 >> 40 & 0xF
@@ -315,28 +317,27 @@ def unpack_arm_progress(sender: int, data: bytes) -> ArmProgress | None:
 
 
 def pack_part_at(message: PartAt) -> bytes:
-    part_origin = message.part.origin
-    if not 0 <= part_origin <= 255:
-        raise OutOfRangeError("PartAt.part_origin", part_origin, 0, 255)
-    part_number = message.part.number
-    if not 0 <= part_number <= 65535:
-        raise OutOfRangeError("PartAt.part_number", part_number, 0, 65535)
+    part = message.part
     x_mm = message.x_mm
     if not -262144 <= x_mm <= 262143:
         raise OutOfRangeError("PartAt.x_mm", x_mm, -262144, 262143)
+    if x_mm < 0:
+        x_mm += 0x80000
     y_mm = message.y_mm
     if not -262144 <= y_mm <= 262143:
         raise OutOfRangeError("PartAt.y_mm", y_mm, -262144, 262143)
-    return _Q.pack(
-        part_origin
-        + part_number * 0x100
-        + (x_mm & 0x7FFFF) * 0x1000000
-        + ((y_mm & 0x7FFFF) + message.aboard * 0x80000) * 0x80000000000
-    )
+    if y_mm < 0:
+        y_mm += 0x80000
+    try:
+        return _PACK_BHBI(
+            part.origin, part.number, x_mm & 0xFF, (x_mm >> 8) + y_mm * 0x800 + (0x40000000 if message.aboard else 0)
+        )
+    except struct.error as error:
+        raise refusal(message, ("PartAt.part.origin", 0, 255), ("PartAt.part.number", 0, 65535)) from error
 
 
 def unpack_part_at(sender: int, data: bytes) -> PartAt | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     part_origin = word_0 & 0xFF
     part_number = word_0 >> 8 & 0xFFFF
     x_mm = ((word_0 >> 24 & 0x7FFFF) ^ 0x40000) - 0x40000

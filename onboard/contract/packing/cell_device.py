@@ -3,9 +3,9 @@
 Written by ``make docs`` from ``dbc/cell.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError, Reference
+from onboard.contract.base import FrameCode, OutOfRangeError, Reference, refusal
 from onboard.contract.cell import ArmMode, GripAction, GripMode
 from onboard.contract.cell_device import ArmOrder, ArmState, GripOrder, GripState, OrderAnswer, OrderFrom, OrderTo
 from onboard.contract.codes import OrderResult
@@ -15,25 +15,32 @@ _ARM_MODE = tuple(ArmMode)
 _GRIP_ACTION = tuple(GripAction)
 _GRIP_MODE = tuple(GripMode)
 _ORDER_RESULT = tuple(OrderResult)
-_BIXXX = Struct("<BIxxx")
-_Q = Struct("<Q")
+_FROM_0_TO_255_AT_1 = {value: value << 1 for value in range(256)}
+_FROM_0_TO_255_AT_2 = {value: value << 2 for value in range(256)}
+_PACK_BBSIH = struct.Struct("<BBiH").pack
+_PACK_BBSIXX = struct.Struct("<BBixx").pack
+_PACK_BIXXX = struct.Struct("<BIxxx").pack
+_PACK_HBSIB = struct.Struct("<HBiB").pack
+_PACK_HBSIX = struct.Struct("<HBix").pack
+_PACK_HHI = struct.Struct("<HHI").pack
+_UNPACK_BIXXX = struct.Struct("<BIxxx").unpack_from
+_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_arm_order(message: ArmOrder) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("ArmOrder.sequence", sequence, 0, 255)
     x_mm = message.x_mm
     if not -524288 <= x_mm <= 524287:
         raise OutOfRangeError("ArmOrder.x_mm", x_mm, -524288, 524287)
-    y_mm = message.y_mm
-    if not -524288 <= y_mm <= 524287:
-        raise OutOfRangeError("ArmOrder.y_mm", y_mm, -524288, 524287)
-    return _Q.pack(sequence + (x_mm & 0xFFFFF) * 0x100 + (y_mm & 0xFFFFF) * 0x10000000)
+    if x_mm < 0:
+        x_mm += 0x100000
+    try:
+        return _PACK_BBSIXX(message.sequence, x_mm & 0xFF, (x_mm >> 8) + message.y_mm * 0x1000)
+    except struct.error as error:
+        raise refusal(message, ("ArmOrder.sequence", 0, 255), ("ArmOrder.y_mm", -524288, 524287)) from error
 
 
 def unpack_arm_order(sender: int, data: bytes) -> ArmOrder | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     sequence = word_0 & 0xFF
     x_mm = ((word_0 >> 8 & 0xFFFFF) ^ 0x80000) - 0x80000
     y_mm = ((word_0 >> 28 & 0xFFFFF) ^ 0x80000) - 0x80000
@@ -41,20 +48,20 @@ def unpack_arm_order(sender: int, data: bytes) -> ArmOrder | None:
 
 
 def pack_grip_order(message: GripOrder) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("GripOrder.sequence", sequence, 0, 255)
-    part_origin = message.part.origin
-    if not 0 <= part_origin <= 255:
-        raise OutOfRangeError("GripOrder.part_origin", part_origin, 0, 255)
-    part_number = message.part.number
+    part = message.part
+    part_number = part.number
     if not 0 <= part_number <= 65535:
         raise OutOfRangeError("GripOrder.part_number", part_number, 0, 65535)
-    return _BIXXX.pack(sequence, message.grip_action + part_origin * 0x2 + part_number * 0x200)
+    try:
+        return _PACK_BIXXX(
+            message.sequence, message.grip_action + _FROM_0_TO_255_AT_1[part.origin] + part_number * 0x200
+        )
+    except (KeyError, struct.error) as error:
+        raise refusal(message, ("GripOrder.sequence", 0, 255), ("GripOrder.part.origin", 0, 255)) from error
 
 
 def unpack_grip_order(sender: int, data: bytes) -> GripOrder | None:
-    sequence, word_1 = _BIXXX.unpack_from(data)
+    sequence, word_1 = _UNPACK_BIXXX(data)
     grip_action = word_1 & 0x1
     part_origin = word_1 >> 1 & 0xFF
     part_number = word_1 >> 9 & 0xFFFF
@@ -62,17 +69,17 @@ def unpack_grip_order(sender: int, data: bytes) -> GripOrder | None:
 
 
 def pack_order_answer(message: OrderAnswer) -> bytes:
-    order = message.order
-    if not 0 <= order <= 65535:
-        raise OutOfRangeError("OrderAnswer.order", order, 0, 65535)
     cost_mm = message.cost_mm
     if not 0 <= cost_mm <= 4294967295:
         raise OutOfRangeError("OrderAnswer.cost_mm", cost_mm, 0, 4294967295)
-    return _Q.pack(order + message.order_result * 0x10000 + cost_mm * 0x80000)
+    try:
+        return _PACK_HHI(message.order, message.order_result + (cost_mm & 0x1FFF) * 0x8, cost_mm >> 13)
+    except struct.error as error:
+        raise refusal(message, ("OrderAnswer.order", 0, 65535)) from error
 
 
 def unpack_order_answer(sender: int, data: bytes) -> OrderAnswer | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     order = word_0 & 0xFFFF
     order_result = word_0 >> 16 & 0x7
     if order_result > 3:
@@ -82,20 +89,22 @@ def unpack_order_answer(sender: int, data: bytes) -> OrderAnswer | None:
 
 
 def pack_arm_state(message: ArmState) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("ArmState.sequence", sequence, 0, 255)
     x_mm = message.x_mm
     if not -262144 <= x_mm <= 262143:
         raise OutOfRangeError("ArmState.x_mm", x_mm, -262144, 262143)
+    if x_mm < 0:
+        x_mm += 0x100000
     y_mm = message.y_mm
     if not -262144 <= y_mm <= 262143:
         raise OutOfRangeError("ArmState.y_mm", y_mm, -262144, 262143)
-    return _Q.pack(sequence + (x_mm & 0xFFFFF) * 0x100 + ((y_mm & 0xFFFFF) + message.arm_mode * 0x100000) * 0x10000000)
+    try:
+        return _PACK_BBSIH(message.sequence, x_mm & 0xFF, (x_mm >> 8) + y_mm * 0x1000, message.arm_mode)
+    except struct.error as error:
+        raise refusal(message, ("ArmState.sequence", 0, 255)) from error
 
 
 def unpack_arm_state(sender: int, data: bytes) -> ArmState | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     sequence = word_0 & 0xFF
     x_mm = ((word_0 >> 8 & 0xFFFFF) ^ 0x80000) - 0x80000
     if x_mm < -262144 or x_mm > 262143:
@@ -110,20 +119,18 @@ def unpack_arm_state(sender: int, data: bytes) -> ArmState | None:
 
 
 def pack_grip_state(message: GripState) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("GripState.sequence", sequence, 0, 255)
-    part_origin = message.part.origin
-    if not 0 <= part_origin <= 255:
-        raise OutOfRangeError("GripState.part_origin", part_origin, 0, 255)
-    part_number = message.part.number
+    part = message.part
+    part_number = part.number
     if not 0 <= part_number <= 65535:
         raise OutOfRangeError("GripState.part_number", part_number, 0, 65535)
-    return _BIXXX.pack(sequence, message.grip_mode + part_origin * 0x4 + part_number * 0x400)
+    try:
+        return _PACK_BIXXX(message.sequence, message.grip_mode + _FROM_0_TO_255_AT_2[part.origin] + part_number * 0x400)
+    except (KeyError, struct.error) as error:
+        raise refusal(message, ("GripState.sequence", 0, 255), ("GripState.part.origin", 0, 255)) from error
 
 
 def unpack_grip_state(sender: int, data: bytes) -> GripState | None:
-    sequence, word_1 = _BIXXX.unpack_from(data)
+    sequence, word_1 = _UNPACK_BIXXX(data)
     grip_mode = word_1 & 0x3
     part_origin = word_1 >> 2 & 0xFF
     part_number = word_1 >> 10 & 0xFFFF
@@ -131,20 +138,22 @@ def unpack_grip_state(sender: int, data: bytes) -> GripState | None:
 
 
 def pack_order_from(message: OrderFrom) -> bytes:
-    order = message.order
-    if not 0 <= order <= 65535:
-        raise OutOfRangeError("OrderFrom.order", order, 0, 65535)
     x_mm = message.x_mm
     if not -262144 <= x_mm <= 262143:
         raise OutOfRangeError("OrderFrom.x_mm", x_mm, -262144, 262143)
+    if x_mm < 0:
+        x_mm += 0x100000
     y_mm = message.y_mm
     if not -262144 <= y_mm <= 262143:
         raise OutOfRangeError("OrderFrom.y_mm", y_mm, -262144, 262143)
-    return _Q.pack(order + (x_mm & 0xFFFFF) * 0x10000 + (y_mm & 0xFFFFF) * 0x1000000000)
+    try:
+        return _PACK_HBSIX(message.order, x_mm & 0xFF, (x_mm >> 8) + y_mm * 0x1000)
+    except struct.error as error:
+        raise refusal(message, ("OrderFrom.order", 0, 65535)) from error
 
 
 def unpack_order_from(sender: int, data: bytes) -> OrderFrom | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     order = word_0 & 0xFFFF
     x_mm = ((word_0 >> 16 & 0xFFFFF) ^ 0x80000) - 0x80000
     if x_mm < -262144 or x_mm > 262143:
@@ -156,25 +165,25 @@ def unpack_order_from(sender: int, data: bytes) -> OrderFrom | None:
 
 
 def pack_order_to(message: OrderTo) -> bytes:
-    order = message.order
-    if not 0 <= order <= 65535:
-        raise OutOfRangeError("OrderTo.order", order, 0, 65535)
     x_mm = message.x_mm
     if not -262144 <= x_mm <= 262143:
         raise OutOfRangeError("OrderTo.x_mm", x_mm, -262144, 262143)
+    if x_mm < 0:
+        x_mm += 0x100000
     y_mm = message.y_mm
     if not -262144 <= y_mm <= 262143:
         raise OutOfRangeError("OrderTo.y_mm", y_mm, -262144, 262143)
     within_ms = message.within_ms
     if not 0 <= within_ms <= 2550000:
         raise OutOfRangeError("OrderTo.within_ms", within_ms, 0, 2550000)
-    return _Q.pack(
-        order + (x_mm & 0xFFFFF) * 0x10000 + ((y_mm & 0xFFFFF) + (within_ms // 10000) * 0x100000) * 0x1000000000
-    )
+    try:
+        return _PACK_HBSIB(message.order, x_mm & 0xFF, (x_mm >> 8) + y_mm * 0x1000, within_ms // 10000)
+    except struct.error as error:
+        raise refusal(message, ("OrderTo.order", 0, 65535)) from error
 
 
 def unpack_order_to(sender: int, data: bytes) -> OrderTo | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     order = word_0 & 0xFFFF
     x_mm = ((word_0 >> 16 & 0xFFFFF) ^ 0x80000) - 0x80000
     if x_mm < -262144 or x_mm > 262143:

@@ -3,9 +3,9 @@
 Written by ``make docs`` from ``dbc/device.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError, Reference
+from onboard.contract.base import FrameCode, OutOfRangeError, Reference, refusal
 from onboard.contract.codes import (
     DeskInput,
     DeskText,
@@ -43,45 +43,52 @@ _LIGHT_COLOUR = tuple(LightColour)
 _SHUTTLE_ACTION = tuple(ShuttleAction)
 _SHUTTLE_MODE = tuple(ShuttleMode)
 _SIDE = tuple(Side)
-_BBXXXXXX = Struct("<BBxxxxxx")
-_BIXXX = Struct("<BIxxx")
-_BSIHB = Struct("<BiHB")
-_BSISHB = Struct("<BihB")
-_BXXXXXXX = Struct("<Bxxxxxxx")
-_HXXXXXX = Struct("<Hxxxxxx")
-_Q = Struct("<Q")
+_FROM_0_TO_255_AT_2 = {value: value << 2 for value in range(256)}
+_FROM_0_TO_255_AT_4 = {value: value << 4 for value in range(256)}
+_PACK_BBXXXXXX = struct.Struct("<BBxxxxxx").pack
+_PACK_BHIX = struct.Struct("<BHIx").pack
+_PACK_BIXXX = struct.Struct("<BIxxx").pack
+_PACK_BSIHB = struct.Struct("<BiHB").pack
+_PACK_BSISHB = struct.Struct("<BihB").pack
+_PACK_IXXXX = struct.Struct("<Ixxxx").pack
+_UNPACK_BBXXXXXX = struct.Struct("<BBxxxxxx").unpack_from
+_UNPACK_BIXXX = struct.Struct("<BIxxx").unpack_from
+_UNPACK_BSIHB = struct.Struct("<BiHB").unpack_from
+_UNPACK_BSISHB = struct.Struct("<BihB").unpack_from
+_UNPACK_BXXXXXXX = struct.Struct("<Bxxxxxxx").unpack_from
+_UNPACK_HXXXXXX = struct.Struct("<Hxxxxxx").unpack_from
+_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_drive_order(message: DriveOrder) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("DriveOrder.sequence", sequence, 0, 255)
-    target_mm = message.target_mm
-    if not -2147483648 <= target_mm <= 2147483647:
-        raise OutOfRangeError("DriveOrder.target_mm", target_mm, -2147483648, 2147483647)
-    speed_limit_mm_s = message.speed_limit_mm_s
-    if not 0 <= speed_limit_mm_s <= 65535:
-        raise OutOfRangeError("DriveOrder.speed_limit_mm_s", speed_limit_mm_s, 0, 65535)
-    return _BSIHB.pack(sequence, target_mm, speed_limit_mm_s, message.across)
+    try:
+        return _PACK_BSIHB(message.sequence, message.target_mm, message.speed_limit_mm_s, message.across)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("DriveOrder.sequence", 0, 255),
+            ("DriveOrder.target_mm", -2147483648, 2147483647),
+            ("DriveOrder.speed_limit_mm_s", 0, 65535),
+        ) from error
 
 
 def unpack_drive_order(sender: int, data: bytes) -> DriveOrder | None:
-    sequence, target_mm, speed_limit_mm_s, across = _BSIHB.unpack_from(data)
+    sequence, target_mm, speed_limit_mm_s, across = _UNPACK_BSIHB(data)
     return DriveOrder(sender, sequence, target_mm, speed_limit_mm_s, across & 0x1 != 0)
 
 
 def pack_shuttle_order(message: ShuttleOrder) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("ShuttleOrder.sequence", sequence, 0, 255)
     wheelbase_mm = message.wheelbase_mm
     if not 0 <= wheelbase_mm <= 8191:
         raise OutOfRangeError("ShuttleOrder.wheelbase_mm", wheelbase_mm, 0, 8191)
-    return _BIXXX.pack(sequence, message.action + message.side * 0x10 + wheelbase_mm * 0x20)
+    try:
+        return _PACK_BIXXX(message.sequence, message.action + message.side * 0x10 + wheelbase_mm * 0x20)
+    except struct.error as error:
+        raise refusal(message, ("ShuttleOrder.sequence", 0, 255)) from error
 
 
 def unpack_shuttle_order(sender: int, data: bytes) -> ShuttleOrder | None:
-    sequence, word_1 = _BIXXX.unpack_from(data)
+    sequence, word_1 = _UNPACK_BIXXX(data)
     action = word_1 & 0xF
     if action > 3:
         return None
@@ -91,44 +98,42 @@ def unpack_shuttle_order(sender: int, data: bytes) -> ShuttleOrder | None:
 
 
 def pack_door_order(message: DoorOrder) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("DoorOrder.sequence", sequence, 0, 255)
-    return _BBXXXXXX.pack(sequence, message.door + message.action * 0x2)
+    try:
+        return _PACK_BBXXXXXX(message.sequence, message.door + message.action * 0x2)
+    except struct.error as error:
+        raise refusal(message, ("DoorOrder.sequence", 0, 255)) from error
 
 
 def unpack_door_order(sender: int, data: bytes) -> DoorOrder | None:
-    sequence, word_1 = _BBXXXXXX.unpack_from(data)
+    sequence, word_1 = _UNPACK_BBXXXXXX(data)
     door = word_1 & 0x1
     action = word_1 >> 1 & 0x1
     return DoorOrder(sender, sequence, _DOOR_NAME[door], _DOOR_ACTION[action])
 
 
 def pack_light_order(message: LightOrder) -> bytes:
-    return _BXXXXXXX.pack(message.colour)
+    return _PACK_IXXXX(message.colour)
 
 
 def unpack_light_order(sender: int, data: bytes) -> LightOrder | None:
-    (colour,) = _BXXXXXXX.unpack_from(data)
+    (colour,) = _UNPACK_BXXXXXXX(data)
     colour = colour & 0x1
     return LightOrder(sender, _LIGHT_COLOUR[colour])
 
 
 def pack_desk_order(message: DeskOrder) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("DeskOrder.sequence", sequence, 0, 255)
-    car_origin = message.car.origin
-    if not 0 <= car_origin <= 255:
-        raise OutOfRangeError("DeskOrder.car_origin", car_origin, 0, 255)
-    car_number = message.car.number
+    car = message.car
+    car_number = car.number
     if not 0 <= car_number <= 65535:
         raise OutOfRangeError("DeskOrder.car_number", car_number, 0, 65535)
-    return _BIXXX.pack(sequence, message.text + car_origin * 0x10 + car_number * 0x1000)
+    try:
+        return _PACK_BIXXX(message.sequence, message.text + _FROM_0_TO_255_AT_4[car.origin] + car_number * 0x1000)
+    except (KeyError, struct.error) as error:
+        raise refusal(message, ("DeskOrder.sequence", 0, 255), ("DeskOrder.car.origin", 0, 255)) from error
 
 
 def unpack_desk_order(sender: int, data: bytes) -> DeskOrder | None:
-    sequence, word_1 = _BIXXX.unpack_from(data)
+    sequence, word_1 = _UNPACK_BIXXX(data)
     text = word_1 & 0xF
     if text > 8:
         return None
@@ -138,20 +143,24 @@ def unpack_desk_order(sender: int, data: bytes) -> DeskOrder | None:
 
 
 def pack_drive_state(message: DriveState) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("DriveState.sequence", sequence, 0, 255)
-    position_mm = message.position_mm
-    if not -2147483648 <= position_mm <= 2147483647:
-        raise OutOfRangeError("DriveState.position_mm", position_mm, -2147483648, 2147483647)
-    speed_mm_s = message.speed_mm_s
-    if not -32768 <= speed_mm_s <= 32767:
-        raise OutOfRangeError("DriveState.speed_mm_s", speed_mm_s, -32768, 32767)
-    return _BSISHB.pack(sequence, position_mm, speed_mm_s, message.mode + message.at_mark * 0x8 + message.across * 0x10)
+    try:
+        return _PACK_BSISHB(
+            message.sequence,
+            message.position_mm,
+            message.speed_mm_s,
+            message.mode + (0x8 if message.at_mark else 0) + (0x10 if message.across else 0),
+        )
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("DriveState.sequence", 0, 255),
+            ("DriveState.position_mm", -2147483648, 2147483647),
+            ("DriveState.speed_mm_s", -32768, 32767),
+        ) from error
 
 
 def unpack_drive_state(sender: int, data: bytes) -> DriveState | None:
-    sequence, position_mm, speed_mm_s, word_7 = _BSISHB.unpack_from(data)
+    sequence, position_mm, speed_mm_s, word_7 = _UNPACK_BSISHB(data)
     mode = word_7 & 0x7
     if mode > 4:
         return None
@@ -161,9 +170,6 @@ def unpack_drive_state(sender: int, data: bytes) -> DriveState | None:
 
 
 def pack_shuttle_state(message: ShuttleState) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("ShuttleState.sequence", sequence, 0, 255)
     extension_mm = message.extension_mm
     if not 0 <= extension_mm <= 8191:
         raise OutOfRangeError("ShuttleState.extension_mm", extension_mm, 0, 8191)
@@ -173,17 +179,18 @@ def pack_shuttle_state(message: ShuttleState) -> bytes:
     wheelbase_mm = message.wheelbase_mm
     if not 0 <= wheelbase_mm <= 8191:
         raise OutOfRangeError("ShuttleState.wheelbase_mm", wheelbase_mm, 0, 8191)
-    return _Q.pack(
-        sequence
-        + message.mode * 0x100
-        + message.side * 0x1000
-        + extension_mm * 0x2000
-        + (load_kg + wheelbase_mm * 0x1000) * 0x4000000
-    )
+    try:
+        return _PACK_BHIX(
+            message.sequence,
+            message.mode + message.side * 0x10 + (extension_mm & 0x7FF) * 0x20,
+            (extension_mm >> 11) + load_kg * 0x4 + wheelbase_mm * 0x4000,
+        )
+    except struct.error as error:
+        raise refusal(message, ("ShuttleState.sequence", 0, 255)) from error
 
 
 def unpack_shuttle_state(sender: int, data: bytes) -> ShuttleState | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     sequence = word_0 & 0xFF
     mode = word_0 >> 8 & 0xF
     if mode > 5:
@@ -196,11 +203,11 @@ def unpack_shuttle_state(sender: int, data: bytes) -> ShuttleState | None:
 
 
 def pack_door_state(message: DoorState) -> bytes:
-    return _BXXXXXXX.pack(message.input_door + message.output_door * 0x8 + message.light * 0x40)
+    return _PACK_IXXXX(message.input_door + message.output_door * 0x8 + message.light * 0x40)
 
 
 def unpack_door_state(sender: int, data: bytes) -> DoorState | None:
-    (word_0,) = _BXXXXXXX.unpack_from(data)
+    (word_0,) = _UNPACK_BXXXXXXX(data)
     input_door = word_0 & 0x7
     if input_door > 5:
         return None
@@ -212,20 +219,18 @@ def unpack_door_state(sender: int, data: bytes) -> DoorState | None:
 
 
 def pack_desk_event(message: DeskEvent) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("DeskEvent.sequence", sequence, 0, 255)
-    car_origin = message.car.origin
-    if not 0 <= car_origin <= 255:
-        raise OutOfRangeError("DeskEvent.car_origin", car_origin, 0, 255)
-    car_number = message.car.number
+    car = message.car
+    car_number = car.number
     if not 0 <= car_number <= 65535:
         raise OutOfRangeError("DeskEvent.car_number", car_number, 0, 65535)
-    return _BIXXX.pack(sequence, message.event + car_origin * 0x4 + car_number * 0x400)
+    try:
+        return _PACK_BIXXX(message.sequence, message.event + _FROM_0_TO_255_AT_2[car.origin] + car_number * 0x400)
+    except (KeyError, struct.error) as error:
+        raise refusal(message, ("DeskEvent.sequence", 0, 255), ("DeskEvent.car.origin", 0, 255)) from error
 
 
 def unpack_desk_event(sender: int, data: bytes) -> DeskEvent | None:
-    sequence, word_1 = _BIXXX.unpack_from(data)
+    sequence, word_1 = _UNPACK_BIXXX(data)
     event = word_1 & 0x3
     if event > 2:
         return None
@@ -247,16 +252,17 @@ def pack_bay_state(message: BayState) -> bytes:
     wheelbase_mm = message.wheelbase_mm
     if not 0 <= wheelbase_mm <= 8191:
         raise OutOfRangeError("BayState.wheelbase_mm", wheelbase_mm, 0, 8191)
-    return _Q.pack(
+    return (
         load_kg
         + length_mm * 0x1000
-        + (height_mm + wheelbase_mm * 0x1000 + message.person_inside * 0x2000000 + message.carrier_in_front * 0x4000000)
-        * 0x2000000
-    )
+        + (height_mm + wheelbase_mm * 0x1000) * 0x2000000
+        + (0x4000000000000 if message.person_inside else 0)
+        + (0x8000000000000 if message.carrier_in_front else 0)
+    ).to_bytes(8, "little")
 
 
 def unpack_bay_state(sender: int, data: bytes) -> BayState | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     load_kg = word_0 & 0xFFF
     length_mm = word_0 >> 12 & 0x1FFF
     height_mm = word_0 >> 25 & 0xFFF
@@ -276,11 +282,11 @@ def pack_platform_state(message: PlatformState) -> bytes:
     load_kg = message.load_kg
     if not 0 <= load_kg <= 4095:
         raise OutOfRangeError("PlatformState.load_kg", load_kg, 0, 4095)
-    return _HXXXXXX.pack(message.carrier_aboard + message.crossing * 0x2 + load_kg * 0x4)
+    return _PACK_IXXXX(message.carrier_aboard + (0x2 if message.crossing else 0) + load_kg * 0x4)
 
 
 def unpack_platform_state(sender: int, data: bytes) -> PlatformState | None:
-    (word_0,) = _HXXXXXX.unpack_from(data)
+    (word_0,) = _UNPACK_HXXXXXX(data)
     load_kg = word_0 >> 2 & 0xFFF
     return PlatformState(sender, word_0 & 0x1 != 0, word_0 & 0x2 != 0, load_kg)
 

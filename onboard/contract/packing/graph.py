@@ -3,9 +3,9 @@
 Written by ``make docs`` from ``dbc/graph.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError
+from onboard.contract.base import FrameCode, OutOfRangeError, refusal
 from onboard.contract.graph import (
     EdgeNotice,
     EdgeState,
@@ -20,30 +20,39 @@ from onboard.contract.graph import (
 _EDGE_STATE = tuple(EdgeState)
 _NODE_VERDICT = tuple(NodeVerdict)
 _ROBOT_MODE = tuple(RobotMode)
-_BBBXXXXX = Struct("<BBBxxxxx")
-_BBHXXXX = Struct("<BBHxxxx")
-_HBBBBBB = Struct("<HBBBBBB")
-_Q = Struct("<Q")
+_FROM_0_TO_15_AT_10 = {value: value << 10 for value in range(16)}
+_FROM_0_TO_250_AT_2 = {value: value << 2 for value in range(251)}
+_FROM_0_TO_255_AT_11 = {value: value << 11 for value in range(256)}
+_FROM_0_TO_255_AT_2 = {value: value << 2 for value in range(256)}
+_FROM_0_TO_255_AT_3 = {value: value << 3 for value in range(256)}
+_PACK_BBBXXXXX = struct.Struct("<BBBxxxxx").pack
+_PACK_BBHI = struct.Struct("<BBHI").pack
+_PACK_BBHXXXX = struct.Struct("<BBHxxxx").pack
+_PACK_HBBBBBB = struct.Struct("<HBBBBBB").pack
+_UNPACK_BBBXXXXX = struct.Struct("<BBBxxxxx").unpack_from
+_UNPACK_BBHXXXX = struct.Struct("<BBHxxxx").unpack_from
+_UNPACK_HBBBBBB = struct.Struct("<HBBBBBB").unpack_from
+_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_node_answer(message: NodeAnswer) -> bytes:
     robot = message.robot
     if not 1 <= robot <= 250:
         raise OutOfRangeError("NodeAnswer.robot", robot, 1, 250)
-    node = message.node
-    if not 0 <= node <= 255:
-        raise OutOfRangeError("NodeAnswer.node", node, 0, 255)
-    after = message.after
-    if not 0 <= after <= 255:
-        raise OutOfRangeError("NodeAnswer.after", after, 0, 255)
-    slot = message.slot
-    if not 0 <= slot <= 15:
-        raise OutOfRangeError("NodeAnswer.slot", slot, 0, 15)
-    return _BBHXXXX.pack(robot, node, message.node_verdict + after * 0x4 + slot * 0x400)
+    try:
+        return _PACK_BBHXXXX(
+            robot,
+            message.node,
+            message.node_verdict + _FROM_0_TO_255_AT_2[message.after] + _FROM_0_TO_15_AT_10[message.slot],
+        )
+    except (KeyError, struct.error) as error:
+        raise refusal(
+            message, ("NodeAnswer.node", 0, 255), ("NodeAnswer.after", 0, 255), ("NodeAnswer.slot", 0, 15)
+        ) from error
 
 
 def unpack_node_answer(sender: int, data: bytes) -> NodeAnswer | None:
-    robot, node, word_2 = _BBHXXXX.unpack_from(data)
+    robot, node, word_2 = _UNPACK_BBHXXXX(data)
     if robot < 1 or robot > 250:
         return None
     node_verdict = word_2 & 0x3
@@ -55,20 +64,16 @@ def unpack_node_answer(sender: int, data: bytes) -> NodeAnswer | None:
 
 
 def pack_edge_notice(message: EdgeNotice) -> bytes:
-    node = message.node
-    if not 0 <= node <= 255:
-        raise OutOfRangeError("EdgeNotice.node", node, 0, 255)
-    other = message.other
-    if not 0 <= other <= 255:
-        raise OutOfRangeError("EdgeNotice.other", other, 0, 255)
-    robot = message.robot
-    if not 0 <= robot <= 250:
-        raise OutOfRangeError("EdgeNotice.robot", robot, 0, 250)
-    return _BBHXXXX.pack(node, other, message.edge_state + robot * 0x4)
+    try:
+        return _PACK_BBHXXXX(message.node, message.other, message.edge_state + _FROM_0_TO_250_AT_2[message.robot])
+    except (KeyError, struct.error) as error:
+        raise refusal(
+            message, ("EdgeNotice.node", 0, 255), ("EdgeNotice.other", 0, 255), ("EdgeNotice.robot", 0, 250)
+        ) from error
 
 
 def unpack_edge_notice(sender: int, data: bytes) -> EdgeNotice | None:
-    node, other, word_2 = _BBHXXXX.unpack_from(data)
+    node, other, word_2 = _UNPACK_BBHXXXX(data)
     edge_state = word_2 & 0x3
     if edge_state > 2:
         return None
@@ -79,86 +84,70 @@ def unpack_edge_notice(sender: int, data: bytes) -> EdgeNotice | None:
 
 
 def pack_turn_signal(message: TurnSignal) -> bytes:
-    node = message.node
-    if not 0 <= node <= 255:
-        raise OutOfRangeError("TurnSignal.node", node, 0, 255)
-    behind = message.behind
-    if not 0 <= behind <= 255:
-        raise OutOfRangeError("TurnSignal.behind", behind, 0, 255)
-    after = message.after
-    if not 0 <= after <= 255:
-        raise OutOfRangeError("TurnSignal.after", after, 0, 255)
-    return _BBBXXXXX.pack(node, behind, after)
+    try:
+        return _PACK_BBBXXXXX(message.node, message.behind, message.after)
+    except struct.error as error:
+        raise refusal(
+            message, ("TurnSignal.node", 0, 255), ("TurnSignal.behind", 0, 255), ("TurnSignal.after", 0, 255)
+        ) from error
 
 
 def unpack_turn_signal(sender: int, data: bytes) -> TurnSignal | None:
-    node, behind, after = _BBBXXXXX.unpack_from(data)
+    node, behind, after = _UNPACK_BBBXXXXX(data)
     return TurnSignal(sender, node, behind, after)
 
 
 def pack_visit_list(message: VisitList) -> bytes:
-    order = message.order
-    if not 0 <= order <= 65535:
-        raise OutOfRangeError("VisitList.order", order, 0, 65535)
     robot = message.robot
     if not 1 <= robot <= 250:
         raise OutOfRangeError("VisitList.robot", robot, 1, 250)
-    stop1 = message.stop1
-    if not 0 <= stop1 <= 255:
-        raise OutOfRangeError("VisitList.stop1", stop1, 0, 255)
-    stop2 = message.stop2
-    if not 0 <= stop2 <= 255:
-        raise OutOfRangeError("VisitList.stop2", stop2, 0, 255)
-    stop3 = message.stop3
-    if not 0 <= stop3 <= 255:
-        raise OutOfRangeError("VisitList.stop3", stop3, 0, 255)
-    stop4 = message.stop4
-    if not 0 <= stop4 <= 255:
-        raise OutOfRangeError("VisitList.stop4", stop4, 0, 255)
-    stop5 = message.stop5
-    if not 0 <= stop5 <= 255:
-        raise OutOfRangeError("VisitList.stop5", stop5, 0, 255)
-    return _HBBBBBB.pack(order, robot, stop1, stop2, stop3, stop4, stop5)
+    try:
+        return _PACK_HBBBBBB(
+            message.order, robot, message.stop1, message.stop2, message.stop3, message.stop4, message.stop5
+        )
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("VisitList.order", 0, 65535),
+            ("VisitList.stop1", 0, 255),
+            ("VisitList.stop2", 0, 255),
+            ("VisitList.stop3", 0, 255),
+            ("VisitList.stop4", 0, 255),
+            ("VisitList.stop5", 0, 255),
+        ) from error
 
 
 def unpack_visit_list(sender: int, data: bytes) -> VisitList | None:
-    order, robot, stop1, stop2, stop3, stop4, stop5 = _HBBBBBB.unpack_from(data)
+    order, robot, stop1, stop2, stop3, stop4, stop5 = _UNPACK_HBBBBBB(data)
     if robot < 1 or robot > 250:
         return None
     return VisitList(sender, order, robot, stop1, stop2, stop3, stop4, stop5)
 
 
 def pack_robot_at(message: RobotAt) -> bytes:
-    behind = message.behind
-    if not 0 <= behind <= 255:
-        raise OutOfRangeError("RobotAt.behind", behind, 0, 255)
-    node = message.node
-    if not 0 <= node <= 255:
-        raise OutOfRangeError("RobotAt.node", node, 0, 255)
-    ahead1 = message.ahead1
-    if not 0 <= ahead1 <= 255:
-        raise OutOfRangeError("RobotAt.ahead1", ahead1, 0, 255)
     ahead2 = message.ahead2
     if not 0 <= ahead2 <= 255:
         raise OutOfRangeError("RobotAt.ahead2", ahead2, 0, 255)
-    ahead3 = message.ahead3
-    if not 0 <= ahead3 <= 255:
-        raise OutOfRangeError("RobotAt.ahead3", ahead3, 0, 255)
-    goal = message.goal
-    if not 0 <= goal <= 255:
-        raise OutOfRangeError("RobotAt.goal", goal, 0, 255)
-    return _Q.pack(
-        behind
-        + node * 0x100
-        + message.on_edge * 0x10000
-        + message.robot_mode * 0x20000
-        + ahead1 * 0x80000
-        + (ahead2 + ahead3 * 0x100 + goal * 0x10000) * 0x8000000
-    )
+    try:
+        return _PACK_BBHI(
+            message.behind,
+            message.node,
+            message.on_edge + message.robot_mode * 0x2 + _FROM_0_TO_255_AT_3[message.ahead1] + (ahead2 & 0x1F) * 0x800,
+            (ahead2 >> 5) + _FROM_0_TO_255_AT_3[message.ahead3] + _FROM_0_TO_255_AT_11[message.goal],
+        )
+    except (KeyError, struct.error) as error:
+        raise refusal(
+            message,
+            ("RobotAt.behind", 0, 255),
+            ("RobotAt.node", 0, 255),
+            ("RobotAt.ahead1", 0, 255),
+            ("RobotAt.ahead3", 0, 255),
+            ("RobotAt.goal", 0, 255),
+        ) from error
 
 
 def unpack_robot_at(sender: int, data: bytes) -> RobotAt | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     behind = word_0 & 0xFF
     node = word_0 >> 8 & 0xFF
     robot_mode = word_0 >> 17 & 0x3

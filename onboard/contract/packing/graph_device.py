@@ -3,9 +3,9 @@
 Written by ``make docs`` from ``dbc/graph.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError
+from onboard.contract.base import FrameCode, OutOfRangeError, refusal
 from onboard.contract.codes import OrderResult
 from onboard.contract.graph import BodyPlace, RouteAction
 from onboard.contract.graph_device import ApproachSensor, BodyState, RouteOrder, VisitAnswer, VisitKey
@@ -13,28 +13,35 @@ from onboard.contract.graph_device import ApproachSensor, BodyState, RouteOrder,
 _BODY_PLACE = tuple(BodyPlace)
 _ORDER_RESULT = tuple(OrderResult)
 _ROUTE_ACTION = tuple(RouteAction)
-_BBBBXXXX = Struct("<BBBBxxxx")
-_BBXXXXXX = Struct("<BBxxxxxx")
-_BIXXX = Struct("<BIxxx")
-_HBBBBBB = Struct("<HBBBBBB")
-_HHXXXX = Struct("<HHxxxx")
+_FROM_0_TO_250_AT_2 = {value: value << 2 for value in range(251)}
+_FROM_0_TO_255_AT_1 = {value: value << 1 for value in range(256)}
+_FROM_0_TO_255_AT_9 = {value: value << 9 for value in range(256)}
+_PACK_BBBBXXXX = struct.Struct("<BBBBxxxx").pack
+_PACK_BBXXXXXX = struct.Struct("<BBxxxxxx").pack
+_PACK_BIXXX = struct.Struct("<BIxxx").pack
+_PACK_HBBBBBB = struct.Struct("<HBBBBBB").pack
+_PACK_HHXXXX = struct.Struct("<HHxxxx").pack
+_UNPACK_BBBBXXXX = struct.Struct("<BBBBxxxx").unpack_from
+_UNPACK_BBXXXXXX = struct.Struct("<BBxxxxxx").unpack_from
+_UNPACK_BIXXX = struct.Struct("<BIxxx").unpack_from
+_UNPACK_HBBBBBB = struct.Struct("<HBBBBBB").unpack_from
+_UNPACK_HHXXXX = struct.Struct("<HHxxxx").unpack_from
 
 
 def pack_route_order(message: RouteOrder) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("RouteOrder.sequence", sequence, 0, 255)
-    start = message.start
-    if not 0 <= start <= 255:
-        raise OutOfRangeError("RouteOrder.start", start, 0, 255)
-    end = message.end
-    if not 0 <= end <= 255:
-        raise OutOfRangeError("RouteOrder.end", end, 0, 255)
-    return _BIXXX.pack(sequence, message.route_action + start * 0x2 + end * 0x200)
+    try:
+        return _PACK_BIXXX(
+            message.sequence,
+            message.route_action + _FROM_0_TO_255_AT_1[message.start] + _FROM_0_TO_255_AT_9[message.end],
+        )
+    except (KeyError, struct.error) as error:
+        raise refusal(
+            message, ("RouteOrder.sequence", 0, 255), ("RouteOrder.start", 0, 255), ("RouteOrder.end", 0, 255)
+        ) from error
 
 
 def unpack_route_order(sender: int, data: bytes) -> RouteOrder | None:
-    sequence, word_1 = _BIXXX.unpack_from(data)
+    sequence, word_1 = _UNPACK_BIXXX(data)
     route_action = word_1 & 0x1
     start = word_1 >> 1 & 0xFF
     end = word_1 >> 9 & 0xFF
@@ -42,17 +49,14 @@ def unpack_route_order(sender: int, data: bytes) -> RouteOrder | None:
 
 
 def pack_visit_answer(message: VisitAnswer) -> bytes:
-    order = message.order
-    if not 0 <= order <= 65535:
-        raise OutOfRangeError("VisitAnswer.order", order, 0, 65535)
-    robot = message.robot
-    if not 0 <= robot <= 250:
-        raise OutOfRangeError("VisitAnswer.robot", robot, 0, 250)
-    return _HHXXXX.pack(order, message.visit_result + robot * 0x4)
+    try:
+        return _PACK_HHXXXX(message.order, message.visit_result + _FROM_0_TO_250_AT_2[message.robot])
+    except (KeyError, struct.error) as error:
+        raise refusal(message, ("VisitAnswer.order", 0, 65535), ("VisitAnswer.robot", 0, 250)) from error
 
 
 def unpack_visit_answer(sender: int, data: bytes) -> VisitAnswer | None:
-    order, word_2 = _HHXXXX.unpack_from(data)
+    order, word_2 = _UNPACK_HHXXXX(data)
     visit_result = word_2 & 0x3
     robot = word_2 >> 2 & 0xFF
     if robot > 250:
@@ -61,20 +65,16 @@ def unpack_visit_answer(sender: int, data: bytes) -> VisitAnswer | None:
 
 
 def pack_body_state(message: BodyState) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("BodyState.sequence", sequence, 0, 255)
-    behind = message.behind
-    if not 0 <= behind <= 255:
-        raise OutOfRangeError("BodyState.behind", behind, 0, 255)
-    node = message.node
-    if not 0 <= node <= 255:
-        raise OutOfRangeError("BodyState.node", node, 0, 255)
-    return _BBBBXXXX.pack(sequence, behind, node, message.body_place)
+    try:
+        return _PACK_BBBBXXXX(message.sequence, message.behind, message.node, message.body_place)
+    except struct.error as error:
+        raise refusal(
+            message, ("BodyState.sequence", 0, 255), ("BodyState.behind", 0, 255), ("BodyState.node", 0, 255)
+        ) from error
 
 
 def unpack_body_state(sender: int, data: bytes) -> BodyState | None:
-    sequence, behind, node, body_place = _BBBBXXXX.unpack_from(data)
+    sequence, behind, node, body_place = _UNPACK_BBBBXXXX(data)
     body_place = body_place & 0x3
     if body_place > 2:
         return None
@@ -82,47 +82,40 @@ def unpack_body_state(sender: int, data: bytes) -> BodyState | None:
 
 
 def pack_approach_sensor(message: ApproachSensor) -> bytes:
-    behind = message.behind
-    if not 0 <= behind <= 255:
-        raise OutOfRangeError("ApproachSensor.behind", behind, 0, 255)
-    node = message.node
-    if not 0 <= node <= 255:
-        raise OutOfRangeError("ApproachSensor.node", node, 0, 255)
-    return _BBXXXXXX.pack(behind, node)
+    try:
+        return _PACK_BBXXXXXX(message.behind, message.node)
+    except struct.error as error:
+        raise refusal(message, ("ApproachSensor.behind", 0, 255), ("ApproachSensor.node", 0, 255)) from error
 
 
 def unpack_approach_sensor(sender: int, data: bytes) -> ApproachSensor | None:
-    behind, node = _BBXXXXXX.unpack_from(data)
+    behind, node = _UNPACK_BBXXXXXX(data)
     return ApproachSensor(sender, behind, node)
 
 
 def pack_visit_key(message: VisitKey) -> bytes:
-    order = message.order
-    if not 0 <= order <= 65535:
-        raise OutOfRangeError("VisitKey.order", order, 0, 65535)
     robot = message.robot
-    if not 0 <= robot <= 250:
+    if robot > 250:
         raise OutOfRangeError("VisitKey.robot", robot, 0, 250)
-    stop1 = message.stop1
-    if not 0 <= stop1 <= 255:
-        raise OutOfRangeError("VisitKey.stop1", stop1, 0, 255)
-    stop2 = message.stop2
-    if not 0 <= stop2 <= 255:
-        raise OutOfRangeError("VisitKey.stop2", stop2, 0, 255)
-    stop3 = message.stop3
-    if not 0 <= stop3 <= 255:
-        raise OutOfRangeError("VisitKey.stop3", stop3, 0, 255)
-    stop4 = message.stop4
-    if not 0 <= stop4 <= 255:
-        raise OutOfRangeError("VisitKey.stop4", stop4, 0, 255)
-    stop5 = message.stop5
-    if not 0 <= stop5 <= 255:
-        raise OutOfRangeError("VisitKey.stop5", stop5, 0, 255)
-    return _HBBBBBB.pack(order, robot, stop1, stop2, stop3, stop4, stop5)
+    try:
+        return _PACK_HBBBBBB(
+            message.order, robot, message.stop1, message.stop2, message.stop3, message.stop4, message.stop5
+        )
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("VisitKey.order", 0, 65535),
+            ("VisitKey.robot", 0, 250),
+            ("VisitKey.stop1", 0, 255),
+            ("VisitKey.stop2", 0, 255),
+            ("VisitKey.stop3", 0, 255),
+            ("VisitKey.stop4", 0, 255),
+            ("VisitKey.stop5", 0, 255),
+        ) from error
 
 
 def unpack_visit_key(sender: int, data: bytes) -> VisitKey | None:
-    order, robot, stop1, stop2, stop3, stop4, stop5 = _HBBBBBB.unpack_from(data)
+    order, robot, stop1, stop2, stop3, stop4, stop5 = _UNPACK_HBBBBBB(data)
     if robot > 250:
         return None
     return VisitKey(sender, order, robot, stop1, stop2, stop3, stop4, stop5)

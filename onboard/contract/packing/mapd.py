@@ -3,13 +3,21 @@
 Written by ``make docs`` from ``dbc/mapd.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError
+from onboard.contract.base import FrameCode, OutOfRangeError, refusal
 from onboard.contract.mapd import PathHead, PathMoves, StepRound, StepState, StepTurn, TurnRequest
 
-_IXXXX = Struct("<Ixxxx")
-_Q = Struct("<Q")
+_FROM_0_TO_1_AT_46 = {value: value << 46 for value in range(2)}
+_FROM_0_TO_250_AT_38 = {value: value << 38 for value in range(251)}
+_FROM_0_TO_255_AT_22 = {value: value << 22 for value in range(256)}
+_FROM_0_TO_255_AT_30 = {value: value << 30 for value in range(256)}
+_FROM_0_TO_255_AT_38 = {value: value << 38 for value in range(256)}
+_FROM_0_TO_255_AT_50 = {value: value << 50 for value in range(256)}
+_PACK_BBHI = struct.Struct("<BBHI").pack
+_PACK_IXXXX = struct.Struct("<Ixxxx").pack
+_UNPACK_IXXXX = struct.Struct("<Ixxxx").unpack_from
+_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_step_round(message: StepRound) -> bytes:
@@ -19,14 +27,19 @@ def pack_step_round(message: StepRound) -> bytes:
     open_tasks = message.open_tasks
     if not 0 <= open_tasks <= 65535:
         raise OutOfRangeError("StepRound.open_tasks", open_tasks, 0, 65535)
-    attempt = message.attempt
-    if not 0 <= attempt <= 255:
-        raise OutOfRangeError("StepRound.attempt", attempt, 0, 255)
-    return _Q.pack(step + (open_tasks + attempt * 0x10000 + message.bidding * 0x1000000) * 0x400000)
+    try:
+        return (
+            step
+            + open_tasks * 0x400000
+            + _FROM_0_TO_255_AT_38[message.attempt]
+            + (0x400000000000 if message.bidding else 0)
+        ).to_bytes(8, "little")
+    except KeyError as error:
+        raise refusal(message, ("StepRound.attempt", 0, 255)) from error
 
 
 def unpack_step_round(sender: int, data: bytes) -> StepRound | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     step = word_0 & 0x3FFFFF
     open_tasks = word_0 >> 22 & 0xFFFF
     attempt = word_0 >> 38 & 0xFF
@@ -37,23 +50,26 @@ def pack_step_turn(message: StepTurn) -> bytes:
     step = message.step
     if not 0 <= step <= 4194303:
         raise OutOfRangeError("StepTurn.step", step, 0, 4194303)
-    index = message.index
-    if not 0 <= index <= 255:
-        raise OutOfRangeError("StepTurn.index", index, 0, 255)
-    changes = message.changes
-    if not 0 <= changes <= 255:
-        raise OutOfRangeError("StepTurn.changes", changes, 0, 255)
-    robot = message.robot
-    if not 0 <= robot <= 250:
-        raise OutOfRangeError("StepTurn.robot", robot, 0, 250)
-    won = message.won
-    if not 0 <= won <= 1:
-        raise OutOfRangeError("StepTurn.won", won, 0, 1)
-    return _Q.pack(step + index * 0x400000 + (changes + robot * 0x100 + won * 0x10000) * 0x40000000)
+    try:
+        return (
+            step
+            + _FROM_0_TO_255_AT_22[message.index]
+            + _FROM_0_TO_255_AT_30[message.changes]
+            + _FROM_0_TO_250_AT_38[message.robot]
+            + _FROM_0_TO_1_AT_46[message.won]
+        ).to_bytes(8, "little")
+    except KeyError as error:
+        raise refusal(
+            message,
+            ("StepTurn.index", 0, 255),
+            ("StepTurn.changes", 0, 255),
+            ("StepTurn.robot", 0, 250),
+            ("StepTurn.won", 0, 1),
+        ) from error
 
 
 def unpack_step_turn(sender: int, data: bytes) -> StepTurn | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     step = word_0 & 0x3FFFFF
     index = word_0 >> 22 & 0xFF
     changes = word_0 >> 30 & 0xFF
@@ -68,14 +84,14 @@ def pack_turn_request(message: TurnRequest) -> bytes:
     step = message.step
     if not 0 <= step <= 4194303:
         raise OutOfRangeError("TurnRequest.step", step, 0, 4194303)
-    attempt = message.attempt
-    if not 0 <= attempt <= 255:
-        raise OutOfRangeError("TurnRequest.attempt", attempt, 0, 255)
-    return _IXXXX.pack(step + attempt * 0x400000)
+    try:
+        return _PACK_IXXXX(step + _FROM_0_TO_255_AT_22[message.attempt])
+    except (KeyError, struct.error) as error:
+        raise refusal(message, ("TurnRequest.attempt", 0, 255)) from error
 
 
 def unpack_turn_request(sender: int, data: bytes) -> TurnRequest | None:
-    (word_0,) = _IXXXX.unpack_from(data)
+    (word_0,) = _UNPACK_IXXXX(data)
     step = word_0 & 0x3FFFFF
     attempt = word_0 >> 22 & 0xFF
     return TurnRequest(sender, step, attempt)
@@ -91,14 +107,19 @@ def pack_path_head(message: PathHead) -> bytes:
     moves = message.moves
     if not 0 <= moves <= 4095:
         raise OutOfRangeError("PathHead.moves", moves, 0, 4095)
-    version = message.version
-    if not 0 <= version <= 255:
-        raise OutOfRangeError("PathHead.version", version, 0, 255)
-    return _Q.pack(step + (cell + moves * 0x10000) * 0x400000 + (version + message.kept * 0x100) * 0x4000000000000)
+    try:
+        return (
+            step
+            + (cell + moves * 0x10000) * 0x400000
+            + _FROM_0_TO_255_AT_50[message.version]
+            + (0x400000000000000 if message.kept else 0)
+        ).to_bytes(8, "little")
+    except KeyError as error:
+        raise refusal(message, ("PathHead.version", 0, 255)) from error
 
 
 def unpack_path_head(sender: int, data: bytes) -> PathHead | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     step = word_0 & 0x3FFFFF
     cell = word_0 >> 22 & 0xFFFF
     if cell > 63999:
@@ -109,20 +130,17 @@ def unpack_path_head(sender: int, data: bytes) -> PathHead | None:
 
 
 def pack_path_moves(message: PathMoves) -> bytes:
-    version = message.version
-    if not 0 <= version <= 255:
-        raise OutOfRangeError("PathMoves.version", version, 0, 255)
-    part = message.part
-    if not 0 <= part <= 255:
-        raise OutOfRangeError("PathMoves.part", part, 0, 255)
     codes = message.codes
-    if not 0 <= codes <= 281474976710655:
-        raise OutOfRangeError("PathMoves.codes", codes, 0, 281474976710655)
-    return _Q.pack(version + part * 0x100 + codes * 0x10000)
+    try:
+        return _PACK_BBHI(message.version, message.part, codes & 0xFFFF, codes >> 16)
+    except struct.error as error:
+        raise refusal(
+            message, ("PathMoves.version", 0, 255), ("PathMoves.part", 0, 255), ("PathMoves.codes", 0, 281474976710655)
+        ) from error
 
 
 def unpack_path_moves(sender: int, data: bytes) -> PathMoves | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     version = word_0 & 0xFF
     part = word_0 >> 8 & 0xFF
     codes = word_0 >> 16
@@ -139,11 +157,17 @@ def pack_step_state(message: StepState) -> bytes:
     task = message.task
     if not 0 <= task <= 65535:
         raise OutOfRangeError("StepState.task", task, 0, 65535)
-    return _Q.pack(step + cell * 0x400000 + (task + message.loaded * 0x10000 + message.served * 0x20000) * 0x4000000000)
+    return (
+        step
+        + cell * 0x400000
+        + task * 0x4000000000
+        + (0x40000000000000 if message.loaded else 0)
+        + (0x80000000000000 if message.served else 0)
+    ).to_bytes(8, "little")
 
 
 def unpack_step_state(sender: int, data: bytes) -> StepState | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     step = word_0 & 0x3FFFFF
     cell = word_0 >> 22 & 0xFFFF
     if cell > 63999:

@@ -3,19 +3,22 @@
 Written by ``make docs`` from ``dbc/mapd.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError
+from onboard.contract.base import FrameCode, OutOfRangeError, refusal
 from onboard.contract.codes import OrderResult
 from onboard.contract.mapd import CartAction
 from onboard.contract.mapd_device import CartOrder, CartState, TransportAnswer, TransportKey
 
 _CART_ACTION = tuple(CartAction)
 _ORDER_RESULT = tuple(OrderResult)
-_BHIX = Struct("<BHIx")
-_HBXXXXX = Struct("<HBxxxxx")
-_HHHH = Struct("<HHHH")
-_Q = Struct("<Q")
+_PACK_BHIX = struct.Struct("<BHIx").pack
+_PACK_HHHH = struct.Struct("<HHHH").pack
+_PACK_HHXXXX = struct.Struct("<HHxxxx").pack
+_UNPACK_BHIX = struct.Struct("<BHIx").unpack_from
+_UNPACK_HBXXXXX = struct.Struct("<HBxxxxx").unpack_from
+_UNPACK_HHHH = struct.Struct("<HHHH").unpack_from
+_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_cart_order(message: CartOrder) -> bytes:
@@ -28,14 +31,16 @@ def pack_cart_order(message: CartOrder) -> bytes:
     task = message.task
     if not 0 <= task <= 65535:
         raise OutOfRangeError("CartOrder.task", task, 0, 65535)
-    step = message.step
-    if not 0 <= step <= 4194303:
-        raise OutOfRangeError("CartOrder.step", step, 0, 4194303)
-    return _Q.pack(sequence + message.cart_action * 0x100 + cell * 0x400 + task * 0x4000000 + step * 0x40000000000)
+    try:
+        return (
+            sequence + message.cart_action * 0x100 + cell * 0x400 + task * 0x4000000 + message.step * 0x40000000000
+        ).to_bytes(8, "little")
+    except OverflowError as error:
+        raise refusal(message, ("CartOrder.step", 0, 4194303)) from error
 
 
 def unpack_cart_order(sender: int, data: bytes) -> CartOrder | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     sequence = word_0 & 0xFF
     cart_action = word_0 >> 8 & 0x3
     if cart_action > 2:
@@ -50,13 +55,16 @@ def unpack_cart_order(sender: int, data: bytes) -> CartOrder | None:
 
 def pack_transport_answer(message: TransportAnswer) -> bytes:
     task = message.task
-    if not 0 <= task <= 65534:
+    if task > 65534:
         raise OutOfRangeError("TransportAnswer.task", task, 0, 65534)
-    return _HBXXXXX.pack(task, message.transport_result)
+    try:
+        return _PACK_HHXXXX(task, message.transport_result)
+    except struct.error as error:
+        raise refusal(message, ("TransportAnswer.task", 0, 65534)) from error
 
 
 def unpack_transport_answer(sender: int, data: bytes) -> TransportAnswer | None:
-    task, transport_result = _HBXXXXX.unpack_from(data)
+    task, transport_result = _UNPACK_HBXXXXX(data)
     if task > 65534:
         return None
     transport_result = transport_result & 0x3
@@ -64,20 +72,20 @@ def unpack_transport_answer(sender: int, data: bytes) -> TransportAnswer | None:
 
 
 def pack_cart_state(message: CartState) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("CartState.sequence", sequence, 0, 255)
     cell = message.cell
-    if not 0 <= cell <= 63999:
+    if cell > 63999:
         raise OutOfRangeError("CartState.cell", cell, 0, 63999)
     task = message.task
     if not 0 <= task <= 65535:
         raise OutOfRangeError("CartState.task", task, 0, 65535)
-    return _BHIX.pack(sequence, cell, message.moving + task * 0x2)
+    try:
+        return _PACK_BHIX(message.sequence, cell, message.moving + task * 0x2)
+    except struct.error as error:
+        raise refusal(message, ("CartState.sequence", 0, 255), ("CartState.cell", 0, 63999)) from error
 
 
 def unpack_cart_state(sender: int, data: bytes) -> CartState | None:
-    sequence, cell, word_3 = _BHIX.unpack_from(data)
+    sequence, cell, word_3 = _UNPACK_BHIX(data)
     if cell > 63999:
         return None
     task = word_3 >> 1 & 0xFFFF
@@ -86,22 +94,28 @@ def unpack_cart_state(sender: int, data: bytes) -> CartState | None:
 
 def pack_transport_key(message: TransportKey) -> bytes:
     task = message.task
-    if not 0 <= task <= 65534:
+    if task > 65534:
         raise OutOfRangeError("TransportKey.task", task, 0, 65534)
     pickup = message.pickup
-    if not 0 <= pickup <= 63999:
+    if pickup > 63999:
         raise OutOfRangeError("TransportKey.pickup", pickup, 0, 63999)
     delivery = message.delivery
-    if not 0 <= delivery <= 63999:
+    if delivery > 63999:
         raise OutOfRangeError("TransportKey.delivery", delivery, 0, 63999)
-    release = message.release
-    if not 0 <= release <= 65535:
-        raise OutOfRangeError("TransportKey.release", release, 0, 65535)
-    return _HHHH.pack(task, pickup, delivery, release)
+    try:
+        return _PACK_HHHH(task, pickup, delivery, message.release)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("TransportKey.task", 0, 65534),
+            ("TransportKey.pickup", 0, 63999),
+            ("TransportKey.delivery", 0, 63999),
+            ("TransportKey.release", 0, 65535),
+        ) from error
 
 
 def unpack_transport_key(sender: int, data: bytes) -> TransportKey | None:
-    task, pickup, delivery, release = _HHHH.unpack_from(data)
+    task, pickup, delivery, release = _UNPACK_HHHH(data)
     if task > 65534:
         return None
     if pickup > 63999:

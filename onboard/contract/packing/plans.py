@@ -3,9 +3,9 @@
 Written by ``make docs`` from ``dbc/fleet.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError, Reference, Stamp
+from onboard.contract.base import FrameCode, OutOfRangeError, Reference, Stamp, refusal
 from onboard.contract.codes import Grade, LegAction, Reason, Side, TaskPhase
 from onboard.contract.plans import (
     Blocked,
@@ -25,36 +25,45 @@ _LEG_ACTION = tuple(LegAction)
 _REASON = tuple(Reason)
 _SIDE = tuple(Side)
 _TASK_PHASE = tuple(TaskPhase)
-_BBBBI = Struct("<BBBBI")
-_BBBBXXXX = Struct("<BBBBxxxx")
-_BBBXXXXX = Struct("<BBBxxxxx")
-_BBIBB = Struct("<BBIBB")
-_BHHHB = Struct("<BHHHB")
-_BHIX = Struct("<BHIx")
-_Q = Struct("<Q")
+_FROM_0_TO_255_AT_21 = {value: value << 21 for value in range(256)}
+_FROM_0_TO_30_AT_2 = {value: value << 2 for value in range(31)}
+_FROM_0_TO_31_AT_8 = {value: value << 8 for value in range(32)}
+_FROM_1_TO_254_AT_13 = {value: value << 13 for value in range(1, 255)}
+_PACK_BBBBBBH = struct.Struct("<BBBBBBH").pack
+_PACK_BBBBXXXX = struct.Struct("<BBBBxxxx").pack
+_PACK_BBHXXXX = struct.Struct("<BBHxxxx").pack
+_PACK_BBIBB = struct.Struct("<BBIBB").pack
+_PACK_BHHHB = struct.Struct("<BHHHB").pack
+_PACK_BHIX = struct.Struct("<BHIx").pack
+_UNPACK_BBBBI = struct.Struct("<BBBBI").unpack_from
+_UNPACK_BBBBXXXX = struct.Struct("<BBBBxxxx").unpack_from
+_UNPACK_BBBXXXXX = struct.Struct("<BBBxxxxx").unpack_from
+_UNPACK_BBIBB = struct.Struct("<BBIBB").unpack_from
+_UNPACK_BHHHB = struct.Struct("<BHHHB").unpack_from
+_UNPACK_BHIX = struct.Struct("<BHIx").unpack_from
+_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_itinerary_head(message: ItineraryHead) -> bytes:
-    version = message.version
-    if not 0 <= version <= 255:
-        raise OutOfRangeError("ItineraryHead.version", version, 0, 255)
     legs = message.legs
-    if not 0 <= legs <= 31:
+    if legs > 31:
         raise OutOfRangeError("ItineraryHead.legs", legs, 0, 31)
-    stamp_award_ms = message.stamp.award_ms
-    if not 0 <= stamp_award_ms <= 4294967295:
-        raise OutOfRangeError("ItineraryHead.stamp_award_ms", stamp_award_ms, 0, 4294967295)
-    stamp_initiator = message.stamp.initiator
-    if not 0 <= stamp_initiator <= 255:
-        raise OutOfRangeError("ItineraryHead.stamp_initiator", stamp_initiator, 0, 255)
-    stamp_call = message.stamp.call
-    if not 0 <= stamp_call <= 255:
-        raise OutOfRangeError("ItineraryHead.stamp_call", stamp_call, 0, 255)
-    return _BBIBB.pack(version, message.grade + legs * 0x4, stamp_award_ms, stamp_initiator, stamp_call)
+    stamp = message.stamp
+    try:
+        return _PACK_BBIBB(message.version, message.grade + legs * 0x4, stamp.award_ms, stamp.initiator, stamp.call)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("ItineraryHead.version", 0, 255),
+            ("ItineraryHead.legs", 0, 31),
+            ("ItineraryHead.stamp.award_ms", 0, 4294967295),
+            ("ItineraryHead.stamp.initiator", 0, 255),
+            ("ItineraryHead.stamp.call", 0, 255),
+        ) from error
 
 
 def unpack_itinerary_head(sender: int, data: bytes) -> ItineraryHead | None:
-    version, word_1, stamp_award_ms, stamp_initiator, stamp_call = _BBIBB.unpack_from(data)
+    version, word_1, stamp_award_ms, stamp_initiator, stamp_call = _UNPACK_BBIBB(data)
     grade = word_1 & 0x3
     if grade > 2:
         return None
@@ -67,31 +76,33 @@ def unpack_itinerary_head(sender: int, data: bytes) -> ItineraryHead | None:
 
 
 def pack_itinerary_leg(message: ItineraryLeg) -> bytes:
-    version = message.version
-    if not 0 <= version <= 255:
-        raise OutOfRangeError("ItineraryLeg.version", version, 0, 255)
-    leg = message.leg
-    if not 0 <= leg <= 30:
-        raise OutOfRangeError("ItineraryLeg.leg", leg, 0, 30)
     track = message.track
     if not 1 <= track <= 254:
         raise OutOfRangeError("ItineraryLeg.track", track, 1, 254)
-    from_index = message.from_index
-    if not 0 <= from_index <= 255:
-        raise OutOfRangeError("ItineraryLeg.from_index", from_index, 0, 255)
-    to_index = message.to_index
-    if not 0 <= to_index <= 255:
-        raise OutOfRangeError("ItineraryLeg.to_index", to_index, 0, 255)
     end_ms = message.end_ms
-    if not 0 <= end_ms <= 16777215:
-        raise OutOfRangeError("ItineraryLeg.end_ms", end_ms, 0, 16777215)
-    return _BBBBI.pack(
-        version, message.action + leg * 0x4 + message.side * 0x80, track, from_index, to_index + end_ms * 0x100
-    )
+    try:
+        return _PACK_BBBBBBH(
+            message.version,
+            message.action + _FROM_0_TO_30_AT_2[message.leg] + message.side * 0x80,
+            track,
+            message.from_index,
+            message.to_index,
+            end_ms & 0xFF,
+            end_ms >> 8,
+        )
+    except (KeyError, struct.error) as error:
+        raise refusal(
+            message,
+            ("ItineraryLeg.version", 0, 255),
+            ("ItineraryLeg.leg", 0, 30),
+            ("ItineraryLeg.from_index", 0, 255),
+            ("ItineraryLeg.to_index", 0, 255),
+            ("ItineraryLeg.end_ms", 0, 16777215),
+        ) from error
 
 
 def unpack_itinerary_leg(sender: int, data: bytes) -> ItineraryLeg | None:
-    version, word_1, track, from_index, word_4 = _BBBBI.unpack_from(data)
+    version, word_1, track, from_index, word_4 = _UNPACK_BBBBI(data)
     action = word_1 & 0x3
     leg = word_1 >> 2 & 0x1F
     if leg > 30:
@@ -108,33 +119,33 @@ def pack_progress(message: Progress) -> bytes:
     itinerary_version = message.itinerary_version
     if not 0 <= itinerary_version <= 255:
         raise OutOfRangeError("Progress.itinerary_version", itinerary_version, 0, 255)
-    leg = message.leg
-    if not 0 <= leg <= 31:
-        raise OutOfRangeError("Progress.leg", leg, 0, 31)
-    track = message.track
-    if not 1 <= track <= 254:
-        raise OutOfRangeError("Progress.track", track, 1, 254)
-    index = message.index
-    if not 0 <= index <= 255:
-        raise OutOfRangeError("Progress.index", index, 0, 255)
     offset_mm = message.offset_mm
     if not -32768 <= offset_mm <= 32767:
         raise OutOfRangeError("Progress.offset_mm", offset_mm, -32768, 32767)
+    if offset_mm < 0:
+        offset_mm += 0x10000
     speed_mm_s = message.speed_mm_s
     if not -32768 <= speed_mm_s <= 32767:
         raise OutOfRangeError("Progress.speed_mm_s", speed_mm_s, -32768, 32767)
-    return _Q.pack(
-        itinerary_version
-        + leg * 0x100
-        + track * 0x2000
-        + index * 0x200000
-        + (offset_mm & 0xFFFF) * 0x20000000
-        + (speed_mm_s & 0xFFFF) * 0x200000000000
-    )
+    if speed_mm_s < 0:
+        speed_mm_s += 0x10000
+    try:
+        return (
+            itinerary_version
+            + _FROM_0_TO_31_AT_8[message.leg]
+            + _FROM_1_TO_254_AT_13[message.track]
+            + _FROM_0_TO_255_AT_21[message.index]
+            + offset_mm * 0x20000000
+            + speed_mm_s * 0x200000000000
+        ).to_bytes(8, "little")
+    except KeyError as error:
+        raise refusal(
+            message, ("Progress.leg", 0, 31), ("Progress.track", 1, 254), ("Progress.index", 0, 255)
+        ) from error
 
 
 def unpack_progress(sender: int, data: bytes) -> Progress | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     itinerary_version = word_0 & 0xFF
     leg = word_0 >> 8 & 0x1F
     track = word_0 >> 13 & 0xFF
@@ -150,17 +161,14 @@ def pack_waiting(message: Waiting) -> bytes:
     track = message.track
     if not 1 <= track <= 254:
         raise OutOfRangeError("Waiting.track", track, 1, 254)
-    index = message.index
-    if not 0 <= index <= 255:
-        raise OutOfRangeError("Waiting.index", index, 0, 255)
-    blocker = message.blocker
-    if not 0 <= blocker <= 255:
-        raise OutOfRangeError("Waiting.blocker", blocker, 0, 255)
-    return _BBBBXXXX.pack(track, index, blocker, message.reason)
+    try:
+        return _PACK_BBBBXXXX(track, message.index, message.blocker, message.reason)
+    except struct.error as error:
+        raise refusal(message, ("Waiting.index", 0, 255), ("Waiting.blocker", 0, 255)) from error
 
 
 def unpack_waiting(sender: int, data: bytes) -> Waiting | None:
-    track, index, blocker, reason = _BBBBXXXX.unpack_from(data)
+    track, index, blocker, reason = _UNPACK_BBBBXXXX(data)
     if track < 1 or track > 254:
         return None
     if reason > 47:
@@ -169,20 +177,18 @@ def unpack_waiting(sender: int, data: bytes) -> Waiting | None:
 
 
 def pack_task_report(message: TaskReport) -> bytes:
-    task_origin = message.task.origin
-    if not 0 <= task_origin <= 255:
-        raise OutOfRangeError("TaskReport.task_origin", task_origin, 0, 255)
-    task_number = message.task.number
-    if not 0 <= task_number <= 65535:
-        raise OutOfRangeError("TaskReport.task_number", task_number, 0, 65535)
+    task = message.task
     station = message.station
     if not 0 <= station <= 65535:
         raise OutOfRangeError("TaskReport.station", station, 0, 65535)
-    return _BHIX.pack(task_origin, task_number, message.phase + station * 0x10 + message.reason * 0x100000)
+    try:
+        return _PACK_BHIX(task.origin, task.number, message.phase + station * 0x10 + message.reason * 0x100000)
+    except struct.error as error:
+        raise refusal(message, ("TaskReport.task.origin", 0, 255), ("TaskReport.task.number", 0, 65535)) from error
 
 
 def unpack_task_report(sender: int, data: bytes) -> TaskReport | None:
-    task_origin, task_number, word_3 = _BHIX.unpack_from(data)
+    task_origin, task_number, word_3 = _UNPACK_BHIX(data)
     phase = word_3 & 0xF
     if phase > 6:
         return None
@@ -194,26 +200,24 @@ def unpack_task_report(sender: int, data: bytes) -> TaskReport | None:
 
 
 def pack_car_at(message: CarAt) -> bytes:
-    car_origin = message.car.origin
-    if not 0 <= car_origin <= 255:
-        raise OutOfRangeError("CarAt.car_origin", car_origin, 0, 255)
-    car_number = message.car.number
-    if not 0 <= car_number <= 65535:
-        raise OutOfRangeError("CarAt.car_number", car_number, 0, 65535)
-    station = message.station
-    if not 0 <= station <= 65535:
-        raise OutOfRangeError("CarAt.station", station, 0, 65535)
-    version = message.version
-    if not 0 <= version <= 65535:
-        raise OutOfRangeError("CarAt.version", version, 0, 65535)
+    car = message.car
     wheelbase_mm = message.wheelbase_mm
     if not 1500 <= wheelbase_mm <= 4050:
         raise OutOfRangeError("CarAt.wheelbase_mm", wheelbase_mm, 1500, 4050)
-    return _BHHHB.pack(car_origin, car_number, station, version, (wheelbase_mm - 1500) // 10)
+    try:
+        return _PACK_BHHHB(car.origin, car.number, message.station, message.version, (wheelbase_mm - 1500) // 10)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("CarAt.car.origin", 0, 255),
+            ("CarAt.car.number", 0, 65535),
+            ("CarAt.station", 0, 65535),
+            ("CarAt.version", 0, 65535),
+        ) from error
 
 
 def unpack_car_at(sender: int, data: bytes) -> CarAt | None:
-    car_origin, car_number, station, version, wheelbase_mm = _BHHHB.unpack_from(data)
+    car_origin, car_number, station, version, wheelbase_mm = _UNPACK_BHHHB(data)
     wheelbase_mm = wheelbase_mm * 10 + 1500
     return CarAt(sender, _new(Reference, (car_origin, car_number)), station, version, wheelbase_mm)
 
@@ -222,14 +226,14 @@ def pack_blocked(message: Blocked) -> bytes:
     track = message.track
     if not 1 <= track <= 254:
         raise OutOfRangeError("Blocked.track", track, 1, 254)
-    index = message.index
-    if not 0 <= index <= 255:
-        raise OutOfRangeError("Blocked.index", index, 0, 255)
-    return _BBBXXXXX.pack(track, index, message.reason)
+    try:
+        return _PACK_BBHXXXX(track, message.index, message.reason)
+    except struct.error as error:
+        raise refusal(message, ("Blocked.index", 0, 255)) from error
 
 
 def unpack_blocked(sender: int, data: bytes) -> Blocked | None:
-    track, index, reason = _BBBXXXXX.unpack_from(data)
+    track, index, reason = _UNPACK_BBBXXXXX(data)
     if track < 1 or track > 254:
         return None
     if reason > 47:
@@ -241,14 +245,14 @@ def pack_clear(message: Clear) -> bytes:
     track = message.track
     if not 1 <= track <= 254:
         raise OutOfRangeError("Clear.track", track, 1, 254)
-    index = message.index
-    if not 0 <= index <= 255:
-        raise OutOfRangeError("Clear.index", index, 0, 255)
-    return _BBBXXXXX.pack(track, index, message.reason)
+    try:
+        return _PACK_BBHXXXX(track, message.index, message.reason)
+    except struct.error as error:
+        raise refusal(message, ("Clear.index", 0, 255)) from error
 
 
 def unpack_clear(sender: int, data: bytes) -> Clear | None:
-    track, index, reason = _BBBXXXXX.unpack_from(data)
+    track, index, reason = _UNPACK_BBBXXXXX(data)
     if track < 1 or track > 254:
         return None
     if reason > 47:

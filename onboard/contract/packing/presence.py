@@ -3,9 +3,9 @@
 Written by ``make docs`` from ``dbc/fleet.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError, Reference
+from onboard.contract.base import FrameCode, OutOfRangeError, Reference, refusal
 from onboard.contract.codes import KindCode, MachineState, ManualMode, OperatorAction, Reason
 from onboard.contract.presence import (
     BusTime,
@@ -27,35 +27,43 @@ _MACHINE_STATE = tuple(MachineState)
 _MANUAL_MODE = tuple(ManualMode)
 _OPERATOR_ACTION = tuple(OperatorAction)
 _REASON = tuple(Reason)
-_BBBBBXXX = Struct("<BBBBBxxx")
-_BBBXXXXX = Struct("<BBBxxxxx")
-_BBXXXXXX = Struct("<BBxxxxxx")
-_BHHBBB = Struct("<BHHBBB")
-_BIXXX = Struct("<BIxxx")
-_BXXXXXXX = Struct("<Bxxxxxxx")
-_Q = Struct("<Q")
+_FROM_0_TO_255_AT_4 = {value: value << 4 for value in range(256)}
+_PACK_BBBBBXXX = struct.Struct("<BBBBBxxx").pack
+_PACK_BBHXXXX = struct.Struct("<BBHxxxx").pack
+_PACK_BBXXXXXX = struct.Struct("<BBxxxxxx").pack
+_PACK_BHHBBB = struct.Struct("<BHHBBB").pack
+_PACK_BIXXX = struct.Struct("<BIxxx").pack
+_PACK_BXXXXXXX = struct.Struct("<Bxxxxxxx").pack
+_PACK_IXXXX = struct.Struct("<Ixxxx").pack
+_UNPACK_BBBBBXXX = struct.Struct("<BBBBBxxx").unpack_from
+_UNPACK_BBBXXXXX = struct.Struct("<BBBxxxxx").unpack_from
+_UNPACK_BBXXXXXX = struct.Struct("<BBxxxxxx").unpack_from
+_UNPACK_BHHBBB = struct.Struct("<BHHBBB").unpack_from
+_UNPACK_BIXXX = struct.Struct("<BIxxx").unpack_from
+_UNPACK_BXXXXXXX = struct.Struct("<Bxxxxxxx").unpack_from
+_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_emergency_stop(message: EmergencyStop) -> bytes:
-    return _BXXXXXXX.pack(message.reason)
+    return _PACK_IXXXX(message.reason)
 
 
 def unpack_emergency_stop(sender: int, data: bytes) -> EmergencyStop | None:
-    (reason,) = _BXXXXXXX.unpack_from(data)
+    (reason,) = _UNPACK_BXXXXXXX(data)
     if reason > 47:
         return None
     return EmergencyStop(sender, _REASON[reason])
 
 
 def pack_go(message: Go) -> bytes:
-    stopper = message.stopper
-    if not 0 <= stopper <= 255:
-        raise OutOfRangeError("Go.stopper", stopper, 0, 255)
-    return _BXXXXXXX.pack(stopper)
+    try:
+        return _PACK_BXXXXXXX(message.stopper)
+    except struct.error as error:
+        raise refusal(message, ("Go.stopper", 0, 255)) from error
 
 
 def unpack_go(sender: int, data: bytes) -> Go | None:
-    (stopper,) = _BXXXXXXX.unpack_from(data)
+    (stopper,) = _UNPACK_BXXXXXXX(data)
     return Go(sender, stopper)
 
 
@@ -63,11 +71,11 @@ def pack_bus_time(message: BusTime) -> bytes:
     bus_time_us = message.bus_time_us
     if not 0 <= bus_time_us <= 281474976710655:
         raise OutOfRangeError("BusTime.bus_time_us", bus_time_us, 0, 281474976710655)
-    return _Q.pack(bus_time_us)
+    return (bus_time_us).to_bytes(8, "little")
 
 
 def unpack_bus_time(sender: int, data: bytes) -> BusTime | None:
-    (bus_time_us,) = _Q.unpack_from(data)
+    (bus_time_us,) = _UNPACK_Q(data)
     bus_time_us = bus_time_us & 0xFFFFFFFFFFFF
     return BusTime(sender, bus_time_us)
 
@@ -77,13 +85,16 @@ def pack_manual_order(message: ManualOrder) -> bytes:
     if not 1 <= machine <= 250:
         raise OutOfRangeError("ManualOrder.machine", machine, 1, 250)
     number = message.number
-    if not 1 <= number <= 255:
+    if number < 1:
         raise OutOfRangeError("ManualOrder.number", number, 1, 255)
-    return _BBBXXXXX.pack(machine, number, message.manual_mode)
+    try:
+        return _PACK_BBHXXXX(machine, number, message.manual_mode)
+    except struct.error as error:
+        raise refusal(message, ("ManualOrder.number", 1, 255)) from error
 
 
 def unpack_manual_order(sender: int, data: bytes) -> ManualOrder | None:
-    machine, number, manual_mode = _BBBXXXXX.unpack_from(data)
+    machine, number, manual_mode = _UNPACK_BBBXXXXX(data)
     if machine < 1 or machine > 250:
         return None
     if number < 1:
@@ -95,14 +106,14 @@ def unpack_manual_order(sender: int, data: bytes) -> ManualOrder | None:
 
 
 def pack_manual_state(message: ManualState) -> bytes:
-    number = message.number
-    if not 0 <= number <= 255:
-        raise OutOfRangeError("ManualState.number", number, 0, 255)
-    return _BBXXXXXX.pack(number, message.manual_mode + message.at_rest * 0x4)
+    try:
+        return _PACK_BBXXXXXX(message.number, message.manual_mode + (0x4 if message.at_rest else 0))
+    except struct.error as error:
+        raise refusal(message, ("ManualState.number", 0, 255)) from error
 
 
 def unpack_manual_state(sender: int, data: bytes) -> ManualState | None:
-    number, word_1 = _BBXXXXXX.unpack_from(data)
+    number, word_1 = _UNPACK_BBXXXXXX(data)
     manual_mode = word_1 & 0x3
     if manual_mode > 2:
         return None
@@ -113,17 +124,14 @@ def pack_halted(message: Halted) -> bytes:
     machine = message.machine
     if not 1 <= machine <= 250:
         raise OutOfRangeError("Halted.machine", machine, 1, 250)
-    cause = message.cause
-    if not 0 <= cause <= 255:
-        raise OutOfRangeError("Halted.cause", cause, 0, 255)
-    boot = message.boot
-    if not 0 <= boot <= 255:
-        raise OutOfRangeError("Halted.boot", boot, 0, 255)
-    return _BBBBBXXX.pack(machine, message.reason, cause, message.needs_person, boot)
+    try:
+        return _PACK_BBBBBXXX(machine, message.reason, message.cause, message.needs_person, message.boot)
+    except struct.error as error:
+        raise refusal(message, ("Halted.cause", 0, 255), ("Halted.boot", 0, 255)) from error
 
 
 def unpack_halted(sender: int, data: bytes) -> Halted | None:
-    machine, reason, cause, needs_person, boot = _BBBBBXXX.unpack_from(data)
+    machine, reason, cause, needs_person, boot = _UNPACK_BBBBBXXX(data)
     if machine < 1 or machine > 250:
         return None
     if reason > 47:
@@ -132,35 +140,33 @@ def unpack_halted(sender: int, data: bytes) -> Halted | None:
 
 
 def pack_sync_request(message: SyncRequest) -> bytes:
-    whom = message.whom
-    if not 0 <= whom <= 255:
-        raise OutOfRangeError("SyncRequest.whom", whom, 0, 255)
-    boot_before = message.boot_before
-    if not 0 <= boot_before <= 255:
-        raise OutOfRangeError("SyncRequest.boot_before", boot_before, 0, 255)
-    return _BBXXXXXX.pack(whom, boot_before)
+    try:
+        return _PACK_BBXXXXXX(message.whom, message.boot_before)
+    except struct.error as error:
+        raise refusal(message, ("SyncRequest.whom", 0, 255), ("SyncRequest.boot_before", 0, 255)) from error
 
 
 def unpack_sync_request(sender: int, data: bytes) -> SyncRequest | None:
-    whom, boot_before = _BBXXXXXX.unpack_from(data)
+    whom, boot_before = _UNPACK_BBXXXXXX(data)
     return SyncRequest(sender, whom, boot_before)
 
 
 def pack_operator_order(message: OperatorOrder) -> bytes:
     compartment = message.compartment
-    if not 1 <= compartment <= 255:
+    if compartment < 1:
         raise OutOfRangeError("OperatorOrder.compartment", compartment, 1, 255)
-    car_origin = message.car.origin
-    if not 0 <= car_origin <= 255:
-        raise OutOfRangeError("OperatorOrder.car_origin", car_origin, 0, 255)
-    car_number = message.car.number
+    car = message.car
+    car_number = car.number
     if not 0 <= car_number <= 65535:
         raise OutOfRangeError("OperatorOrder.car_number", car_number, 0, 65535)
-    return _BIXXX.pack(compartment, message.action + car_origin * 0x10 + car_number * 0x1000)
+    try:
+        return _PACK_BIXXX(compartment, message.action + _FROM_0_TO_255_AT_4[car.origin] + car_number * 0x1000)
+    except (KeyError, struct.error) as error:
+        raise refusal(message, ("OperatorOrder.compartment", 1, 255), ("OperatorOrder.car.origin", 0, 255)) from error
 
 
 def unpack_operator_order(sender: int, data: bytes) -> OperatorOrder | None:
-    compartment, word_1 = _BIXXX.unpack_from(data)
+    compartment, word_1 = _UNPACK_BIXXX(data)
     if compartment < 1:
         return None
     action = word_1 & 0xF
@@ -172,41 +178,46 @@ def unpack_operator_order(sender: int, data: bytes) -> OperatorOrder | None:
 
 
 def pack_sync_done(message: SyncDone) -> bytes:
-    whom = message.whom
-    if not 0 <= whom <= 255:
-        raise OutOfRangeError("SyncDone.whom", whom, 0, 255)
-    boot = message.boot
-    if not 0 <= boot <= 255:
-        raise OutOfRangeError("SyncDone.boot", boot, 0, 255)
-    return _BBXXXXXX.pack(whom, boot)
+    try:
+        return _PACK_BBXXXXXX(message.whom, message.boot)
+    except struct.error as error:
+        raise refusal(message, ("SyncDone.whom", 0, 255), ("SyncDone.boot", 0, 255)) from error
 
 
 def unpack_sync_done(sender: int, data: bytes) -> SyncDone | None:
-    whom, boot = _BBXXXXXX.unpack_from(data)
+    whom, boot = _UNPACK_BBXXXXXX(data)
     return SyncDone(sender, whom, boot)
 
 
 def pack_heartbeat(message: Heartbeat) -> bytes:
-    contract = message.contract
-    if not 0 <= contract <= 255:
-        raise OutOfRangeError("Heartbeat.contract", contract, 0, 255)
     site_digest = message.site_digest
-    if not 1 <= site_digest <= 65535:
+    if site_digest < 1:
         raise OutOfRangeError("Heartbeat.site_digest", site_digest, 1, 65535)
-    mirror_digest = message.mirror_digest
-    if not 0 <= mirror_digest <= 65535:
-        raise OutOfRangeError("Heartbeat.mirror_digest", mirror_digest, 0, 65535)
     boot = message.boot
-    if not 1 <= boot <= 255:
+    if boot < 1:
         raise OutOfRangeError("Heartbeat.boot", boot, 1, 255)
-    epoch = message.epoch
-    if not 0 <= epoch <= 255:
-        raise OutOfRangeError("Heartbeat.epoch", epoch, 0, 255)
-    return _BHHBBB.pack(contract, site_digest, mirror_digest, boot, message.kind + message.state * 0x10, epoch)
+    try:
+        return _PACK_BHHBBB(
+            message.contract,
+            site_digest,
+            message.mirror_digest,
+            boot,
+            message.kind + message.state * 0x10,
+            message.epoch,
+        )
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("Heartbeat.contract", 0, 255),
+            ("Heartbeat.site_digest", 1, 65535),
+            ("Heartbeat.mirror_digest", 0, 65535),
+            ("Heartbeat.boot", 1, 255),
+            ("Heartbeat.epoch", 0, 255),
+        ) from error
 
 
 def unpack_heartbeat(sender: int, data: bytes) -> Heartbeat | None:
-    contract, site_digest, mirror_digest, boot, word_6, epoch = _BHHBBB.unpack_from(data)
+    contract, site_digest, mirror_digest, boot, word_6, epoch = _UNPACK_BHHBBB(data)
     if site_digest < 1:
         return None
     if boot < 1:
@@ -221,14 +232,14 @@ def unpack_heartbeat(sender: int, data: bytes) -> Heartbeat | None:
 
 
 def pack_diagnostic(message: Diagnostic) -> bytes:
-    count = message.count
-    if not 0 <= count <= 4294967295:
-        raise OutOfRangeError("Diagnostic.count", count, 0, 4294967295)
-    return _BIXXX.pack(message.reason, count)
+    try:
+        return _PACK_BIXXX(message.reason, message.count)
+    except struct.error as error:
+        raise refusal(message, ("Diagnostic.count", 0, 4294967295)) from error
 
 
 def unpack_diagnostic(sender: int, data: bytes) -> Diagnostic | None:
-    reason, count = _BIXXX.unpack_from(data)
+    reason, count = _UNPACK_BIXXX(data)
     if reason > 47:
         return None
     return Diagnostic(sender, _REASON[reason], count)

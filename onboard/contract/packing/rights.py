@@ -3,9 +3,9 @@
 Written by ``make docs`` from ``dbc/fleet.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError
+from onboard.contract.base import FrameCode, OutOfRangeError, refusal
 from onboard.contract.codes import Reason, RegenerationPhase, TokenKind
 from onboard.contract.rights import (
     Regeneration,
@@ -23,7 +23,13 @@ from onboard.contract.rights import (
 _REASON = tuple(Reason)
 _REGENERATION_PHASE = tuple(RegenerationPhase)
 _TOKEN_KIND = tuple(TokenKind)
-_Q = Struct("<Q")
+_FROM_0_TO_250_AT_12 = {value: value << 12 for value in range(251)}
+_FROM_0_TO_250_AT_20 = {value: value << 20 for value in range(251)}
+_FROM_0_TO_255_AT_4 = {value: value << 4 for value in range(256)}
+_FROM_1_TO_255_AT_4 = {value: value << 4 for value in range(1, 256)}
+_FROM_1_TO_255_AT_56 = {value: value << 56 for value in range(1, 256)}
+_PACK_HIBB = struct.Struct("<HIBB").pack
+_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_token_grant(message: TokenGrant) -> bytes:
@@ -33,14 +39,16 @@ def pack_token_grant(message: TokenGrant) -> bytes:
     version = message.version
     if not 0 <= version <= 268435455:
         raise OutOfRangeError("TokenGrant.version", version, 0, 268435455)
-    holder = message.holder
-    if not 1 <= holder <= 255:
-        raise OutOfRangeError("TokenGrant.holder", holder, 1, 255)
-    return _Q.pack(message.token_kind + token * 0x10 + version * 0x10000000 + holder * 0x100000000000000)
+    try:
+        return (
+            message.token_kind + token * 0x10 + version * 0x10000000 + _FROM_1_TO_255_AT_56[message.holder]
+        ).to_bytes(8, "little")
+    except (KeyError, OverflowError) as error:
+        raise refusal(message, ("TokenGrant.holder", 1, 255)) from error
 
 
 def unpack_token_grant(sender: int, data: bytes) -> TokenGrant | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
     if token_kind > 3:
         return None
@@ -59,11 +67,11 @@ def pack_token_held(message: TokenHeld) -> bytes:
     version = message.version
     if not 0 <= version <= 268435455:
         raise OutOfRangeError("TokenHeld.version", version, 0, 268435455)
-    return _Q.pack(message.token_kind + token * 0x10 + version * 0x10000000)
+    return (message.token_kind + token * 0x10 + version * 0x10000000).to_bytes(8, "little")
 
 
 def unpack_token_held(sender: int, data: bytes) -> TokenHeld | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
     if token_kind > 3:
         return None
@@ -76,22 +84,22 @@ def pack_token_refusal(message: TokenRefusal) -> bytes:
     token = message.token
     if not 0 <= token <= 16777215:
         raise OutOfRangeError("TokenRefusal.token", token, 0, 16777215)
-    version = message.version
-    if not 0 <= version <= 1048575:
-        raise OutOfRangeError("TokenRefusal.version", version, 0, 1048575)
     requester = message.requester
-    if not 1 <= requester <= 255:
+    if requester < 1:
         raise OutOfRangeError("TokenRefusal.requester", requester, 1, 255)
-    return _Q.pack(
-        message.token_kind
-        + token * 0x10
-        + (version + requester * 0x100000) * 0x10000000
-        + message.reason * 0x100000000000000
-    )
+    try:
+        return _PACK_HIBB(
+            message.token_kind + (token & 0xFFF) * 0x10,
+            (token >> 12) + message.version * 0x1000,
+            requester,
+            message.reason,
+        )
+    except struct.error as error:
+        raise refusal(message, ("TokenRefusal.version", 0, 1048575), ("TokenRefusal.requester", 1, 255)) from error
 
 
 def unpack_token_refusal(sender: int, data: bytes) -> TokenRefusal | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
     if token_kind > 3:
         return None
@@ -110,25 +118,24 @@ def pack_token_request(message: TokenRequest) -> bytes:
     token = message.token
     if not 0 <= token <= 16777215:
         raise OutOfRangeError("TokenRequest.token", token, 0, 16777215)
-    version_seen = message.version_seen
-    if not 0 <= version_seen <= 1048575:
-        raise OutOfRangeError("TokenRequest.version_seen", version_seen, 0, 1048575)
-    itinerary_version = message.itinerary_version
-    if not 0 <= itinerary_version <= 255:
-        raise OutOfRangeError("TokenRequest.itinerary_version", itinerary_version, 0, 255)
-    predecessor = message.predecessor
-    if not 0 <= predecessor <= 255:
-        raise OutOfRangeError("TokenRequest.predecessor", predecessor, 0, 255)
-    return _Q.pack(
-        message.token_kind
-        + token * 0x10
-        + (version_seen + itinerary_version * 0x100000) * 0x10000000
-        + predecessor * 0x100000000000000
-    )
+    try:
+        return _PACK_HIBB(
+            message.token_kind + (token & 0xFFF) * 0x10,
+            (token >> 12) + message.version_seen * 0x1000,
+            message.itinerary_version,
+            message.predecessor,
+        )
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("TokenRequest.version_seen", 0, 1048575),
+            ("TokenRequest.itinerary_version", 0, 255),
+            ("TokenRequest.predecessor", 0, 255),
+        ) from error
 
 
 def unpack_token_request(sender: int, data: bytes) -> TokenRequest | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
     if token_kind > 3:
         return None
@@ -146,14 +153,16 @@ def pack_token_dispute(message: TokenDispute) -> bytes:
     version = message.version
     if not 0 <= version <= 268435455:
         raise OutOfRangeError("TokenDispute.version", version, 0, 268435455)
-    believed = message.believed
-    if not 1 <= believed <= 255:
-        raise OutOfRangeError("TokenDispute.believed", believed, 1, 255)
-    return _Q.pack(message.token_kind + token * 0x10 + version * 0x10000000 + believed * 0x100000000000000)
+    try:
+        return (
+            message.token_kind + token * 0x10 + version * 0x10000000 + _FROM_1_TO_255_AT_56[message.believed]
+        ).to_bytes(8, "little")
+    except (KeyError, OverflowError) as error:
+        raise refusal(message, ("TokenDispute.believed", 1, 255)) from error
 
 
 def unpack_token_dispute(sender: int, data: bytes) -> TokenDispute | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
     if token_kind > 3:
         return None
@@ -172,14 +181,16 @@ def pack_token_given(message: TokenGiven) -> bytes:
     version = message.version
     if not 0 <= version <= 268435455:
         raise OutOfRangeError("TokenGiven.version", version, 0, 268435455)
-    holder = message.holder
-    if not 1 <= holder <= 255:
-        raise OutOfRangeError("TokenGiven.holder", holder, 1, 255)
-    return _Q.pack(message.token_kind + token * 0x10 + version * 0x10000000 + holder * 0x100000000000000)
+    try:
+        return (
+            message.token_kind + token * 0x10 + version * 0x10000000 + _FROM_1_TO_255_AT_56[message.holder]
+        ).to_bytes(8, "little")
+    except (KeyError, OverflowError) as error:
+        raise refusal(message, ("TokenGiven.holder", 1, 255)) from error
 
 
 def unpack_token_given(sender: int, data: bytes) -> TokenGiven | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
     if token_kind > 3:
         return None
@@ -198,14 +209,16 @@ def pack_token_seen(message: TokenSeen) -> bytes:
     version = message.version
     if not 0 <= version <= 268435455:
         raise OutOfRangeError("TokenSeen.version", version, 0, 268435455)
-    holder = message.holder
-    if not 1 <= holder <= 255:
-        raise OutOfRangeError("TokenSeen.holder", holder, 1, 255)
-    return _Q.pack(message.token_kind + token * 0x10 + version * 0x10000000 + holder * 0x100000000000000)
+    try:
+        return (
+            message.token_kind + token * 0x10 + version * 0x10000000 + _FROM_1_TO_255_AT_56[message.holder]
+        ).to_bytes(8, "little")
+    except (KeyError, OverflowError) as error:
+        raise refusal(message, ("TokenSeen.holder", 1, 255)) from error
 
 
 def unpack_token_seen(sender: int, data: bytes) -> TokenSeen | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
     if token_kind > 3:
         return None
@@ -224,14 +237,16 @@ def pack_token_assigned(message: TokenAssigned) -> bytes:
     version = message.version
     if not 0 <= version <= 268435455:
         raise OutOfRangeError("TokenAssigned.version", version, 0, 268435455)
-    holder = message.holder
-    if not 1 <= holder <= 255:
-        raise OutOfRangeError("TokenAssigned.holder", holder, 1, 255)
-    return _Q.pack(message.token_kind + token * 0x10 + version * 0x10000000 + holder * 0x100000000000000)
+    try:
+        return (
+            message.token_kind + token * 0x10 + version * 0x10000000 + _FROM_1_TO_255_AT_56[message.holder]
+        ).to_bytes(8, "little")
+    except (KeyError, OverflowError) as error:
+        raise refusal(message, ("TokenAssigned.holder", 1, 255)) from error
 
 
 def unpack_token_assigned(sender: int, data: bytes) -> TokenAssigned | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
     if token_kind > 3:
         return None
@@ -244,33 +259,29 @@ def unpack_token_assigned(sender: int, data: bytes) -> TokenAssigned | None:
 
 
 def pack_regeneration(message: Regeneration) -> bytes:
-    epoch = message.epoch
-    if not 1 <= epoch <= 255:
-        raise OutOfRangeError("Regeneration.epoch", epoch, 1, 255)
-    lost = message.lost
-    if not 0 <= lost <= 250:
-        raise OutOfRangeError("Regeneration.lost", lost, 0, 250)
-    absent = message.absent
-    if not 0 <= absent <= 250:
-        raise OutOfRangeError("Regeneration.absent", absent, 0, 250)
     tokens = message.tokens
     if not 0 <= tokens <= 65535:
         raise OutOfRangeError("Regeneration.tokens", tokens, 0, 65535)
     digest = message.digest
     if not 0 <= digest <= 65535:
         raise OutOfRangeError("Regeneration.digest", digest, 0, 65535)
-    return _Q.pack(
-        message.regeneration_phase
-        + epoch * 0x10
-        + lost * 0x1000
-        + absent * 0x100000
-        + tokens * 0x10000000
-        + digest * 0x100000000000
-    )
+    try:
+        return (
+            message.regeneration_phase
+            + _FROM_1_TO_255_AT_4[message.epoch]
+            + _FROM_0_TO_250_AT_12[message.lost]
+            + _FROM_0_TO_250_AT_20[message.absent]
+            + tokens * 0x10000000
+            + digest * 0x100000000000
+        ).to_bytes(8, "little")
+    except KeyError as error:
+        raise refusal(
+            message, ("Regeneration.epoch", 1, 255), ("Regeneration.lost", 0, 250), ("Regeneration.absent", 0, 250)
+        ) from error
 
 
 def unpack_regeneration(sender: int, data: bytes) -> Regeneration | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     regeneration_phase = word_0 & 0xF
     if regeneration_phase > 5:
         return None
@@ -289,22 +300,25 @@ def unpack_regeneration(sender: int, data: bytes) -> Regeneration | None:
 
 
 def pack_regeneration_state(message: RegenerationState) -> bytes:
-    epoch = message.epoch
-    if not 0 <= epoch <= 255:
-        raise OutOfRangeError("RegenerationState.epoch", epoch, 0, 255)
     tokens = message.tokens
     if not 0 <= tokens <= 65535:
         raise OutOfRangeError("RegenerationState.tokens", tokens, 0, 65535)
     digest = message.digest
     if not 0 <= digest <= 65535:
         raise OutOfRangeError("RegenerationState.digest", digest, 0, 65535)
-    return _Q.pack(
-        message.regeneration_phase + epoch * 0x10 + tokens * 0x1000 + (digest + message.reason * 0x10000) * 0x10000000
-    )
+    try:
+        return (
+            message.regeneration_phase
+            + _FROM_0_TO_255_AT_4[message.epoch]
+            + tokens * 0x1000
+            + (digest + message.reason * 0x10000) * 0x10000000
+        ).to_bytes(8, "little")
+    except KeyError as error:
+        raise refusal(message, ("RegenerationState.epoch", 0, 255)) from error
 
 
 def unpack_regeneration_state(sender: int, data: bytes) -> RegenerationState | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     regeneration_phase = word_0 & 0xF
     if regeneration_phase > 5:
         return None

@@ -3,9 +3,9 @@
 Written by ``make docs`` from ``dbc/terminal.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError, Reference
+from onboard.contract.base import FrameCode, OutOfRangeError, Reference, refusal
 from onboard.contract.terminal import (
     Action,
     Assignment,
@@ -22,29 +22,38 @@ from onboard.contract.terminal import (
 _new = tuple.__new__
 _ACTION = tuple(Action)
 _STEP_RESULT = tuple(StepResult)
-_BBHHBX = Struct("<BBHHBx")
-_BBIBB = Struct("<BBIBB")
-_BBIXX = Struct("<BBIxx")
-_BHHBH = Struct("<BHHBH")
-_BHIX = Struct("<BHIx")
-_Q = Struct("<Q")
+_FROM_0_TO_255_AT_5 = {value: value << 5 for value in range(256)}
+_FROM_0_TO_30_AT_8 = {value: value << 8 for value in range(31)}
+_FROM_1_TO_255_AT_15 = {value: value << 15 for value in range(1, 256)}
+_PACK_BBBBHBB = struct.Struct("<BBBBHBB").pack
+_PACK_BBHHBX = struct.Struct("<BBHHBx").pack
+_PACK_BBHI = struct.Struct("<BBHI").pack
+_PACK_BBIXX = struct.Struct("<BBIxx").pack
+_PACK_BHHBH = struct.Struct("<BHHBH").pack
+_PACK_BHIX = struct.Struct("<BHIx").pack
+_UNPACK_BBHHBX = struct.Struct("<BBHHBx").unpack_from
+_UNPACK_BBIBB = struct.Struct("<BBIBB").unpack_from
+_UNPACK_BBIXX = struct.Struct("<BBIxx").unpack_from
+_UNPACK_BHHBH = struct.Struct("<BHHBH").unpack_from
+_UNPACK_BHIX = struct.Struct("<BHIx").unpack_from
+_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_task_terms(message: TaskTerms) -> bytes:
-    task_origin = message.task.origin
-    if not 0 <= task_origin <= 255:
-        raise OutOfRangeError("TaskTerms.task_origin", task_origin, 0, 255)
-    task_number = message.task.number
-    if not 0 <= task_number <= 65535:
-        raise OutOfRangeError("TaskTerms.task_number", task_number, 0, 65535)
-    before_ms = message.before_ms
-    if not 0 <= before_ms <= 4294967295:
-        raise OutOfRangeError("TaskTerms.before_ms", before_ms, 0, 4294967295)
-    return _BHIX.pack(task_origin, task_number, before_ms)
+    task = message.task
+    try:
+        return _PACK_BHIX(task.origin, task.number, message.before_ms)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("TaskTerms.task.origin", 0, 255),
+            ("TaskTerms.task.number", 0, 65535),
+            ("TaskTerms.before_ms", 0, 4294967295),
+        ) from error
 
 
 def unpack_task_terms(sender: int, data: bytes) -> TaskTerms | None:
-    task_origin, task_number, before_ms = _BHIX.unpack_from(data)
+    task_origin, task_number, before_ms = _UNPACK_BHIX(data)
     return TaskTerms(sender, _new(Reference, (task_origin, task_number)), before_ms)
 
 
@@ -52,23 +61,25 @@ def pack_box_order(message: BoxOrder) -> bytes:
     desk = message.desk
     if not 1 <= desk <= 250:
         raise OutOfRangeError("BoxOrder.desk", desk, 1, 250)
-    number = message.number
-    if not 0 <= number <= 65535:
-        raise OutOfRangeError("BoxOrder.number", number, 0, 65535)
     box = message.box
-    if not 1 <= box <= 65535:
+    if box < 1:
         raise OutOfRangeError("BoxOrder.box", box, 1, 65535)
     target = message.target
-    if not 1 <= target <= 255:
+    if target < 1:
         raise OutOfRangeError("BoxOrder.target", target, 1, 255)
     within_s = message.within_s
     if not 0 <= within_s <= 32767:
         raise OutOfRangeError("BoxOrder.within_s", within_s, 0, 32767)
-    return _BHHBH.pack(desk, number, box, target, within_s + message.urgent * 0x8000)
+    try:
+        return _PACK_BHHBH(desk, message.number, box, target, within_s + (0x8000 if message.urgent else 0))
+    except struct.error as error:
+        raise refusal(
+            message, ("BoxOrder.number", 0, 65535), ("BoxOrder.box", 1, 65535), ("BoxOrder.target", 1, 255)
+        ) from error
 
 
 def unpack_box_order(sender: int, data: bytes) -> BoxOrder | None:
-    desk, number, box, target, word_6 = _BHHBH.unpack_from(data)
+    desk, number, box, target, word_6 = _UNPACK_BHHBH(data)
     if desk < 1 or desk > 250:
         return None
     if box < 1:
@@ -83,23 +94,27 @@ def pack_assignment(message: Assignment) -> bytes:
     vehicle = message.vehicle
     if not 1 <= vehicle <= 250:
         raise OutOfRangeError("Assignment.vehicle", vehicle, 1, 250)
-    task_origin = message.task.origin
-    if not 0 <= task_origin <= 255:
-        raise OutOfRangeError("Assignment.task_origin", task_origin, 0, 255)
-    task_number = message.task.number
-    if not 0 <= task_number <= 65535:
-        raise OutOfRangeError("Assignment.task_number", task_number, 0, 65535)
+    task = message.task
     box = message.box
-    if not 1 <= box <= 65535:
+    if box < 1:
         raise OutOfRangeError("Assignment.box", box, 1, 65535)
     target = message.target
-    if not 1 <= target <= 255:
+    if target < 1:
         raise OutOfRangeError("Assignment.target", target, 1, 255)
-    return _BBHHBX.pack(vehicle, task_origin, task_number, box, target)
+    try:
+        return _PACK_BBHHBX(vehicle, task.origin, task.number, box, target)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("Assignment.task.origin", 0, 255),
+            ("Assignment.task.number", 0, 65535),
+            ("Assignment.box", 1, 65535),
+            ("Assignment.target", 1, 255),
+        ) from error
 
 
 def unpack_assignment(sender: int, data: bytes) -> Assignment | None:
-    vehicle, task_origin, task_number, box, target = _BBHHBX.unpack_from(data)
+    vehicle, task_origin, task_number, box, target = _UNPACK_BBHHBX(data)
     if vehicle < 1 or vehicle > 250:
         return None
     if box < 1:
@@ -111,22 +126,21 @@ def unpack_assignment(sender: int, data: bytes) -> Assignment | None:
 
 def pack_plan_head(message: PlanHead) -> bytes:
     version = message.version
-    if not 1 <= version <= 255:
+    if version < 1:
         raise OutOfRangeError("PlanHead.version", version, 1, 255)
     steps = message.steps
     if not 0 <= steps <= 31:
         raise OutOfRangeError("PlanHead.steps", steps, 0, 31)
-    tasks = message.tasks
-    if not 0 <= tasks <= 7:
-        raise OutOfRangeError("PlanHead.tasks", tasks, 0, 7)
-    begin_ms = message.begin_ms
-    if not 0 <= begin_ms <= 4294967295:
-        raise OutOfRangeError("PlanHead.begin_ms", begin_ms, 0, 4294967295)
-    return _BBIXX.pack(version, steps + tasks * 0x20, begin_ms)
+    try:
+        return _PACK_BBIXX(version, steps + message.tasks * 0x20, message.begin_ms)
+    except struct.error as error:
+        raise refusal(
+            message, ("PlanHead.version", 1, 255), ("PlanHead.tasks", 0, 7), ("PlanHead.begin_ms", 0, 4294967295)
+        ) from error
 
 
 def unpack_plan_head(sender: int, data: bytes) -> PlanHead | None:
-    version, word_1, begin_ms = _BBIXX.unpack_from(data)
+    version, word_1, begin_ms = _UNPACK_BBIXX(data)
     if version < 1:
         return None
     steps = word_1 & 0x1F
@@ -136,28 +150,34 @@ def unpack_plan_head(sender: int, data: bytes) -> PlanHead | None:
 
 def pack_plan_step(message: PlanStep) -> bytes:
     version = message.version
-    if not 1 <= version <= 255:
+    if version < 1:
         raise OutOfRangeError("PlanStep.version", version, 1, 255)
     step = message.step
     if not 0 <= step <= 30:
         raise OutOfRangeError("PlanStep.step", step, 0, 30)
     entity = message.entity
-    if not 1 <= entity <= 255:
+    if entity < 1:
         raise OutOfRangeError("PlanStep.entity", entity, 1, 255)
     end_ms = message.end_ms
-    if not 0 <= end_ms <= 16777215:
-        raise OutOfRangeError("PlanStep.end_ms", end_ms, 0, 16777215)
-    after = message.after
-    if not 0 <= after <= 255:
-        raise OutOfRangeError("PlanStep.after", after, 0, 255)
     after_step = message.after_step
     if not 0 <= after_step <= 31:
         raise OutOfRangeError("PlanStep.after_step", after_step, 0, 31)
-    return _BBIBB.pack(version, step + message.action * 0x20, entity + end_ms * 0x100, after, after_step)
+    try:
+        return _PACK_BBBBHBB(
+            version, step + message.action * 0x20, entity, end_ms & 0xFF, end_ms >> 8, message.after, after_step
+        )
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("PlanStep.version", 1, 255),
+            ("PlanStep.entity", 1, 255),
+            ("PlanStep.end_ms", 0, 16777215),
+            ("PlanStep.after", 0, 255),
+        ) from error
 
 
 def unpack_plan_step(sender: int, data: bytes) -> PlanStep | None:
-    version, word_1, word_2, after, after_step = _BBIBB.unpack_from(data)
+    version, word_1, word_2, after, after_step = _UNPACK_BBIBB(data)
     if version < 1:
         return None
     step = word_1 & 0x1F
@@ -176,38 +196,36 @@ def unpack_plan_step(sender: int, data: bytes) -> PlanStep | None:
 
 def pack_plan_task(message: PlanTask) -> bytes:
     version = message.version
-    if not 1 <= version <= 255:
+    if version < 1:
         raise OutOfRangeError("PlanTask.version", version, 1, 255)
     part = message.part
     if not 0 <= part <= 6:
         raise OutOfRangeError("PlanTask.part", part, 0, 6)
-    pick = message.pick
-    if not 0 <= pick <= 31:
-        raise OutOfRangeError("PlanTask.pick", pick, 0, 31)
     put = message.put
     if not 0 <= put <= 30:
         raise OutOfRangeError("PlanTask.put", put, 0, 30)
     box = message.box
     if not 1 <= box <= 65535:
         raise OutOfRangeError("PlanTask.box", box, 1, 65535)
-    task_origin = message.task.origin
-    if not 0 <= task_origin <= 255:
-        raise OutOfRangeError("PlanTask.task_origin", task_origin, 0, 255)
-    task_number = message.task.number
+    task = message.task
+    task_number = task.number
     if not 0 <= task_number <= 65535:
         raise OutOfRangeError("PlanTask.task_number", task_number, 0, 65535)
-    return _Q.pack(
-        version
-        + part * 0x100
-        + pick * 0x800
-        + put * 0x10000
-        + (box + task_origin * 0x10000) * 0x200000
-        + task_number * 0x200000000000
-    )
+    try:
+        return _PACK_BBHI(
+            version,
+            part + message.pick * 0x8,
+            put + (box & 0x7FF) * 0x20,
+            (box >> 11) + _FROM_0_TO_255_AT_5[task.origin] + task_number * 0x2000,
+        )
+    except (KeyError, struct.error) as error:
+        raise refusal(
+            message, ("PlanTask.version", 1, 255), ("PlanTask.pick", 0, 31), ("PlanTask.task.origin", 0, 255)
+        ) from error
 
 
 def unpack_plan_task(sender: int, data: bytes) -> PlanTask | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     version = word_0 & 0xFF
     if version < 1:
         return None
@@ -230,20 +248,23 @@ def pack_step_report(message: StepReport) -> bytes:
     version = message.version
     if not 1 <= version <= 255:
         raise OutOfRangeError("StepReport.version", version, 1, 255)
-    step = message.step
-    if not 0 <= step <= 30:
-        raise OutOfRangeError("StepReport.step", step, 0, 30)
-    entity = message.entity
-    if not 1 <= entity <= 255:
-        raise OutOfRangeError("StepReport.entity", entity, 1, 255)
     at_ms = message.at_ms
     if not 0 <= at_ms <= 4294967295:
         raise OutOfRangeError("StepReport.at_ms", at_ms, 0, 4294967295)
-    return _Q.pack(version + step * 0x100 + message.result * 0x2000 + entity * 0x8000 + at_ms * 0x800000)
+    try:
+        return (
+            version
+            + _FROM_0_TO_30_AT_8[message.step]
+            + message.result * 0x2000
+            + _FROM_1_TO_255_AT_15[message.entity]
+            + at_ms * 0x800000
+        ).to_bytes(8, "little")
+    except KeyError as error:
+        raise refusal(message, ("StepReport.step", 0, 30), ("StepReport.entity", 1, 255)) from error
 
 
 def unpack_step_report(sender: int, data: bytes) -> StepReport | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     version = word_0 & 0xFF
     if version < 1:
         return None
@@ -267,11 +288,11 @@ def pack_lane_state(message: LaneState) -> bytes:
     since_ms = message.since_ms
     if not 0 <= since_ms <= 4294967295:
         raise OutOfRangeError("LaneState.since_ms", since_ms, 0, 4294967295)
-    return _Q.pack(lane + message.blocked * 0x100 + since_ms * 0x200)
+    return (lane + (0x100 if message.blocked else 0) + since_ms * 0x200).to_bytes(8, "little")
 
 
 def unpack_lane_state(sender: int, data: bytes) -> LaneState | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     lane = word_0 & 0xFF
     if lane < 1:
         return None

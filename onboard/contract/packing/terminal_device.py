@@ -3,9 +3,9 @@
 Written by ``make docs`` from ``dbc/terminal.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError
+from onboard.contract.base import FrameCode, OutOfRangeError, refusal
 from onboard.contract.codes import ManualMode
 from onboard.contract.terminal import Action, HandlerMode, MoveMode, Verb
 from onboard.contract.terminal_device import (
@@ -24,48 +24,55 @@ _HANDLER_MODE = tuple(HandlerMode)
 _MANUAL_MODE = tuple(ManualMode)
 _MOVE_MODE = tuple(MoveMode)
 _VERB = tuple(Verb)
-_BBBBXXXX = Struct("<BBBBxxxx")
-_BBBXXXXX = Struct("<BBBxxxxx")
-_BBXXXXXX = Struct("<BBxxxxxx")
-_BIXXX = Struct("<BIxxx")
-_Q = Struct("<Q")
+_FROM_0_TO_255_AT_31 = {value: value << 31 for value in range(256)}
+_FROM_0_TO_255_AT_39 = {value: value << 39 for value in range(256)}
+_FROM_0_TO_31_AT_26 = {value: value << 26 for value in range(32)}
+_PACK_BBBBXXXX = struct.Struct("<BBBBxxxx").pack
+_PACK_BBHXXXX = struct.Struct("<BBHxxxx").pack
+_PACK_BBXXXXXX = struct.Struct("<BBxxxxxx").pack
+_PACK_BIXXX = struct.Struct("<BIxxx").pack
+_UNPACK_BBBBXXXX = struct.Struct("<BBBBxxxx").unpack_from
+_UNPACK_BBBXXXXX = struct.Struct("<BBBxxxxx").unpack_from
+_UNPACK_BBXXXXXX = struct.Struct("<BBxxxxxx").unpack_from
+_UNPACK_BIXXX = struct.Struct("<BIxxx").unpack_from
+_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_move_order(message: MoveOrder) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("MoveOrder.sequence", sequence, 0, 255)
     entity = message.entity
-    if not 1 <= entity <= 255:
+    if entity < 1:
         raise OutOfRangeError("MoveOrder.entity", entity, 1, 255)
-    slot = message.slot
-    if not 0 <= slot <= 255:
-        raise OutOfRangeError("MoveOrder.slot", slot, 0, 255)
-    towards = message.towards
-    if not 0 <= towards <= 255:
-        raise OutOfRangeError("MoveOrder.towards", towards, 0, 255)
-    return _BBBBXXXX.pack(sequence, entity, slot, towards)
+    try:
+        return _PACK_BBBBXXXX(message.sequence, entity, message.slot, message.towards)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("MoveOrder.sequence", 0, 255),
+            ("MoveOrder.entity", 1, 255),
+            ("MoveOrder.slot", 0, 255),
+            ("MoveOrder.towards", 0, 255),
+        ) from error
 
 
 def unpack_move_order(sender: int, data: bytes) -> MoveOrder | None:
-    sequence, entity, slot, towards = _BBBBXXXX.unpack_from(data)
+    sequence, entity, slot, towards = _UNPACK_BBBBXXXX(data)
     if entity < 1:
         return None
     return MoveOrder(sender, sequence, entity, slot, towards)
 
 
 def pack_handler_order(message: HandlerOrder) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("HandlerOrder.sequence", sequence, 0, 255)
     box = message.box
     if not 0 <= box <= 65535:
         raise OutOfRangeError("HandlerOrder.box", box, 0, 65535)
-    return _BIXXX.pack(sequence, message.action + box * 0x8)
+    try:
+        return _PACK_BIXXX(message.sequence, message.action + box * 0x8)
+    except struct.error as error:
+        raise refusal(message, ("HandlerOrder.sequence", 0, 255)) from error
 
 
 def unpack_handler_order(sender: int, data: bytes) -> HandlerOrder | None:
-    sequence, word_1 = _BIXXX.unpack_from(data)
+    sequence, word_1 = _UNPACK_BIXXX(data)
     action = word_1 & 0x7
     if action > 4:
         return None
@@ -74,48 +81,46 @@ def unpack_handler_order(sender: int, data: bytes) -> HandlerOrder | None:
 
 
 def pack_mission_answer(message: MissionAnswer) -> bytes:
-    mission = message.mission
-    if not 0 <= mission <= 255:
-        raise OutOfRangeError("MissionAnswer.mission", mission, 0, 255)
-    return _BBXXXXXX.pack(mission, message.is_taken)
+    try:
+        return _PACK_BBXXXXXX(message.mission, message.is_taken)
+    except struct.error as error:
+        raise refusal(message, ("MissionAnswer.mission", 0, 255)) from error
 
 
 def unpack_mission_answer(sender: int, data: bytes) -> MissionAnswer | None:
-    mission, is_taken = _BBXXXXXX.unpack_from(data)
+    mission, is_taken = _UNPACK_BBXXXXXX(data)
     return MissionAnswer(sender, mission, is_taken & 0x1 != 0)
 
 
 def pack_move_state(message: MoveState) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("MoveState.sequence", sequence, 0, 255)
-    entity = message.entity
-    if not 0 <= entity <= 255:
-        raise OutOfRangeError("MoveState.entity", entity, 0, 255)
-    slot = message.slot
-    if not 0 <= slot <= 255:
-        raise OutOfRangeError("MoveState.slot", slot, 0, 255)
-    return _BBBBXXXX.pack(sequence, entity, slot, message.mode + message.at_end * 0x4)
+    try:
+        return _PACK_BBBBXXXX(
+            message.sequence, message.entity, message.slot, message.mode + (0x4 if message.at_end else 0)
+        )
+    except struct.error as error:
+        raise refusal(
+            message, ("MoveState.sequence", 0, 255), ("MoveState.entity", 0, 255), ("MoveState.slot", 0, 255)
+        ) from error
 
 
 def unpack_move_state(sender: int, data: bytes) -> MoveState | None:
-    sequence, entity, slot, word_3 = _BBBBXXXX.unpack_from(data)
+    sequence, entity, slot, word_3 = _UNPACK_BBBBXXXX(data)
     mode = word_3 & 0x3
     return MoveState(sender, sequence, entity, slot, _MOVE_MODE[mode], word_3 & 0x4 != 0)
 
 
 def pack_handler_state(message: HandlerState) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("HandlerState.sequence", sequence, 0, 255)
     box = message.box
     if not 0 <= box <= 65535:
         raise OutOfRangeError("HandlerState.box", box, 0, 65535)
-    return _BIXXX.pack(sequence, message.gear + box * 0x4)
+    try:
+        return _PACK_BIXXX(message.sequence, message.gear + box * 0x4)
+    except struct.error as error:
+        raise refusal(message, ("HandlerState.sequence", 0, 255)) from error
 
 
 def unpack_handler_state(sender: int, data: bytes) -> HandlerState | None:
-    sequence, word_1 = _BIXXX.unpack_from(data)
+    sequence, word_1 = _UNPACK_BIXXX(data)
     gear = word_1 & 0x3
     box = word_1 >> 2 & 0xFFFF
     return HandlerState(sender, sequence, _HANDLER_MODE[gear], box)
@@ -123,13 +128,16 @@ def unpack_handler_state(sender: int, data: bytes) -> HandlerState | None:
 
 def pack_lane_sensor(message: LaneSensor) -> bytes:
     lane = message.lane
-    if not 1 <= lane <= 255:
+    if lane < 1:
         raise OutOfRangeError("LaneSensor.lane", lane, 1, 255)
-    return _BBXXXXXX.pack(lane, message.blocked)
+    try:
+        return _PACK_BBXXXXXX(lane, message.blocked)
+    except struct.error as error:
+        raise refusal(message, ("LaneSensor.lane", 1, 255)) from error
 
 
 def unpack_lane_sensor(sender: int, data: bytes) -> LaneSensor | None:
-    lane, blocked = _BBXXXXXX.unpack_from(data)
+    lane, blocked = _UNPACK_BBXXXXXX(data)
     if lane < 1:
         return None
     return LaneSensor(sender, lane, blocked & 0x1 != 0)
@@ -142,29 +150,28 @@ def pack_mission_key(message: MissionKey) -> bytes:
     what = message.what
     if not 0 <= what <= 65535:
         raise OutOfRangeError("MissionKey.what", what, 0, 65535)
-    count = message.count
-    if not 0 <= count <= 31:
-        raise OutOfRangeError("MissionKey.count", count, 0, 31)
-    source = message.source
-    if not 0 <= source <= 255:
-        raise OutOfRangeError("MissionKey.source", source, 0, 255)
-    target = message.target
-    if not 0 <= target <= 255:
-        raise OutOfRangeError("MissionKey.target", target, 0, 255)
     before_s = message.before_s
     if not 0 <= before_s <= 32767:
         raise OutOfRangeError("MissionKey.before_s", before_s, 0, 32767)
-    return _Q.pack(
-        mission
-        + message.verb * 0x100
-        + what * 0x400
-        + (count + source * 0x20 + target * 0x2000) * 0x4000000
-        + (before_s + message.urgent * 0x8000) * 0x800000000000
-    )
+    try:
+        return (
+            mission
+            + message.verb * 0x100
+            + what * 0x400
+            + _FROM_0_TO_31_AT_26[message.count]
+            + _FROM_0_TO_255_AT_31[message.source]
+            + _FROM_0_TO_255_AT_39[message.target]
+            + before_s * 0x800000000000
+            + (0x4000000000000000 if message.urgent else 0)
+        ).to_bytes(8, "little")
+    except KeyError as error:
+        raise refusal(
+            message, ("MissionKey.count", 0, 31), ("MissionKey.source", 0, 255), ("MissionKey.target", 0, 255)
+        ) from error
 
 
 def unpack_mission_key(sender: int, data: bytes) -> MissionKey | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     mission = word_0 & 0xFF
     verb = word_0 >> 8 & 0x3
     if verb > 2:
@@ -181,16 +188,19 @@ def unpack_mission_key(sender: int, data: bytes) -> MissionKey | None:
 
 def pack_manual_key(message: ManualKey) -> bytes:
     number = message.number
-    if not 1 <= number <= 255:
+    if number < 1:
         raise OutOfRangeError("ManualKey.number", number, 1, 255)
     vehicle = message.vehicle
     if not 1 <= vehicle <= 250:
         raise OutOfRangeError("ManualKey.vehicle", vehicle, 1, 250)
-    return _BBBXXXXX.pack(number, vehicle, message.manual_mode)
+    try:
+        return _PACK_BBHXXXX(number, vehicle, message.manual_mode)
+    except struct.error as error:
+        raise refusal(message, ("ManualKey.number", 1, 255)) from error
 
 
 def unpack_manual_key(sender: int, data: bytes) -> ManualKey | None:
-    number, vehicle, manual_mode = _BBBXXXXX.unpack_from(data)
+    number, vehicle, manual_mode = _UNPACK_BBBXXXXX(data)
     if number < 1:
         return None
     if vehicle < 1 or vehicle > 250:

@@ -3,41 +3,46 @@
 Written by ``make docs`` from ``dbc/turning.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError
+from onboard.contract.base import FrameCode, OutOfRangeError, refusal
 from onboard.contract.turning import BillBar, BillCutting, BillWaiting, LathePhase, LatheProgress, TurningOrder
 
 _LATHE_PHASE = tuple(LathePhase)
-_BHIX = Struct("<BHIx")
-_HBIB = Struct("<HBIB")
-_Q = Struct("<Q")
+_PACK_BHBHH = struct.Struct("<BHBHH").pack
+_PACK_BHBI = struct.Struct("<BHBI").pack
+_PACK_HBBBHB = struct.Struct("<HBBBHB").pack
+_UNPACK_BHIX = struct.Struct("<BHIx").unpack_from
+_UNPACK_HBIB = struct.Struct("<HBIB").unpack_from
+_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_turning_order(message: TurningOrder) -> bytes:
-    task = message.task
-    if not 0 <= task <= 65535:
-        raise OutOfRangeError("TurningOrder.task", task, 0, 65535)
-    drawing = message.drawing
-    if not 0 <= drawing <= 255:
-        raise OutOfRangeError("TurningOrder.drawing", drawing, 0, 255)
-    material = message.material
-    if not 0 <= material <= 255:
-        raise OutOfRangeError("TurningOrder.material", material, 0, 255)
     batch = message.batch
     if not 1 <= batch <= 4095:
         raise OutOfRangeError("TurningOrder.batch", batch, 1, 4095)
     bar_mm = message.bar_mm
-    if not 1 <= bar_mm <= 4095:
+    if bar_mm < 1:
         raise OutOfRangeError("TurningOrder.bar_mm", bar_mm, 1, 4095)
     face_um = message.face_um
     if not 0 <= face_um <= 25500:
         raise OutOfRangeError("TurningOrder.face_um", face_um, 0, 25500)
-    return _HBIB.pack(task, drawing, material + batch * 0x100 + bar_mm * 0x100000, face_um // 100)
+    try:
+        return _PACK_HBBBHB(
+            message.task, message.drawing, message.material, batch & 0xFF, (batch >> 8) + bar_mm * 0x10, face_um // 100
+        )
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("TurningOrder.task", 0, 65535),
+            ("TurningOrder.drawing", 0, 255),
+            ("TurningOrder.material", 0, 255),
+            ("TurningOrder.bar_mm", 1, 4095),
+        ) from error
 
 
 def unpack_turning_order(sender: int, data: bytes) -> TurningOrder | None:
-    task, drawing, word_3, face_um = _HBIB.unpack_from(data)
+    task, drawing, word_3, face_um = _UNPACK_HBIB(data)
     material = word_3 & 0xFF
     batch = word_3 >> 8 & 0xFFF
     if batch < 1:
@@ -51,22 +56,24 @@ def unpack_turning_order(sender: int, data: bytes) -> TurningOrder | None:
 
 def pack_bill_cutting(message: BillCutting) -> bytes:
     manager = message.manager
-    if not 1 <= manager <= 255:
+    if manager < 1:
         raise OutOfRangeError("BillCutting.manager", manager, 1, 255)
-    task = message.task
-    if not 0 <= task <= 65535:
-        raise OutOfRangeError("BillCutting.task", task, 0, 65535)
     machining_ct = message.machining_ct
     if not 0 <= machining_ct <= 1048575:
         raise OutOfRangeError("BillCutting.machining_ct", machining_ct, 0, 1048575)
-    tools_ct = message.tools_ct
-    if not 0 <= tools_ct <= 1048575:
-        raise OutOfRangeError("BillCutting.tools_ct", tools_ct, 0, 1048575)
-    return _Q.pack(manager + task * 0x100 + machining_ct * 0x1000000 + tools_ct * 0x100000000000)
+    try:
+        return _PACK_BHBI(manager, message.task, machining_ct & 0xFF, (machining_ct >> 8) + message.tools_ct * 0x1000)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("BillCutting.manager", 1, 255),
+            ("BillCutting.task", 0, 65535),
+            ("BillCutting.tools_ct", 0, 1048575),
+        ) from error
 
 
 def unpack_bill_cutting(sender: int, data: bytes) -> BillCutting | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     manager = word_0 & 0xFF
     if manager < 1:
         return None
@@ -78,22 +85,24 @@ def unpack_bill_cutting(sender: int, data: bytes) -> BillCutting | None:
 
 def pack_bill_waiting(message: BillWaiting) -> bytes:
     manager = message.manager
-    if not 1 <= manager <= 255:
+    if manager < 1:
         raise OutOfRangeError("BillWaiting.manager", manager, 1, 255)
-    task = message.task
-    if not 0 <= task <= 65535:
-        raise OutOfRangeError("BillWaiting.task", task, 0, 65535)
     setup_ct = message.setup_ct
     if not 0 <= setup_ct <= 1048575:
         raise OutOfRangeError("BillWaiting.setup_ct", setup_ct, 0, 1048575)
-    latency_ct = message.latency_ct
-    if not 0 <= latency_ct <= 1048575:
-        raise OutOfRangeError("BillWaiting.latency_ct", latency_ct, 0, 1048575)
-    return _Q.pack(manager + task * 0x100 + setup_ct * 0x1000000 + latency_ct * 0x100000000000)
+    try:
+        return _PACK_BHBI(manager, message.task, setup_ct & 0xFF, (setup_ct >> 8) + message.latency_ct * 0x1000)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("BillWaiting.manager", 1, 255),
+            ("BillWaiting.task", 0, 65535),
+            ("BillWaiting.latency_ct", 0, 1048575),
+        ) from error
 
 
 def unpack_bill_waiting(sender: int, data: bytes) -> BillWaiting | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     manager = word_0 & 0xFF
     if manager < 1:
         return None
@@ -105,22 +114,21 @@ def unpack_bill_waiting(sender: int, data: bytes) -> BillWaiting | None:
 
 def pack_bill_bar(message: BillBar) -> bytes:
     manager = message.manager
-    if not 1 <= manager <= 255:
+    if manager < 1:
         raise OutOfRangeError("BillBar.manager", manager, 1, 255)
-    task = message.task
-    if not 0 <= task <= 65535:
-        raise OutOfRangeError("BillBar.task", task, 0, 65535)
     material_ct = message.material_ct
     if not 0 <= material_ct <= 1048575:
         raise OutOfRangeError("BillBar.material_ct", material_ct, 0, 1048575)
-    total_ct = message.total_ct
-    if not 0 <= total_ct <= 1048575:
-        raise OutOfRangeError("BillBar.total_ct", total_ct, 0, 1048575)
-    return _Q.pack(manager + task * 0x100 + material_ct * 0x1000000 + total_ct * 0x100000000000)
+    try:
+        return _PACK_BHBI(manager, message.task, material_ct & 0xFF, (material_ct >> 8) + message.total_ct * 0x1000)
+    except struct.error as error:
+        raise refusal(
+            message, ("BillBar.manager", 1, 255), ("BillBar.task", 0, 65535), ("BillBar.total_ct", 0, 1048575)
+        ) from error
 
 
 def unpack_bill_bar(sender: int, data: bytes) -> BillBar | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     manager = word_0 & 0xFF
     if manager < 1:
         return None
@@ -132,22 +140,24 @@ def unpack_bill_bar(sender: int, data: bytes) -> BillBar | None:
 
 def pack_lathe_progress(message: LatheProgress) -> bytes:
     manager = message.manager
-    if not 1 <= manager <= 255:
+    if manager < 1:
         raise OutOfRangeError("LatheProgress.manager", manager, 1, 255)
-    task = message.task
-    if not 0 <= task <= 65535:
-        raise OutOfRangeError("LatheProgress.task", task, 0, 65535)
     made = message.made
     if not 0 <= made <= 4095:
         raise OutOfRangeError("LatheProgress.made", made, 0, 4095)
-    batch = message.batch
-    if not 0 <= batch <= 4095:
-        raise OutOfRangeError("LatheProgress.batch", batch, 0, 4095)
-    return _BHIX.pack(manager, task, made + batch * 0x1000 + message.lathe_phase * 0x1000000)
+    try:
+        return _PACK_BHBHH(manager, message.task, made & 0xFF, (made >> 8) + message.batch * 0x10, message.lathe_phase)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("LatheProgress.manager", 1, 255),
+            ("LatheProgress.task", 0, 65535),
+            ("LatheProgress.batch", 0, 4095),
+        ) from error
 
 
 def unpack_lathe_progress(sender: int, data: bytes) -> LatheProgress | None:
-    manager, task, word_3 = _BHIX.unpack_from(data)
+    manager, task, word_3 = _UNPACK_BHIX(data)
     if manager < 1:
         return None
     made = word_3 & 0xFFF

@@ -3,9 +3,9 @@
 Written by ``make docs`` from ``dbc/turning.dbc``: change that file, never this one.
 """
 
-from struct import Struct
+import struct
 
-from onboard.contract.base import FrameCode, OutOfRangeError
+from onboard.contract.base import FrameCode, OutOfRangeError, refusal
 from onboard.contract.codes import OrderResult
 from onboard.contract.turning import LatheAction, NcMode
 from onboard.contract.turning_device import JobAnswer, JobEntry, LatheOrder, NcState, ProgramEnd, ProgramText, ToolState
@@ -13,28 +13,35 @@ from onboard.contract.turning_device import JobAnswer, JobEntry, LatheOrder, NcS
 _LATHE_ACTION = tuple(LatheAction)
 _NC_MODE = tuple(NcMode)
 _ORDER_RESULT = tuple(OrderResult)
-_BIXXX = Struct("<BIxxx")
-_HBIB = Struct("<HBIB")
-_HIXX = Struct("<HIxx")
-_IHXX = Struct("<IHxx")
-_Q = Struct("<Q")
+_FROM_0_TO_15_AT_2 = {value: value << 2 for value in range(16)}
+_FROM_0_TO_255_AT_3 = {value: value << 3 for value in range(256)}
+_PACK_BBHHXX = struct.Struct("<BBHHxx").pack
+_PACK_BHBI = struct.Struct("<BHBI").pack
+_PACK_BIXXX = struct.Struct("<BIxxx").pack
+_PACK_HBBBHB = struct.Struct("<HBBBHB").pack
+_PACK_HIXX = struct.Struct("<HIxx").pack
+_UNPACK_BIXXX = struct.Struct("<BIxxx").unpack_from
+_UNPACK_HBIB = struct.Struct("<HBIB").unpack_from
+_UNPACK_HIXX = struct.Struct("<HIxx").unpack_from
+_UNPACK_IHXX = struct.Struct("<IHxx").unpack_from
+_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_program_text(message: ProgramText) -> bytes:
-    program = message.program
-    if not 0 <= program <= 255:
-        raise OutOfRangeError("ProgramText.program", program, 0, 255)
-    index = message.index
-    if not 0 <= index <= 65535:
-        raise OutOfRangeError("ProgramText.index", index, 0, 65535)
     text = message.text
-    if not 0 <= text <= 1099511627775:
-        raise OutOfRangeError("ProgramText.text", text, 0, 1099511627775)
-    return _Q.pack(program + index * 0x100 + text * 0x1000000)
+    try:
+        return _PACK_BHBI(message.program, message.index, text & 0xFF, text >> 8)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("ProgramText.program", 0, 255),
+            ("ProgramText.index", 0, 65535),
+            ("ProgramText.text", 0, 1099511627775),
+        ) from error
 
 
 def unpack_program_text(sender: int, data: bytes) -> ProgramText | None:
-    (word_0,) = _Q.unpack_from(data)
+    (word_0,) = _UNPACK_Q(data)
     program = word_0 & 0xFF
     index = word_0 >> 8 & 0xFFFF
     text = word_0 >> 24
@@ -42,40 +49,34 @@ def unpack_program_text(sender: int, data: bytes) -> ProgramText | None:
 
 
 def pack_program_end(message: ProgramEnd) -> bytes:
-    program = message.program
-    if not 0 <= program <= 255:
-        raise OutOfRangeError("ProgramEnd.program", program, 0, 255)
     length = message.length
-    if not 0 <= length <= 16777215:
-        raise OutOfRangeError("ProgramEnd.length", length, 0, 16777215)
-    crc = message.crc
-    if not 0 <= crc <= 65535:
-        raise OutOfRangeError("ProgramEnd.crc", crc, 0, 65535)
-    return _IHXX.pack(program + length * 0x100, crc)
+    try:
+        return _PACK_BBHHXX(message.program, length & 0xFF, length >> 8, message.crc)
+    except struct.error as error:
+        raise refusal(
+            message, ("ProgramEnd.program", 0, 255), ("ProgramEnd.length", 0, 16777215), ("ProgramEnd.crc", 0, 65535)
+        ) from error
 
 
 def unpack_program_end(sender: int, data: bytes) -> ProgramEnd | None:
-    word_0, crc = _IHXX.unpack_from(data)
+    word_0, crc = _UNPACK_IHXX(data)
     program = word_0 & 0xFF
     length = word_0 >> 8
     return ProgramEnd(sender, program, length, crc)
 
 
 def pack_lathe_order(message: LatheOrder) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("LatheOrder.sequence", sequence, 0, 255)
-    chuck = message.chuck
-    if not 0 <= chuck <= 15:
-        raise OutOfRangeError("LatheOrder.chuck", chuck, 0, 15)
     edges = message.edges
     if not 0 <= edges <= 65535:
         raise OutOfRangeError("LatheOrder.edges", edges, 0, 65535)
-    return _BIXXX.pack(sequence, message.lathe_action + chuck * 0x4 + edges * 0x40)
+    try:
+        return _PACK_BIXXX(message.sequence, message.lathe_action + _FROM_0_TO_15_AT_2[message.chuck] + edges * 0x40)
+    except (KeyError, struct.error) as error:
+        raise refusal(message, ("LatheOrder.sequence", 0, 255), ("LatheOrder.chuck", 0, 15)) from error
 
 
 def unpack_lathe_order(sender: int, data: bytes) -> LatheOrder | None:
-    sequence, word_1 = _BIXXX.unpack_from(data)
+    sequence, word_1 = _UNPACK_BIXXX(data)
     lathe_action = word_1 & 0x3
     if lathe_action > 1:
         return None
@@ -85,20 +86,17 @@ def unpack_lathe_order(sender: int, data: bytes) -> LatheOrder | None:
 
 
 def pack_job_answer(message: JobAnswer) -> bytes:
-    number = message.number
-    if not 0 <= number <= 65535:
-        raise OutOfRangeError("JobAnswer.number", number, 0, 65535)
-    winner = message.winner
-    if not 0 <= winner <= 255:
-        raise OutOfRangeError("JobAnswer.winner", winner, 0, 255)
     total_ct = message.total_ct
     if not 0 <= total_ct <= 1048575:
         raise OutOfRangeError("JobAnswer.total_ct", total_ct, 0, 1048575)
-    return _HIXX.pack(number, message.job_result + winner * 0x8 + total_ct * 0x800)
+    try:
+        return _PACK_HIXX(message.number, message.job_result + _FROM_0_TO_255_AT_3[message.winner] + total_ct * 0x800)
+    except (KeyError, struct.error) as error:
+        raise refusal(message, ("JobAnswer.number", 0, 65535), ("JobAnswer.winner", 0, 255)) from error
 
 
 def unpack_job_answer(sender: int, data: bytes) -> JobAnswer | None:
-    number, word_2 = _HIXX.unpack_from(data)
+    number, word_2 = _UNPACK_HIXX(data)
     job_result = word_2 & 0x7
     if job_result > 3:
         return None
@@ -108,20 +106,17 @@ def unpack_job_answer(sender: int, data: bytes) -> JobAnswer | None:
 
 
 def pack_nc_state(message: NcState) -> bytes:
-    sequence = message.sequence
-    if not 0 <= sequence <= 255:
-        raise OutOfRangeError("NcState.sequence", sequence, 0, 255)
-    program = message.program
-    if not 0 <= program <= 255:
-        raise OutOfRangeError("NcState.program", program, 0, 255)
     parts = message.parts
     if not 0 <= parts <= 65535:
         raise OutOfRangeError("NcState.parts", parts, 0, 65535)
-    return _BIXXX.pack(sequence, message.nc_mode + program * 0x8 + parts * 0x800)
+    try:
+        return _PACK_BIXXX(message.sequence, message.nc_mode + _FROM_0_TO_255_AT_3[message.program] + parts * 0x800)
+    except (KeyError, struct.error) as error:
+        raise refusal(message, ("NcState.sequence", 0, 255), ("NcState.program", 0, 255)) from error
 
 
 def unpack_nc_state(sender: int, data: bytes) -> NcState | None:
-    sequence, word_1 = _BIXXX.unpack_from(data)
+    sequence, word_1 = _UNPACK_BIXXX(data)
     nc_mode = word_1 & 0x7
     if nc_mode > 3:
         return None
@@ -132,45 +127,52 @@ def unpack_nc_state(sender: int, data: bytes) -> NcState | None:
 
 def pack_tool_state(message: ToolState) -> bytes:
     tool = message.tool
-    if not 1 <= tool <= 255:
+    if tool < 1:
         raise OutOfRangeError("ToolState.tool", tool, 1, 255)
-    used_ms = message.used_ms
-    if not 0 <= used_ms <= 4294967295:
-        raise OutOfRangeError("ToolState.used_ms", used_ms, 0, 4294967295)
-    return _BIXXX.pack(tool, used_ms)
+    try:
+        return _PACK_BIXXX(tool, message.used_ms)
+    except struct.error as error:
+        raise refusal(message, ("ToolState.tool", 1, 255), ("ToolState.used_ms", 0, 4294967295)) from error
 
 
 def unpack_tool_state(sender: int, data: bytes) -> ToolState | None:
-    tool, used_ms = _BIXXX.unpack_from(data)
+    tool, used_ms = _UNPACK_BIXXX(data)
     if tool < 1:
         return None
     return ToolState(sender, tool, used_ms)
 
 
 def pack_job_entry(message: JobEntry) -> bytes:
-    number = message.number
-    if not 0 <= number <= 65535:
-        raise OutOfRangeError("JobEntry.number", number, 0, 65535)
-    drawing = message.drawing
-    if not 0 <= drawing <= 255:
-        raise OutOfRangeError("JobEntry.drawing", drawing, 0, 255)
-    material = message.material
-    if not 0 <= material <= 255:
-        raise OutOfRangeError("JobEntry.material", material, 0, 255)
     batch = message.batch
     if not 1 <= batch <= 4095:
         raise OutOfRangeError("JobEntry.batch", batch, 1, 4095)
     bar_mm = message.bar_mm
-    if not 1 <= bar_mm <= 4095:
+    if bar_mm < 1:
         raise OutOfRangeError("JobEntry.bar_mm", bar_mm, 1, 4095)
     face_um = message.face_um
     if not 0 <= face_um <= 25500:
         raise OutOfRangeError("JobEntry.face_um", face_um, 0, 25500)
-    return _HBIB.pack(number, drawing, material + batch * 0x100 + bar_mm * 0x100000, face_um // 100)
+    try:
+        return _PACK_HBBBHB(
+            message.number,
+            message.drawing,
+            message.material,
+            batch & 0xFF,
+            (batch >> 8) + bar_mm * 0x10,
+            face_um // 100,
+        )
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("JobEntry.number", 0, 65535),
+            ("JobEntry.drawing", 0, 255),
+            ("JobEntry.material", 0, 255),
+            ("JobEntry.bar_mm", 1, 4095),
+        ) from error
 
 
 def unpack_job_entry(sender: int, data: bytes) -> JobEntry | None:
-    number, drawing, word_3, face_um = _HBIB.unpack_from(data)
+    number, drawing, word_3, face_um = _UNPACK_HBIB(data)
     material = word_3 & 0xFF
     batch = word_3 >> 8 & 0xFFF
     if batch < 1:

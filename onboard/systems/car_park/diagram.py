@@ -9,11 +9,15 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
 
-from onboard.contract.codes import Grade, LegAction, TokenKind
+from onboard.contract.codes import LegAction, TokenKind
 from onboard.contract.constants import MOBILE_KINDS
-from onboard.contract.messages import BusTime, Itinerary, Leg, Progress, TokenGrant, TokenHeld
+from onboard.contract.messages import Itinerary, Leg
 from onboard.core.serial import ms_after
 from onboard.core.site import Segment, Site
+from onboard.history.history import History
+from onboard.history.places import Place, PlaceTold
+from onboard.history.plans import PlanTold
+from onboard.history.rights import RightTold
 from onboard.trace.chart.over_time import BOTTOM, GAP, LEFT, RIGHT, TOP, WIDTH, name_machines, time_axis
 from onboard.trace.chart.svg import SvgDrawing, colour, dashes
 from onboard.trace.listener import LoggedMessage
@@ -57,7 +61,7 @@ class TrackDiagram:
 
 
 class Watcher:
-    """A fold over the fleet bus: feed every message, then ``finish``."""
+    """A view of a history of its own: feed every message, then ``finish``."""
 
     def __init__(self, site: Site, from_us: int | None = None, until_us: int | None = None) -> None:
         self.picture = TrackDiagram()
@@ -66,7 +70,7 @@ class Watcher:
         self._open: dict[int, tuple[int, list[TrackPoint]]] = {}
         self._plans: dict[int, tuple[int, Itinerary]] = {}
         self._held: dict[Segment, tuple[int, int]] = {}
-        self._offset_us = 0
+        self._history = History(site)
         self._started = False
 
     def feed(self, logged: LoggedMessage) -> None:
@@ -77,18 +81,16 @@ class Watcher:
             self._started = True
             self.picture.first_us = logged.time_us if self._from_us is None else self._from_us
         self.picture.last_us = max(self.picture.last_us, logged.time_us)
-        match logged.message:
-            case BusTime():
-                self._offset_us = logged.time_us - logged.message.bus_time_us
-            case Progress():
-                self._on_progress(logged.message, logged.time_us)
-            case Itinerary() if logged.message.grade is Grade.FIRM:
-                self._end_plan(logged.message.sender, logged.time_us)
-                self._plans[logged.message.sender] = logged.time_us, logged.message
-            case TokenHeld() if logged.message.token_kind is TokenKind.SEGMENT:
-                self._hold(logged.message.token, logged.message.sender, logged.time_us)
-            case TokenGrant() if logged.message.token_kind is TokenKind.SEGMENT:
-                self._let_go(_segment(logged.message.token), logged.time_us, of=logged.message.sender)
+        match self._history.feed(logged.message, logged.time_us):
+            case PlaceTold(node=node, place=place):
+                self._on_place(node, place, logged.time_us)
+            case PlanTold(plan=plan) as told if told.is_firm:
+                self._end_plan(plan.sender, logged.time_us)
+                self._plans[plan.sender] = logged.time_us, plan
+            case RightTold(kind=TokenKind.SEGMENT) as told if told.giver:
+                self._let_go(_segment(told.number), logged.time_us, of=told.giver)
+            case RightTold(kind=TokenKind.SEGMENT) as told:
+                self._hold(told.number, told.holder, logged.time_us)
 
     def finish(self) -> TrackDiagram:
         """The log is over: what is still going on ends with it."""
@@ -105,22 +107,23 @@ class Watcher:
         self.picture.authority = [band for band in self.picture.authority if band.end_us > first_us]
         return self.picture
 
-    def _on_progress(self, progress: Progress, time_us: int) -> None:
-        track = way_site(self._site).tracks.get(progress.track)
+    def _on_place(self, node: int, at: Place, time_us: int) -> None:
+        segment = at.segment
+        track = way_site(self._site).tracks.get(segment.track)
         if track is None:
             return
-        place = progress.index - 1 + progress.offset_mm / track.pitch_mm
+        place = segment.index - 1 + at.offset_mm / track.pitch_mm
         if not -_BEYOND <= place <= track.length - 1 + _BEYOND:
             # On the way through a lift in line, told by the track that it left.
             return
-        point = TrackPoint(time_us, place, progress.speed_mm_s)
-        run = self._open.get(progress.sender)
-        if run is not None and run[0] == progress.track:
+        point = TrackPoint(time_us, place, at.speed_mm_s)
+        run = self._open.get(node)
+        if run is not None and run[0] == segment.track:
             run[1].append(point)
             return
         if run is not None:
-            self.picture.runs.append((progress.sender, *run))
-        self._open[progress.sender] = progress.track, [point]
+            self.picture.runs.append((node, *run))
+        self._open[node] = segment.track, [point]
 
     def _end_plan(self, node: int, end_us: int) -> None:
         """Bands of a plan as long as it stood."""
@@ -154,7 +157,7 @@ class Watcher:
         self.picture.authority.append(Band(node, segment.track, since_us, time_us, around, around))
 
     def _moment_us(self, bus_ms: int, near_us: int) -> int:
-        return near_us + 1000 * ms_after(bus_ms, (near_us - self._offset_us) // 1000)
+        return near_us + 1000 * ms_after(bus_ms, (near_us - (self._history.clock.offset_us or 0)) // 1000)
 
 
 def _segment(token: int) -> Segment:

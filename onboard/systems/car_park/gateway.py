@@ -8,11 +8,14 @@ from typing import Any
 
 from onboard.contract.codes import Operation, OperatorAction
 from onboard.contract.constants import ANY_STATION, OUTSIDE
-from onboard.contract.messages import CallForProposals, CarAt, Message, OperatorOrder, Reference
+from onboard.contract.messages import OperatorOrder, Reference
 from onboard.gateway.bus_orders import BusOrders, NoBusOrders, OrderMessages, RefusedError, refuse_load
 from onboard.gateway.dialect import Json
 from onboard.gateway.edge import PhysicalLimits, SystemEdge
 from onboard.gateway.order import GatewayOrder, OrderRequest
+from onboard.history.calls import CallOpened, CallRepeated
+from onboard.history.history import Fact
+from onboard.history.loads import LoadTold
 from onboard.systems.car_park.site import CarPark
 from onboard.trace.view import SiteView
 from onboard.ways.site import WaySite, way_site
@@ -54,28 +57,32 @@ class CarParkOrders(NoBusOrders):
             return OrderMessages(
                 (OperatorOrder(sender, request.node, OperatorAction.PRESS_KEY, Reference(0, 0)),), KEY_PATIENCE_US
             )
-        if request.car not in self._view.cars:
+        if request.car not in self._view.history.loads.stations:
             raise RefusedError("UNKNOWN_TICKET", "no such car is in the park", "$.car")
         action = OperatorAction.URGENT_TICKET if request.urgent else OperatorAction.INSERT_TICKET
         return OrderMessages((OperatorOrder(sender, request.node, action, request.car),), TICKET_AGAIN_US)
 
-    def task_of(self, order: GatewayOrder, message: Message) -> Reference | None:
+    def task_of(self, order: GatewayOrder, fact: Fact | None) -> Reference | None:
         """The compartment's call for the car, or its next call to park."""
-        if not isinstance(message, CallForProposals) or message.sender != order.request.node or message.depth:
+        if not isinstance(fact, CallOpened | CallRepeated):
+            return None
+        call = fact.call.terms
+        if call.sender != order.request.node or call.depth:
             return None
         if order.request.car is None:
-            return message.task if message.operation is Operation.PARK and order.was_said else None
-        is_it = message.operation is Operation.RETRIEVE and message.car == order.request.car
-        return message.task if is_it else None
+            return call.task if call.operation is Operation.PARK and order.was_said else None
+        is_it = call.operation is Operation.RETRIEVE and call.car == order.request.car
+        return call.task if is_it else None
 
-    def is_done(self, order: GatewayOrder, message: Message) -> bool:
+    def is_done(self, order: GatewayOrder, fact: Fact | None) -> bool:
         """The car has left; or it stands in a place, and its parking was the task, which has the car's own name."""
-        if not isinstance(message, CarAt) or order.task is None:
+        if not isinstance(fact, LoadTold) or order.task is None:
             return False
+        word = fact.word
         if order.request.car is not None:
-            return message.car == order.request.car and message.station == OUTSIDE
+            return word.car == order.request.car and word.station == OUTSIDE
         bays = {station.number for station in way_site(self._site).compartments.values()}
-        return message.car == order.task and message.station not in (*bays, ANY_STATION, OUTSIDE)
+        return word.car == order.task and word.station not in (*bays, ANY_STATION, OUTSIDE)
 
     def _desk(self, name: str, path: str) -> int:
         if name not in self._desks:
@@ -83,7 +90,7 @@ class CarParkOrders(NoBusOrders):
         return self._desks[name]
 
     def _standing(self, place: str) -> Reference:
-        for number, car in self._view.places_taken().items():
+        for number, car in self._view.history.loads.standing().items():
             if self._place(number) == place:
                 return car
         raise RefusedError("UNKNOWN_TICKET", "no car is known to stand there", "$.from")

@@ -7,8 +7,9 @@ by floor from above, to scale, as ``_building`` arranges it.
 from typing import Any
 
 from onboard.contract.codes import KindCode, LegAction, TokenKind
-from onboard.contract.messages import BayState, DoorState, Message, Progress, ShuttleState
+from onboard.contract.messages import BayState, DoorState, Message, ShuttleState
 from onboard.core.site import Segment
+from onboard.history.history import Fact
 from onboard.systems.car_park.outlines import Outlines, is_elevation
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.trace.scene.scene import Json
@@ -17,24 +18,20 @@ from onboard.ways.site import TrackKind, WaySite
 
 
 class CarParkScene:
-    """Fed beside ``view``, which knows where machines and cars are."""
+    """A view of the history of ``view``, and of the device buses that are heard."""
 
     def __init__(self, site: WaySite, view: SiteView) -> None:
         self.site = site
         self.view = view
         self.words = view.words
+        self._history = view.history
         self._clock = view.history.clock
-        self._rights = view.history.rights
         self._doors: dict[int, dict[str, str]] = {}
         self._bays: dict[int, dict[str, Any]] = {}
         self._shuttles: dict[int, dict[str, Any]] = {}
-        self._speeds: dict[int, tuple[int, int]] = {}
 
-    def feed(self, message: Message, time_us: int) -> None:
-        """Follow rights, plans, cars and calls for the elevation."""
-        match message:
-            case Progress():
-                self._speeds[message.sender] = (message.speed_mm_s, time_us)
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
+        """The history tells all of it."""
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:
         """Follow doors, desks and drives, where their buses are heard."""
@@ -79,23 +76,21 @@ class CarParkScene:
     def marks(self, now_us: int) -> Json:
         """Cars by the station where they stand, and segments that somebody says nobody can pass."""
         return {
-            "cars": {station: self.words.load(car) for station, car in self.view.places_taken().items()},
-            "blocked": [[*segment] for segment in sorted(self.view.blocked)],
+            "cars": {station: self.words.load(car) for station, car in self._history.loads.standing().items()},
+            "blocked": [[*segment] for segment in sorted(self._history.orders.blocked)],
         }
 
     def machine(self, node: int, now_us: int) -> Json:
         """Segment, offset in mm, speed and car of one machine at ``now_us``."""
-        view = self.view
-        segment, offset_mm = view.positions[node]
-        speed_mm_s, since_us = self._speeds.get(node, (0, 0))
-        aboard = view.aboard.get(node)
+        place = self._history.places.by_node[node]
+        aboard = self._history.loads.aboard.get(node)
         told: Json = {
-            "track": segment.track,
-            "index": segment.index,
-            "offset_mm": offset_mm,
-            "speed_mm_s": speed_mm_s,
-            "since_us": since_us,
-            "where": self._where(segment),
+            "track": place.segment.track,
+            "index": place.segment.index,
+            "offset_mm": place.offset_mm,
+            "speed_mm_s": place.speed_mm_s,
+            "since_us": place.told_us or 0,
+            "where": self._where(place.segment),
             "car": self.words.load(aboard) if aboard is not None else None,
             "plan": self._plan(node, now_us),
             "holds": self._held(node),
@@ -114,7 +109,7 @@ class CarParkScene:
 
     def _plan(self, node: int, now_us: int) -> list[list[int]]:
         """What is left of a firm itinerary: [track, from, to, begin us, end us, is a ride or work] a leg."""
-        plan = self.view.itineraries.get(node)
+        plan = self._history.plans.firm.get(node)
         if plan is None:
             return []
         legs, begin_us = [], self._clock.log_us(plan.stamp.award_ms, now_us)
@@ -130,7 +125,7 @@ class CarParkScene:
     def _held(self, node: int) -> list[list[int]]:
         if self.site.machines[node].kind is not KindCode.ROBOT:
             return []
-        return [[number >> 8, number & 0xFF] for number in self._rights.held_by(node, TokenKind.SEGMENT)]
+        return [[number >> 8, number & 0xFF] for number in self._history.rights.held_by(node, TokenKind.SEGMENT)]
 
 
 #: Room between two floors of the picture, mm, with a floor's name in it.

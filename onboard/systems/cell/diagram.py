@@ -1,7 +1,9 @@
 """A cell over time: a row an arm, bars for what it does, and a line for each part that goes from arm to arm."""
 
-from onboard.contract.cell import ArmPhase, ArmProgress, PartAt
+from onboard.contract.cell import ArmPhase, PartAt
 from onboard.contract.messages import Message, Reference
+from onboard.history.history import Fact
+from onboard.systems.cell.history import ArmTold, PartTold
 from onboard.systems.cell.site import Cell
 from onboard.trace.chart.over_time import Bar, Panel, PanelLine, Rows
 
@@ -30,13 +32,13 @@ class CellDiagram(Rows):
         self._carried: dict[int, Reference] = {}
         self._parts: dict[Reference, list[tuple[int, float]]] = {}
 
-    def take(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Arms tell their phases; who has a part in its keeping tells where it is."""
-        match message:
-            case ArmProgress() if message.sender in self._rows:
-                self._on_phase(message.sender, message.arm_phase, time_us)
-            case PartAt() if message.sender in self._rows:
-                self._on_part(message, time_us)
+        match fact:
+            case ArmTold(word=word) if word.sender in self._rows:
+                self._on_phase(word.sender, word.arm_phase, time_us)
+            case PartTold(word=at) if at.sender in self._rows:
+                self._on_part(at, time_us)
 
     def _on_phase(self, node: int, phase: ArmPhase, time_us: int) -> None:
         known, since_us = self._phases.get(node, (ArmPhase.IDLE, time_us))

@@ -27,7 +27,7 @@ from onboard.systems.cell.memory import Undertaking, lost_record, stage_record, 
 from onboard.systems.cell.motion import ArmDriver
 from onboard.systems.cell.records import ContractStage
 from onboard.systems.cell.site import Cell
-from onboard.systems.cell.steps import TABLE, Deed, Finding
+from onboard.systems.cell.steps import TABLE, ArmDeed, ArmFinding
 from onboard.work.device_link import DeviceLink
 from onboard.work.undertaking import TaskEvent, Undertakings
 
@@ -390,54 +390,54 @@ class ArmRobot:
             ready, key=lambda one: (one.stage is not ContractStage.TAKEN, one.contract.goal.urgency), default=None
         )
 
-    def _found(self, one: Undertaking | None) -> Finding:
+    def _found(self, one: Undertaking | None) -> ArmFinding:
         """What contracts, tokens and the devices' last words come to for ``one``, in hand or to be chosen."""
         if one is None:
-            return Finding.NO_RIGHT if self.tasks.in_hand else Finding.NOTHING
+            return ArmFinding.NO_RIGHT if self.tasks.in_hand else ArmFinding.NOTHING
         if self.active is None:
-            return Finding.HALF_TAKEN if one.stage is ContractStage.TAKEN else Finding.MAY_TAKE
+            return ArmFinding.HALF_TAKEN if one.stage is ContractStage.TAKEN else ArmFinding.MAY_TAKE
         if self.phase is ArmPhase.TAKING:
             return self._found_taking(one)
         if self.phase is ArmPhase.PUTTING:
             assert self.grip is not None
-            return Finding.GRIPPED if self.grip.grip_mode is GripMode.OPEN else Finding.THERE
+            return ArmFinding.GRIPPED if self.grip.grip_mode is GripMode.OPEN else ArmFinding.THERE
         goal = one.contract.goal.start if self.phase is ArmPhase.TO_PART else one.contract.move.via
-        return Finding.THERE if self.driver.stands_at(goal) else Finding.ELSEWHERE
+        return ArmFinding.THERE if self.driver.stands_at(goal) else ArmFinding.ELSEWHERE
 
-    def _found_taking(self, one: Undertaking) -> Finding:
+    def _found_taking(self, one: Undertaking) -> ArmFinding:
         """Also after a restart in which the part was put down, and that not yet journalled."""
         assert self.grip is not None
         mode = self.grip.grip_mode
         if mode is GripMode.HOLDING and self.grip.part == one.contract.goal.part:
-            return Finding.GRIPPED
+            return ArmFinding.GRIPPED
         if mode is GripMode.BUSY:
-            return Finding.GRIPPING
+            return ArmFinding.GRIPPING
         if mode is GripMode.OPEN and self.gripper.wanted is None and self.driver.stands_at(one.contract.move.via):
-            return Finding.LIES
-        return Finding.THERE if self.driver.stands_at(one.contract.goal.start) else Finding.ELSEWHERE
+            return ArmFinding.LIES
+        return ArmFinding.THERE if self.driver.stands_at(one.contract.goal.start) else ArmFinding.ELSEWHERE
 
-    def _do(self, deed: Deed, one: Undertaking | None, now_us: int) -> list[Effect]:
-        if one is None or deed is Deed.WAIT:
+    def _do(self, deed: ArmDeed, one: Undertaking | None, now_us: int) -> list[Effect]:
+        if one is None or deed is ArmDeed.WAIT:
             self.gripper.pause()
             return []
         goal, via = one.contract.goal, one.contract.move.via
         match deed:
-            case Deed.CHOOSE:
+            case ArmDeed.CHOOSE:
                 self.active = one.task
-            case Deed.TO_START | Deed.TO_END:
-                return self.driver.go(goal.start if deed is Deed.TO_START else via, part_token(goal.part), now_us)
-            case Deed.BEGIN:
+            case ArmDeed.TO_START | ArmDeed.TO_END:
+                return self.driver.go(goal.start if deed is ArmDeed.TO_START else via, part_token(goal.part), now_us)
+            case ArmDeed.BEGIN:
                 one.stage = ContractStage.TAKEN
                 self._engage()
                 return [*self.driver.rest(), stage_record(one)]
-            case Deed.TAKE | Deed.PUT:
-                return self._order(GripAction.TAKE if deed is Deed.TAKE else GripAction.PUT, goal.part, now_us)
-            case Deed.LIFTED:
+            case ArmDeed.TAKE | ArmDeed.PUT:
+                return self._order(GripAction.TAKE if deed is ArmDeed.TAKE else GripAction.PUT, goal.part, now_us)
+            case ArmDeed.LIFTED:
                 self.gripper.rest()
                 return [self._part_at(one)]
-            case Deed.REST:
+            case ArmDeed.REST:
                 return self.driver.rest()
-            case Deed.PUT_DOWN:
+            case ArmDeed.PUT_DOWN:
                 return self._put(one, now_us)
         return []
 

@@ -1,22 +1,19 @@
 """The cell's plan: working areas, obstacles, robots and parts, contracts as the ways that their winners will go."""
 
-from collections import OrderedDict
 from dataclasses import dataclass
-from typing import TypeVar
 
-from onboard.contract.cell import ArmPhase, ArmProgress, GoalEnd, GoalStart, MoveFrom, MoveTo, PartAt
+from onboard.contract.cell import ArmPhase, ArmProgress
 from onboard.contract.codes import TaskPhase
-from onboard.contract.messages import Message, Reference, TaskReport
+from onboard.contract.messages import Message, Reference
+from onboard.history.history import Fact
+from onboard.history.tasks import TaskTold
+from onboard.systems.cell.history import ArmTold, MoveTold, PartTold, cell_history
 from onboard.systems.cell.site import Area, Cell
 from onboard.trace.scene.scene import Json, Spot, shape, still
 from onboard.trace.view import SiteView
 
 #: Plan units across the cell, and around it.
 WIDTH, MARGIN = 1000.0, 20.0
-#: Goals and parts that are remembered: the newest.
-MOST_KEPT = 256
-_Key = TypeVar("_Key")
-_Value = TypeVar("_Value")
 _MOVING = (ArmPhase.TO_PART, ArmPhase.CARRYING)
 
 
@@ -44,11 +41,9 @@ class CellScene:
         self._scale = (WIDTH - 2 * MARGIN) / max(1, span_mm)
         self._height = 2 * MARGIN + (self._y1 - min(one.y0_mm for one in areas)) * self._scale
         self._robots = {node: _SeenArm((float(arm.home.x_mm), float(arm.home.y_mm))) for node, arm in site.arms.items()}
-        self._starts: OrderedDict[tuple[int, int], Spot] = OrderedDict()
-        self._ends: OrderedDict[tuple[int, int], Spot] = OrderedDict()
+        self._seen = cell_history(view.history)
         #: What each robot has undertaken: from where, and to where it brings the part, by goal.
         self._moves: dict[int, dict[tuple[int, int], tuple[Spot, Spot | None]]] = {}
-        self._parts: OrderedDict[Reference, tuple[Spot, int]] = OrderedDict()
 
     def _spot(self, at: Spot) -> Spot:
         return MARGIN + (at[0] - self._x0) * self._scale, MARGIN + (self._y1 - at[1]) * self._scale
@@ -64,31 +59,26 @@ class CellScene:
         ]
         return {"plan": {"width": WIDTH, "height": self._height, "shapes": shapes}}
 
-    def feed(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Follow arms, goals and parts for the plan."""
-        match message:
-            case ArmProgress() if message.sender in self._robots:
-                self._on_progress(message, time_us)
-            case GoalStart():
-                _keep(self._starts, (message.sender, message.goal), (message.x_mm, message.y_mm))
-            case GoalEnd():
-                _keep(self._ends, (message.sender, message.goal), (message.x_mm, message.y_mm))
-            case PartAt():
-                carrier = message.sender if message.aboard else 0
-                known = self._parts.get(message.part)
-                if known is None or known[1] != carrier:
-                    words = "has taken up" if carrier else "has put down" if known is not None else "has"
-                    self.view.say(time_us, f"{self.view.name(message.sender)} {words} {self.words.thing(message.part)}")
-                _keep(self._parts, message.part, ((message.x_mm, message.y_mm), carrier))
-            case MoveFrom():
-                moves = self._moves.setdefault(message.sender, {})
-                moves[message.manager, message.goal] = ((message.x_mm, message.y_mm), None)
-            case MoveTo():
-                moves = self._moves.setdefault(message.sender, {})
-                key = (message.manager, message.goal)
-                moves[key] = (moves.get(key, ((message.x_mm, message.y_mm), None))[0], (message.x_mm, message.y_mm))
-            case TaskReport() if message.phase in (TaskPhase.DONE, TaskPhase.REFUSED, TaskPhase.FORFEITED):
-                self._moves.get(message.sender, {}).pop((message.task.origin, message.task.number), None)
+        match fact:
+            case ArmTold(word=word) if word.sender in self._robots:
+                self._on_progress(word, time_us)
+            case PartTold(word=at, is_news=True):
+                words = "has taken up" if at.aboard else "has" if fact.is_first else "has put down"
+                self.view.say(time_us, f"{self.view.name(at.sender)} {words} {self.words.thing(at.part)}")
+            case MoveTold():
+                self._on_move(fact)
+            case TaskTold(report=report) if report.phase in (TaskPhase.DONE, TaskPhase.REFUSED, TaskPhase.FORFEITED):
+                self._moves.get(report.sender, {}).pop((report.task.origin, report.task.number), None)
+
+    def _on_move(self, told: MoveTold) -> None:
+        """From where comes first; where it was not heard, the part is drawn where it comes to."""
+        moves, key = self._moves.setdefault(told.robot, {}), (told.manager, told.goal)
+        if told.start is not None:
+            moves[key] = told.start, None
+        elif told.end is not None:
+            moves[key] = moves.get(key, (told.end, None))[0], told.end
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:
         """The fleet bus tells all that is drawn."""
@@ -118,11 +108,11 @@ class CellScene:
         robot = self._robots.get(node)
         if robot is None:
             return {"where": "", "car": None}
-        carried = next((part for part, (_, carrier) in self._parts.items() if carrier == node), None)
+        carried = next((part for part, (_, carrier) in self._seen.parts.items() if carrier == node), None)
         doing = robot.phase.name.lower().replace("_", " ")
         told, ahead = [], []
         for (manager, goal), (start, end) in self._moves.get(node, {}).items():
-            begin = self._starts.get((manager, goal), start)
+            begin = self._seen.starts.get((manager, goal), start)
             if end is not None:
                 ahead += [list(self._whole(begin)), list(self._whole(end))]
                 told.append([None, f"carries from {_metres(begin)} to {_metres(end)} for {self.view.name(manager)}"])
@@ -138,10 +128,10 @@ class CellScene:
     def marks(self, now_us: int) -> Json:
         """Parts where they lie, and where those goals end that are no sub-goals."""
         things: list[Json] = []
-        for part, (at, carrier) in self._parts.items():
+        for part, (at, carrier) in self._seen.parts.items():
             if not carrier:
                 things.append({"kind": "part", "name": str(part.number), "at": list(self._whole(at))})
-        for (manager, goal), end in self._ends.items():
+        for (manager, goal), end in self._seen.ends.items():
             task = self.view.tasks.get(Reference(manager, goal))
             if (
                 manager in self.site.desks
@@ -150,14 +140,6 @@ class CellScene:
             ):
                 things.append({"kind": "goal", "name": str(goal), "at": list(self._whole(end))})
         return {"marks": {}, "things": things}
-
-
-def _keep(kept: OrderedDict[_Key, _Value], key: _Key, value: _Value) -> None:
-    """The newest at the end; the oldest goes when there are too many."""
-    kept[key] = value
-    kept.move_to_end(key)
-    if len(kept) > MOST_KEPT:
-        kept.popitem(last=False)
 
 
 def _metres(at: Spot) -> str:

@@ -5,7 +5,7 @@ from enum import Enum
 from onboard.contract.cell import ArmPhase
 
 
-class Finding(Enum):
+class ArmFinding(Enum):
     """What contracts, tokens and the last words of drive and gripper come to, for the phase in which the robot is."""
 
     NOTHING = "no part is in hand, and no contract either"
@@ -19,7 +19,7 @@ class Finding(Enum):
     LIES = "the gripper is open where the part is to lie, and has no order: it was put down before a restart"
 
 
-class Deed(Enum):
+class ArmDeed(Enum):
     """What the robot does about what it found, once in each round: the table of steps chooses it."""
 
     WAIT = "nothing"
@@ -38,21 +38,21 @@ class Deed(Enum):
 CHOOSING = (ArmPhase.IDLE, ArmPhase.WAITING, ArmPhase.TAKING, ArmPhase.PUTTING)
 
 #: (phase, finding) -> (phase that follows, deed).
-TABLE: dict[tuple[ArmPhase, Finding], tuple[ArmPhase, Deed]] = {
-    **{(phase, Finding.NOTHING): (ArmPhase.IDLE, Deed.WAIT) for phase in CHOOSING},
-    **{(phase, Finding.NO_RIGHT): (ArmPhase.WAITING, Deed.WAIT) for phase in CHOOSING},
-    **{(phase, Finding.MAY_TAKE): (ArmPhase.TO_PART, Deed.CHOOSE) for phase in CHOOSING},
-    **{(phase, Finding.HALF_TAKEN): (ArmPhase.TAKING, Deed.CHOOSE) for phase in CHOOSING},
-    (ArmPhase.TO_PART, Finding.ELSEWHERE): (ArmPhase.TO_PART, Deed.TO_START),
+TABLE: dict[tuple[ArmPhase, ArmFinding], tuple[ArmPhase, ArmDeed]] = {
+    **{(phase, ArmFinding.NOTHING): (ArmPhase.IDLE, ArmDeed.WAIT) for phase in CHOOSING},
+    **{(phase, ArmFinding.NO_RIGHT): (ArmPhase.WAITING, ArmDeed.WAIT) for phase in CHOOSING},
+    **{(phase, ArmFinding.MAY_TAKE): (ArmPhase.TO_PART, ArmDeed.CHOOSE) for phase in CHOOSING},
+    **{(phase, ArmFinding.HALF_TAKEN): (ArmPhase.TAKING, ArmDeed.CHOOSE) for phase in CHOOSING},
+    (ArmPhase.TO_PART, ArmFinding.ELSEWHERE): (ArmPhase.TO_PART, ArmDeed.TO_START),
     # What is journalled first tells whoever starts again to look into the gripper.
-    (ArmPhase.TO_PART, Finding.THERE): (ArmPhase.TAKING, Deed.BEGIN),
-    (ArmPhase.TAKING, Finding.ELSEWHERE): (ArmPhase.TAKING, Deed.TO_START),
-    (ArmPhase.TAKING, Finding.THERE): (ArmPhase.TAKING, Deed.TAKE),
-    (ArmPhase.TAKING, Finding.GRIPPING): (ArmPhase.TAKING, Deed.WAIT),
-    (ArmPhase.TAKING, Finding.GRIPPED): (ArmPhase.CARRYING, Deed.LIFTED),
-    (ArmPhase.TAKING, Finding.LIES): (ArmPhase.TAKING, Deed.PUT_DOWN),
-    (ArmPhase.CARRYING, Finding.ELSEWHERE): (ArmPhase.CARRYING, Deed.TO_END),
-    (ArmPhase.CARRYING, Finding.THERE): (ArmPhase.PUTTING, Deed.REST),
-    (ArmPhase.PUTTING, Finding.THERE): (ArmPhase.PUTTING, Deed.PUT),
-    (ArmPhase.PUTTING, Finding.GRIPPED): (ArmPhase.PUTTING, Deed.PUT_DOWN),
+    (ArmPhase.TO_PART, ArmFinding.THERE): (ArmPhase.TAKING, ArmDeed.BEGIN),
+    (ArmPhase.TAKING, ArmFinding.ELSEWHERE): (ArmPhase.TAKING, ArmDeed.TO_START),
+    (ArmPhase.TAKING, ArmFinding.THERE): (ArmPhase.TAKING, ArmDeed.TAKE),
+    (ArmPhase.TAKING, ArmFinding.GRIPPING): (ArmPhase.TAKING, ArmDeed.WAIT),
+    (ArmPhase.TAKING, ArmFinding.GRIPPED): (ArmPhase.CARRYING, ArmDeed.LIFTED),
+    (ArmPhase.TAKING, ArmFinding.LIES): (ArmPhase.TAKING, ArmDeed.PUT_DOWN),
+    (ArmPhase.CARRYING, ArmFinding.ELSEWHERE): (ArmPhase.CARRYING, ArmDeed.TO_END),
+    (ArmPhase.CARRYING, ArmFinding.THERE): (ArmPhase.PUTTING, ArmDeed.REST),
+    (ArmPhase.PUTTING, ArmFinding.THERE): (ArmPhase.PUTTING, ArmDeed.PUT),
+    (ArmPhase.PUTTING, ArmFinding.GRIPPED): (ArmPhase.PUTTING, ArmDeed.PUT_DOWN),
 }

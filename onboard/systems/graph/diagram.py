@@ -2,6 +2,8 @@
 
 from onboard.contract.graph import RobotAt, RobotMode
 from onboard.contract.messages import Message
+from onboard.history.history import Fact
+from onboard.systems.graph.history import RobotTold
 from onboard.systems.graph.site import FactoryGraph
 from onboard.systems.graph.words import node_name
 from onboard.trace.chart.over_time import Bar, Panel, PanelLine, Rows, by_distance
@@ -24,10 +26,10 @@ class GraphDiagram(Rows):
         self._leaving: dict[int, tuple[int, RobotAt]] = {}
         self._loading: dict[int, tuple[int, int]] = {}
 
-    def take(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """A robot's word of the node where it is becomes a point of its line."""
-        if isinstance(message, RobotAt) and message.sender in self._lines and message.node in self._rows:
-            self._on_robot(message, time_us)
+        if isinstance(fact, RobotTold) and fact.word.node in self._rows:
+            self._on_robot(fact.word, time_us)
 
     def _on_robot(self, at: RobotAt, time_us: int) -> None:
         points, left = self._lines[at.sender].points, self._leaving.pop(at.sender, None)

@@ -4,13 +4,15 @@ from collections.abc import Callable
 from typing import Any
 
 from onboard.contract.codes import KindCode
-from onboard.contract.graph import RobotAt, VisitList
+from onboard.contract.graph import VisitList
 from onboard.contract.messages import Message
 from onboard.gateway.bus_orders import BusOrders, NoBusOrders, OrderMessages, RefusedError, refuse_load
 from onboard.gateway.edge import PhysicalLimits, SystemEdge
 from onboard.gateway.order import GatewayOrder, OrderRequest
 from onboard.gateway.positions import MachinePosition, Tracker
+from onboard.history.history import Fact, History
 from onboard.systems.graph.fields import NO_NODE, five
+from onboard.systems.graph.history import RobotTold, graph_history
 from onboard.systems.graph.site import MAX_STOPS, FactoryGraph
 from onboard.trace.view import SiteView
 
@@ -85,27 +87,25 @@ class GraphOrders(NoBusOrders):
 class GraphTracker:
     """Robots of a factory graph: nodes by number, no coordinates."""
 
-    def __init__(self, site: FactoryGraph) -> None:
-        self._at = {node: MachinePosition(str(machine.home.track)) for node, machine in site.robots.items()}
+    def __init__(self, history: History) -> None:
+        self._seen = graph_history(history)
 
-    def feed(self, message: Message) -> bool:
+    def take(self, message: Message, fact: Fact | None) -> bool:
         """Robots say where they are and where they go."""
-        if not isinstance(message, RobotAt) or message.sender not in self._at:
-            return False
-        old = self._at[message.sender]
-        node = str(message.behind if message.on_edge else message.node)
-        first = (message.node,) if message.on_edge else ()
-        coming = (*first, message.ahead1, message.ahead2, message.ahead3, message.goal)
-        ahead: list[str] = []
-        for one in coming:
-            if one != NO_NODE and str(one) != (ahead[-1] if ahead else node):
-                ahead.append(str(one))
-        self._at[message.sender] = MachinePosition(node, tuple(ahead), old.passed + (node != old.node), message.on_edge)
-        return True
+        return isinstance(fact, RobotTold)
 
     def where(self, node_id: int) -> MachinePosition:
         """The node where the robot is, or that it left last."""
-        return self._at[node_id]
+        node, passed = str(self._seen.node_of(node_id)), self._seen.passed[node_id]
+        at = self._seen.robots.get(node_id)
+        if at is None:
+            return MachinePosition(node)
+        first = (at.node,) if at.on_edge else ()
+        ahead: list[str] = []
+        for one in (*first, at.ahead1, at.ahead2, at.ahead3, at.goal):
+            if one != NO_NODE and str(one) != (ahead[-1] if ahead else node):
+                ahead.append(str(one))
+        return MachinePosition(node, tuple(ahead), passed, at.on_edge)
 
 
 class GraphEdge(SystemEdge):
@@ -121,9 +121,9 @@ class GraphEdge(SystemEdge):
         """Orders from outside become lists of visits."""
         return GraphOrders(self._graph)
 
-    def tracker(self) -> Tracker:
+    def tracker(self, history: History) -> Tracker:
         """By what robots say of their place."""
-        return GraphTracker(self._graph)
+        return GraphTracker(history)
 
     def place(self, number: int) -> str | None:
         """A node, which orders name by its number alone."""

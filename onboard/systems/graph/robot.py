@@ -33,6 +33,7 @@ from onboard.systems.graph.planning import Position, RobotPlanning, told_way
 from onboard.systems.graph.rights import edge_token, keeper, slot_token
 from onboard.systems.graph.rules import Rules
 from onboard.systems.graph.site import FactoryGraph
+from onboard.systems.graph.steps import LOAD_TABLE, NODE_TABLE, Approach, NodeDeed, NodeEvent, Stay, StayDeed
 from onboard.work.device_link import DeviceLink
 from onboard.work.manual import Manual
 from onboard.work.undertaking import TaskEvent, TaskStanding, Undertakings
@@ -86,15 +87,13 @@ class GraphRobot:
     tasks: Undertakings[Errand] = field(init=False)
     #: Whether a host of node agents tells another site: then my map is wrong or old, and I stay where I am (row G27).
     has_other_map: bool = False
-    #: Waits at nodes that ended in STOP, for the indicators.
-    stops_told: int = 0
-    sent_elsewhere: int = 0
     manual: Manual = field(init=False)
+    approach: Approach = Approach.AWAY
+    #: What was granted, in GRANTED only.
     _grant: _Grant | None = None
-    _answer: NodeVerdict | None = None
+    #: Node and edge that were told last, and when they are told again at the earliest.
     _signal: tuple[int, int] | None = None
     _signal_at_us: int | None = None
-    _sensed: bool = False
     _loaded_at_us: int | None = None
     _told_at_us: int | None = None
     _told: RobotAt | None = None
@@ -136,7 +135,7 @@ class GraphRobot:
             return MachineState.STARTING
         if self.has_other_map or self.manual.at_rest:
             return MachineState.OBSTACLE
-        if self._answer is NodeVerdict.STOP:
+        if self.approach is Approach.STOPPED:
             return MachineState.WAITING
         return MachineState.WORKING if self.planning.errands else MachineState.IDLE
 
@@ -157,15 +156,14 @@ class GraphRobot:
             case BodyState():
                 if self.body is None:
                     self.drive.go_on_from(message.sequence)
-                if self.body is None or self.body.node != message.node:
-                    self._sensed = message.body_place is not BodyPlace.ON_EDGE
-                    self._signal = self._answer = None
-                    self._grant = None
-                self._sensed |= message.body_place is not BodyPlace.ON_EDGE
+                if self.body is not None and self.body.node != message.node:
+                    self._meet(NodeEvent.PASSED)
+                if message.body_place is not BodyPlace.ON_EDGE:
+                    self._meet(NodeEvent.MET)
                 self.body = message
                 self._locate()
             case ApproachSensor() if self.body is not None and message.node == self.body.node:
-                self._sensed = True
+                self._meet(NodeEvent.MET)
         return []
 
     def _is_somewhere(self, body: BodyState) -> bool:
@@ -273,18 +271,35 @@ class GraphRobot:
     def _load(self, now_us: int) -> list[Effect]:
         """Load where the next stop is, for the site's time; then go on, or be free (row G13)."""
         assert self.body is not None
+        self.mode, deed = LOAD_TABLE[self.mode, self._stay(self.body, now_us)]
+        match deed:
+            case StayDeed.WAIT:
+                return []
+            case StayDeed.DROP:
+                self._loaded_at_us = None
+                return []
+            case StayDeed.BEGIN:
+                self._loaded_at_us = now_us + self.site.load_ms * 1000
+                return self._load(now_us)
+            case StayDeed.GO_ON:
+                return self._behind_me()
+
+    def _stay(self, body: BodyState, now_us: int) -> Stay:
+        """What errand, place and clock come to."""
         errand = self._errand
+        if errand is None:
+            return Stay.NO_ERRAND
         begins = self.manual.is_automatic or self._loaded_at_us is not None
-        at_stop = self.body.body_place is BodyPlace.IN_NODE and errand is not None and self.body.node == errand.stops[0]
-        if errand is None or not at_stop or not begins:
-            self._loaded_at_us = None
-            self.mode = RobotMode.FREE if errand is None else RobotMode.DRIVING
-            return []
-        self.mode = RobotMode.LOADING
+        if body.body_place is not BodyPlace.IN_NODE or body.node != errand.stops[0] or not begins:
+            return Stay.UNDER_WAY
         if self._loaded_at_us is None:
-            self._loaded_at_us = now_us + self.site.load_ms * 1000
-        if now_us < self._loaded_at_us:
-            return []
+            return Stay.AT_STOP
+        return Stay.LOADING if now_us < self._loaded_at_us else Stay.LOADED
+
+    def _behind_me(self) -> list[Effect]:
+        """The next stop of the errand in hand is done with: it goes on, or is over."""
+        errand = self._errand
+        assert errand is not None
         self._loaded_at_us = None
         self.planning.position.behind = NOWHERE
         left = Errand(errand.task, errand.stops[1:])
@@ -318,37 +333,44 @@ class GraphRobot:
 
     def _ask(self, now_us: int) -> list[Effect]:
         """Near a node, tell by which edge it will be left (row G14); again while nobody answers."""
-        if self._grant is not None or not self._sensed or self.has_other_map:
+        if self.approach in (Approach.AWAY, Approach.GRANTED) or self.has_other_map:
             self._signal_at_us = None
             return []
         wants = self._wants()
-        if wants is None:
-            self._signal = self._signal_at_us = self._answer = None
-            return []
+        deed = self._meet(NodeEvent.STAYS if wants is None else NodeEvent.ONWARD)
+        return self._tell_turn(wants, now_us) if wants is not None and deed is NodeDeed.SIGNAL else []
+
+    def _meet(self, event: NodeEvent) -> NodeDeed:
+        """One line of ``NODE_TABLE``; what is to be said of it."""
+        self.approach, deed = NODE_TABLE.get((self.approach, event), (self.approach, NodeDeed.NOTHING))
+        if deed is NodeDeed.FORGET:
+            self._signal = self._signal_at_us = self._grant = None
+        return deed
+
+    def _tell_turn(self, wants: int, now_us: int) -> list[Effect]:
+        """By which edge the node ahead will be left: when that is another, else when it is due."""
         here = self.planning.position
         if self._signal == (here.node, wants) and self._signal_at_us is not None and now_us < self._signal_at_us:
             return []
-        pause_us = SIGNAL_US if self._answer is None else SIGNAL_AGAIN_US
+        pause_us = SIGNAL_US if self.approach is Approach.ASKING else SIGNAL_AGAIN_US
         self._signal, self._signal_at_us = (here.node, wants), now_us + pause_us
         behind = NO_NODE if here.behind == NOWHERE else here.behind
         return [Send(TurnSignal(self.fleet.node_id, here.node, behind, wants))]
 
     def _on_answer(self, answer: NodeAnswer, now_us: int) -> None:
         here = self.planning.position
-        if answer.node != here.node or answer.sender != self.site.hosts[here.node] or self._signal is None:
-            return
-        if self._grant is not None:
+        if answer.node != here.node or answer.sender != self.site.hosts[here.node]:
             return
         if answer.node_verdict is NodeVerdict.STOP:
-            self.stops_told += self._answer is not NodeVerdict.STOP
-            self._answer = NodeVerdict.STOP
+            self._meet(NodeEvent.STOP)
             return
         if answer.after not in self.site.graph.neighbours[here.node] or answer.after == here.behind:
             return
-        # Sent elsewhere, the robot plans anew from the node to which the edge leads (row G16).
-        self.sent_elsewhere += answer.node_verdict is NodeVerdict.ANOTHER
-        self._answer = answer.node_verdict
-        self._grant = _Grant(here.node, answer.after, answer.slot, now_us + REDEEM_US)
+        was = self.approach
+        self._meet(NodeEvent.GO)
+        if self.approach is not was:
+            # Sent elsewhere, the robot plans anew from the node to which the edge leads (row G16).
+            self._grant = _Grant(here.node, answer.after, answer.slot, now_us + REDEEM_US)
 
     # --- rights ------------------------------------------------------------------------------------------------
 
@@ -363,7 +385,7 @@ class GraphRobot:
         if missing and now_us >= grant.until_us:
             for key in keys:
                 tokens.forget(key)
-            self._grant = self._signal = self._answer = None
+            self._meet(NodeEvent.LAPSED)
             return []
         if not missing:
             grant.until_us = now_us + REDEEM_US
@@ -429,8 +451,8 @@ class GraphRobot:
     def _enters(self, body: BodyState) -> bool:
         """Whether it goes into the node ahead: to load, to be free, or to wait where the rules say so (decision 14)."""
         if self._goal is None or self._goal == body.node:
-            return self._sensed
-        stopped = self._answer is NodeVerdict.STOP or body.body_place is BodyPlace.AT_LINE
+            return self.approach is not Approach.AWAY
+        stopped = self.approach is Approach.STOPPED or body.body_place is BodyPlace.AT_LINE
         return stopped and self.site.rules is Rules.EDGE_AND_NODE
 
     # --- words -------------------------------------------------------------------------------------------------

@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 
-from onboard.contract.codes import Operation
-from onboard.contract.graph import EdgeNotice, EdgeState, RobotAt, VisitList
-from onboard.contract.messages import Message, Reference
+from onboard.contract.graph import EdgeState, RobotAt
+from onboard.contract.messages import Message
+from onboard.history.history import Fact
 from onboard.systems.graph.fields import NO_NODE, stops_of
+from onboard.systems.graph.history import RobotTold, VisitsTold, graph_history
 from onboard.systems.graph.site import FactoryGraph
 from onboard.trace.scene.arrange import arrange
 from onboard.trace.scene.scene import NEARLY, Json, Spot, along, shape, still
@@ -42,7 +43,7 @@ class GraphScene:
         self._spots = {node: (x + MARGIN, y + MARGIN) for node, (x, y) in nodes.items()}
         self._lengths = {frozenset(ends): length for ends, length in lengths.items()}
         self._robots = {node: _SeenRobot(machine.home.track) for node, machine in site.robots.items()}
-        self._edges: dict[frozenset[int], tuple[EdgeState, int]] = {}
+        self._edges = graph_history(view.history).edges
 
     def layout(self) -> Json:
         """Nodes, and edges with their length in m, as a plan."""
@@ -55,18 +56,14 @@ class GraphScene:
         height = max(y for _, y in self._spots.values()) + MARGIN
         return {"plan": {"width": width, "height": height, "shapes": shapes}}
 
-    def feed(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Follow robots, edges, orders and calls for the plan."""
-        match message:
-            case RobotAt() if message.sender in self._robots:
-                self._on_robot(message, time_us)
-            case EdgeNotice():
-                self._edges[frozenset((message.node, message.other))] = (message.edge_state, message.robot)
-            case VisitList():
-                task = Reference(message.sender, message.order)
-                ways = ", ".join(f"N{node}" for node in stops_of(message))
-                if self.view.history.tasks.open(task, Operation.TRANSPORT, time_us) and message.robot:
-                    self.view.say(time_us, f"{self.view.name(message.robot)} is to visit {ways}")
+        match fact:
+            case RobotTold():
+                self._on_robot(fact.word, time_us)
+            case VisitsTold(word=word, is_first=True) if word.robot:
+                ways = ", ".join(f"N{node}" for node in stops_of(word))
+                self.view.say(time_us, f"{self.view.name(word.robot)} is to visit {ways}")
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:
         """The fleet bus tells all that is drawn."""
@@ -101,8 +98,8 @@ class GraphScene:
         where = f"N{robot.behind} to N{robot.node}" if robot.is_on_edge else f"N{robot.node}"
         edges = [
             [_edge_id(*sorted(ends)), []]
-            for ends, (state, by) in self._edges.items()
-            if by == node and state is not EdgeState.FREE
+            for ends, word in self._edges.items()
+            if word.robot == node and word.edge_state is not EdgeState.FREE
         ]
         told = [f"goes to N{robot.goal}"] if robot.goal in self._spots else []
         return {
@@ -127,9 +124,9 @@ class GraphScene:
     def marks(self, now_us: int) -> Json:
         """Edges that somebody may use, with the robot's name."""
         marks: Json = {}
-        for ends, (state, robot) in self._edges.items():
-            if state is not EdgeState.FREE and robot:
-                words = f"{state.name.lower()} for {self.view.name(robot)}"
+        for ends, word in self._edges.items():
+            if word.edge_state is not EdgeState.FREE and word.robot:
+                words = f"{word.edge_state.name.lower()} for {self.view.name(word.robot)}"
                 marks[_edge_id(*sorted(ends))] = {"state": "held", "lines": [words]}
         return {"marks": marks, "things": []}
 

@@ -1,7 +1,8 @@
 """A floor over time: of a map two panels, columns and rows; of a network its cells, neighbours near each other."""
 
-from onboard.contract.mapd import StepState
 from onboard.contract.messages import Message
+from onboard.history.history import Fact
+from onboard.systems.mapd.history import CellTold
 from onboard.systems.mapd.site import Mapd
 from onboard.trace.chart.over_time import Panel, PanelLine, Rows, by_distance
 
@@ -16,7 +17,6 @@ class MapdDiagram(Rows):
 
     def __init__(self, site: Mapd, from_us: int | None, until_us: int | None) -> None:
         super().__init__(site, from_us, until_us)
-        self._robots = frozenset(site.robots)
         #: For each panel the row of each cell.
         self._rows: list[list[float]] = []
         floor = site.floor
@@ -35,20 +35,19 @@ class MapdDiagram(Rows):
             self._rows.append([float(order.index(cell)) for cell in range(floor.size)])
         self._lines: dict[int, list[PanelLine]] = {}
 
-    def take(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """A robot has come to its next cell."""
-        if not isinstance(message, StepState) or message.sender not in self._robots:
+        if not isinstance(fact, CellTold):
             return
-        if message.cell >= len(self._rows[0]):
-            return
-        width = _LOADED if message.loaded else _EMPTY
-        lines = self._lines.get(message.sender, [])
-        spots = [rows[message.cell] for rows in self._rows]
+        word = fact.word
+        width = _LOADED if word.loaded else _EMPTY
+        lines = self._lines.get(word.sender, [])
+        spots = [rows[word.cell] for rows in self._rows]
         for line, spot in zip(lines, spots, strict=False):
             line.points.append((time_us, spot))
         if lines and lines[0].width == width:
             return
-        lines = self._lines[message.sender] = [PanelLine(message.sender, [(time_us, spot)], width) for spot in spots]
+        lines = self._lines[word.sender] = [PanelLine(word.sender, [(time_us, spot)], width) for spot in spots]
         for panel, line in zip(self.panels, lines, strict=True):
             panel.lines.append(line)
 

@@ -1,32 +1,27 @@
 """A pick-up and delivery site at the gateway: robots by the cells that they tell; orders come in at its desk only."""
 
-from dataclasses import replace
-
-from onboard.contract.mapd import StepState
 from onboard.contract.messages import Message
 from onboard.gateway.edge import SystemEdge
 from onboard.gateway.positions import MachinePosition, Tracker
+from onboard.history.history import Fact, History
+from onboard.systems.mapd.history import CellTold, mapd_history
 from onboard.systems.mapd.site import Mapd
 
 
 class CellTracker:
     """Robots that move from cell to cell, a step at a time; no coordinates."""
 
-    def __init__(self, site: Mapd) -> None:
+    def __init__(self, site: Mapd, history: History) -> None:
         self._names = site.floor.names
-        self._at = {node: MachinePosition(self._names[cell]) for node, cell in site.homes.items()}
+        self._seen = mapd_history(history)
 
-    def feed(self, message: Message) -> bool:
+    def take(self, message: Message, fact: Fact | None) -> bool:
         """Robots say in which cell they are at each step."""
-        if not isinstance(message, StepState) or message.sender not in self._at or message.cell >= len(self._names):
-            return False
-        old, node = self._at[message.sender], self._names[message.cell]
-        self._at[message.sender] = replace(old, node=node, passed=old.passed + (node != old.node))
-        return True
+        return isinstance(fact, CellTold)
 
     def where(self, node_id: int) -> MachinePosition:
         """The cell where the robot said that it is."""
-        return self._at[node_id]
+        return MachinePosition(self._names[self._seen.cells[node_id]], passed=self._seen.passed[node_id])
 
 
 class MapdEdge(SystemEdge):
@@ -36,9 +31,9 @@ class MapdEdge(SystemEdge):
         super().__init__(site)
         self._floor = site
 
-    def tracker(self) -> Tracker:
+    def tracker(self, history: History) -> Tracker:
         """By the cell of each step."""
-        return CellTracker(self._floor)
+        return CellTracker(self._floor, history)
 
 
 EDGE = MapdEdge

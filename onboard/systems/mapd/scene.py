@@ -8,10 +8,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import CallResult
-from onboard.contract.mapd import PathHead, PathMoves, StepState, StepTurn
+from onboard.contract.mapd import StepState
 from onboard.contract.mapd_device import CartState
-from onboard.contract.messages import Award, CallForProposals, Message, Reference
+from onboard.contract.messages import CallForProposals, Message, Reference
+from onboard.history.calls import CallAnswered, CallOpened, CallRepeated
+from onboard.history.history import Fact
 from onboard.systems.mapd.fields import MOVE_BITS, MOVES_A_FRAME, NO_TASK
+from onboard.systems.mapd.history import CellTold, TurnTold, mapd_history
 from onboard.systems.mapd.site import FREE, Mapd
 from onboard.trace.scene.arrange import arrange
 from onboard.trace.scene.scene import Json, Spot, along, shape, still
@@ -25,7 +28,7 @@ MOST_TASKS = 1024
 
 @dataclass
 class _SeenGridRobot:
-    """Where a robot is, by step, and the path that it told; incomplete, a path is not shown."""
+    """Where a robot is, by step, its task, and how it is drawn."""
 
     cell: int
     step: int = 0
@@ -34,8 +37,6 @@ class _SeenGridRobot:
     loaded: bool = False
     bound_for: int = -1
     path: list[list[float]] = field(default_factory=list)
-    head: PathHead | None = None
-    parts: dict[int, int] = field(default_factory=dict)
 
 
 class MapdScene:
@@ -74,23 +75,17 @@ class MapdScene:
         height = max(y for _, y in self._spots.values()) + MARGIN
         return {"plan": {"width": width, "height": height, "shapes": shapes}}
 
-    def feed(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Follow robots, tasks and rounds for the plan."""
-        robot = self._robots.get(message.sender)
-        match message:
-            case CallForProposals():
-                self._on_call(message, time_us)
-            case StepTurn(won=False) if message.robot in self._robots:
-                self._on_change(message.robot, NO_TASK, time_us)
-            case Award(result=CallResult.AWARDED) if message.winner in self._robots:
-                self._on_change(message.winner, message.task.number, time_us)
-            case PathHead() if robot is not None:
-                robot.head, robot.parts = message, {}
-            case PathMoves() if robot is not None and robot.head is not None:
-                if message.version == robot.head.version:
-                    robot.parts[message.part] = message.codes
-            case StepState() if robot is not None:
-                self._on_state(robot, message, time_us)
+        match fact:
+            case CallOpened() | CallRepeated():
+                self._on_call(fact.call.terms, time_us)
+            case TurnTold(word=word) if not word.won and word.robot in self._robots:
+                self._on_change(word.robot, NO_TASK, time_us)
+            case CallAnswered(award=award) if award.result is CallResult.AWARDED and award.winner in self._robots:
+                self._on_change(award.winner, award.task.number, time_us)
+            case CellTold(word=word):
+                self._on_state(self._robots[word.sender], word, time_us)
 
     def _on_call(self, call: CallForProposals, time_us: int) -> None:
         if call.task.number in self._tasks:
@@ -150,21 +145,22 @@ class MapdScene:
             "where": f"{self.words.place(robot.cell)}, step {robot.step}",
             "car": str(robot.task) if robot.loaded else None,
             "path": robot.path,
-            "ahead": [[round(x, 1), round(y, 1)] for x, y in (self._spots[cell] for cell in self._ahead(robot))],
+            "ahead": [[round(x, 1), round(y, 1)] for x, y in (self._spots[cell] for cell in self._ahead(node))],
             "held": [],
             "told": told,
         }
 
-    def _ahead(self, robot: _SeenGridRobot) -> Iterator[int]:
-        """The cells of its path that it has not come to yet."""
-        head = robot.head
-        if head is None or head.cell not in self._spots:
+    def _ahead(self, node: int) -> Iterator[int]:
+        """The cells of its path that a robot has not come to yet; incomplete, a path is not shown."""
+        robot, path = self._robots[node], mapd_history(self.view.history).paths.get(node)
+        if path is None or path.head.cell not in self._spots:
             return
-        if any(part not in robot.parts for part in range(-(-head.moves // MOVES_A_FRAME))):
+        head = path.head
+        if any(part not in path.parts for part in range(-(-head.moves // MOVES_A_FRAME))):
             return
         cell = head.cell
         for number in range(head.moves):
-            code = robot.parts[number // MOVES_A_FRAME] >> MOVE_BITS * (number % MOVES_A_FRAME) & (1 << MOVE_BITS) - 1
+            code = path.parts[number // MOVES_A_FRAME] >> MOVE_BITS * (number % MOVES_A_FRAME) & (1 << MOVE_BITS) - 1
             ways = self.site.floor.ways[cell]
             cell = ways[code - 1] if 0 < code <= len(ways) else cell
             if head.step + number + 1 > robot.step and code:

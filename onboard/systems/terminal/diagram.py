@@ -1,27 +1,16 @@
 """A terminal over time: rows for lanes from entry to end, for areas, crossings and stations; vehicles in them."""
 
-from dataclasses import dataclass, field
-
 from onboard.contract.codes import TokenKind
-from onboard.contract.messages import Message, TokenGrant, TokenHeld
-from onboard.contract.terminal import LaneState, PlanHead, PlanStep, StepReport, StepResult
+from onboard.contract.messages import Message
+from onboard.contract.terminal import LaneState
+from onboard.history.history import Fact
+from onboard.history.rights import RightTold
+from onboard.systems.terminal.history import LaneTold, StepTold, terminal_history
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.chart.over_time import Bar, Panel, PanelLine, Rows
 
 #: A lane has as many rows as slots, but at most so many.
 _MOST_ROWS = 4
-
-
-@dataclass
-class _DrawnVehicle:
-    """One vehicle: its plan as far as it was told, and the step that it is at since when."""
-
-    steps: dict[int, PlanStep] = field(default_factory=dict)
-    version: int | None = None
-    begin_ms: int = 0
-    current: int = 0
-    entity: int = 0
-    since_us: int | None = None
 
 
 class TerminalDiagram(Rows):
@@ -41,47 +30,35 @@ class TerminalDiagram(Rows):
             names += [one.name, *[""] * (count - 1)]
         self._panel = Panel("entities", names)
         self.panels = [self._panel]
-        self._bodies = {node: _DrawnVehicle(entity=site.machines[node].home.track) for node in site.vehicles}
+        self._vehicles = terminal_history(self.history).vehicles
+        #: When each came to where it is.
+        self._since_us: dict[int, int] = {}
         self._held: dict[int, tuple[int, int]] = {}
         self._blocked: dict[int, int] = {}
 
-    def take(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Plans, reports on their steps, rights, lanes."""
-        body = self._bodies.get(message.sender)
-        match message:
-            case PlanHead() if body is not None and message.version != body.version:
-                is_same = body.version is not None and message.begin_ms == body.begin_ms
-                body.version, body.begin_ms, body.steps = message.version, message.begin_ms, {}
-                body.current = body.current if is_same else 0
-            case PlanStep() if body is not None and message.version == body.version:
-                body.steps[message.step] = message
-            case StepReport() if body is not None and message.result is StepResult.DONE:
-                self._on_done(message, body)
-            case TokenHeld() if message.token_kind is TokenKind.SEGMENT and body is not None:
-                self._let_go(message.token, time_us)
-                self._held[message.token] = message.sender, time_us
-            case TokenGrant() if message.token_kind is TokenKind.SEGMENT:
-                self._let_go(message.token, time_us)
-            case LaneState():
-                self._on_lane(message, time_us)
+        match fact:
+            case StepTold(is_news=True):
+                self._on_done(fact)
+            case RightTold(kind=TokenKind.SEGMENT, giver=0) if fact.holder in self._vehicles:
+                self._let_go(fact.number, time_us)
+                self._held[fact.number] = fact.holder, time_us
+            case RightTold(kind=TokenKind.SEGMENT) if fact.giver:
+                self._let_go(fact.number, time_us)
+            case LaneTold():
+                self._on_lane(fact.word, time_us)
 
-    def _on_done(self, report: StepReport, body: _DrawnVehicle) -> None:
-        if report.version != body.version or report.step + 1 <= body.current:
-            return
-        time_us = self.log_us(report.at_ms, self.last_us)
-        self._passed(report.sender, body, time_us)
-        body.current, body.since_us = report.step + 1, time_us
-        following = body.steps.get(body.current)
-        body.entity = following.entity if following is not None else report.entity
-
-    def _passed(self, node: int, body: _DrawnVehicle, until_us: int) -> None:
+    def _on_done(self, told: StepTold) -> None:
         """One step was done: along a lane from its entry to its end, anywhere else in the middle."""
-        since_us = self.first_us if body.since_us is None else body.since_us
-        if body.entity not in self._places:
+        node, until_us = told.report.sender, self.log_us(told.report.at_ms, self.last_us)
+        since_us = self._since_us.get(node, self.first_us)
+        self._since_us[node] = until_us
+        if told.left not in self._places:
             return
-        first, count = self._places[body.entity]
-        is_lane = self._site.entities[body.entity].kind is EntityKind.LANE
-        begin = end = self._beside(node, body.entity)
+        first, count = self._places[told.left]
+        is_lane = self._site.entities[told.left].kind is EntityKind.LANE
+        begin = end = self._beside(node, told.left)
         if is_lane:
             begin, end = first - 0.5, first + count - 0.5
         self._panel.lines.append(PanelLine(node, [(since_us, begin), (until_us, end)]))
@@ -121,10 +98,9 @@ class TerminalDiagram(Rows):
             self._let_go(token, time_us)
         for lane in list(self._blocked):
             self._block(lane, time_us)
-        for node, body in self._bodies.items():
-            since_us = self.first_us if body.since_us is None else body.since_us
-            row = self._beside(node, body.entity)
-            self._panel.lines.append(PanelLine(node, [(since_us, row), (time_us, row)]))
+        for node, vehicle in self._vehicles.items():
+            row = self._beside(node, vehicle.entity)
+            self._panel.lines.append(PanelLine(node, [(self._since_us.get(node, self.first_us), row), (time_us, row)]))
 
 
 DIAGRAM = TerminalDiagram

@@ -1,16 +1,18 @@
 """A terminal at the gateway: a transport is a mission of its desk, for one box (rows M05, M39)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from typing import Any
 
-from onboard.contract.messages import CarAt, Message
-from onboard.contract.terminal import BoxOrder, PlanHead, PlanStep, StepReport, StepResult
+from onboard.contract.messages import Message
+from onboard.contract.terminal import BoxOrder
 from onboard.gateway.bus_orders import BusOrders, NoBusOrders, OrderMessages, RefusedError
 from onboard.gateway.edge import SystemEdge
 from onboard.gateway.order import GatewayOrder, OrderRequest
 from onboard.gateway.positions import MachinePosition, Tracker
 from onboard.gateway.records import OrderPhase
+from onboard.history.history import Fact, History
+from onboard.history.loads import LoadTold
+from onboard.systems.terminal.history import LegTold, RouteTold, StepTold, terminal_history
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.view import SiteView
 
@@ -52,67 +54,35 @@ class TerminalOrders(NoBusOrders):
             (BoxOrder(sender, request.node, request.number, box, station, within_s, request.urgent),), ORDER_AGAIN_US
         )
 
-    def is_done(self, order: GatewayOrder, message: Message) -> bool:
+    def is_done(self, order: GatewayOrder, fact: Fact | None) -> bool:
         """The box stands there: the vehicle's own report may have been lost."""
-        if not isinstance(message, CarAt) or order.life in (OrderPhase.ACCEPTED, OrderPhase.CALLED):
+        if not isinstance(fact, LoadTold) or order.life in (OrderPhase.ACCEPTED, OrderPhase.CALLED):
             return False
         box, station = order.request.stops
-        return (message.car.number, message.station) == (box, station)
-
-
-@dataclass(slots=True)
-class _Plan:
-    """A vehicle's plan as far as it was heard, by step."""
-
-    version: int
-    steps: int
-    entities: dict[int, int]
-    done: int = 0
+        return (fact.word.car.number, fact.word.station) == (box, station)
 
 
 class EntityTracker:
     """Vehicles of a terminal: entities by name, no coordinates."""
 
-    def __init__(self, site: Terminal) -> None:
+    def __init__(self, site: Terminal, history: History) -> None:
         self._site = site
-        self._at = {node: MachinePosition(self._name(site.machines[node].home.track)) for node in site.vehicles}
-        self._plans: dict[int, _Plan] = {}
+        self._vehicles = terminal_history(history).vehicles
 
-    def feed(self, message: Message) -> bool:
+    def take(self, message: Message, fact: Fact | None) -> bool:
         """Plans and the steps done of them."""
-        if message.sender not in self._at:
-            return False
-        plan = self._plans.get(message.sender)
-        match message:
-            case PlanHead() if plan is None or message.version != plan.version:
-                self._plans[message.sender] = _Plan(message.version, message.steps, {})
-            case PlanStep() if plan is not None and plan.version == message.version:
-                plan.entities[message.step] = message.entity
-            case StepReport() if plan is not None and plan.version == message.version:
-                self._on_report(message, plan)
-            case _:
-                return False
-        return True
-
-    def _on_report(self, report: StepReport, plan: _Plan) -> None:
-        if report.result is not StepResult.DONE:
-            self._at[report.sender] = replace(self._at[report.sender], driving=False)
-            return
-        plan.done = max(plan.done, report.step + 1)
-        node, old = self._name(plan.entities.get(plan.done, report.entity)), self._at[report.sender]
-        self._at[report.sender] = MachinePosition(node, (), old.passed + (node != old.node), plan.done < plan.steps)
+        return isinstance(fact, RouteTold | LegTold | StepTold)
 
     def where(self, node_id: int) -> MachinePosition:
         """The entity where the vehicle is, and those of its plan that lie ahead."""
-        at, plan = self._at[node_id], self._plans.get(node_id)
-        if plan is None or len(plan.entities) < plan.steps:
-            return at
-        ahead: list[str] = []
-        for step in range(plan.done, plan.steps):
-            name = self._name(plan.entities[step])
-            if name != (ahead[-1] if ahead else at.node):
-                ahead.append(name)
-        return replace(at, ahead=tuple(ahead))
+        vehicle = self._vehicles[node_id]
+        here, ahead = self._name(vehicle.entity), list[str]()
+        if len(vehicle.steps) >= vehicle.count:
+            for step in vehicle.to_come():
+                name = self._name(step.entity)
+                if name != (ahead[-1] if ahead else here):
+                    ahead.append(name)
+        return MachinePosition(here, tuple(ahead), vehicle.passed, vehicle.is_driving)
 
     def _name(self, number: int) -> str:
         entity = self._site.entities.get(number)
@@ -130,9 +100,9 @@ class TerminalEdge(SystemEdge):
         """Orders from outside become missions for one box."""
         return TerminalOrders(self._terminal)
 
-    def tracker(self) -> Tracker:
+    def tracker(self, history: History) -> Tracker:
         """By the plans that vehicles tell."""
-        return EntityTracker(self._terminal)
+        return EntityTracker(self._terminal, history)
 
     def place(self, number: int) -> str | None:
         """An entity's name by its number; None where the site has none."""

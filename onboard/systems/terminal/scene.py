@@ -4,15 +4,17 @@ The fleet bus tells which elementary action a vehicle is at, and when it should 
 as well, the slot that it is in counts.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import TokenKind
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import CarAt, Message
-from onboard.contract.terminal import Action, LaneState, MoveMode, PlanHead, PlanStep, StepReport, StepResult
+from onboard.contract.terminal import Action, MoveMode
 from onboard.contract.terminal_device import MoveState
+from onboard.history.history import Fact
+from onboard.history.loads import LoadTold
 from onboard.systems.terminal.chart import BAY, MARGIN, chart_of
+from onboard.systems.terminal.history import LaneTold, LegTold, RouteTold, StepTold, VehicleSeen, terminal_history
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.scene.scene import NEARLY, Json, Spot, along, part, shape, spot_on, still
 from onboard.trace.view import SiteView
@@ -22,14 +24,9 @@ _DRIVING = Action.GOTO
 
 @dataclass
 class _SeenVehicle:
-    """One vehicle: its plan as far as it was told, the step it is at, and how it moves meanwhile."""
+    """How one vehicle is drawn: the entity where it is shown, since when, and how it moves meanwhile."""
 
     entity: int
-    version: int | None = None
-    begin_ms: int = 0
-    count: int = 0
-    steps: dict[int, PlanStep] = field(default_factory=dict)
-    current: int = 0
     since_us: int = 0
     slot: int = 0
     is_still: bool = False
@@ -46,7 +43,7 @@ class TerminalScene:
         self._clock = view.history.clock
         self._rights = view.history.rights
         self._bodies = {node: _SeenVehicle(site.machines[node].home.track) for node in site.vehicles}
-        self._blocked: dict[int, bool] = {}
+        self._seen = terminal_history(view.history)
         self._boxes = {number: box.station for number, box in enumerate(site.boxes, start=1)}
         chart = chart_of(site)
         self._spots, self._corners, self._lines = chart.spots, chart.corners, chart.lines
@@ -85,33 +82,27 @@ class TerminalScene:
 
     # --- in ----------------------------------------------------------------------------------------------------
 
-    def feed(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Follow vehicles, lanes, boxes and missions for the plan."""
-        if message.sender in self._bodies:
-            self._on_vehicle(message, time_us)
-        match message:
-            case LaneState():
-                if self._blocked.get(message.lane, False) is not message.blocked:
-                    words = "is blocked" if message.blocked else "is free again"
-                    self.view.say(time_us, f"{self.words.place(message.lane)} {words}")
-                self._blocked[message.lane] = message.blocked
-            case CarAt() if message.car.number in self._boxes:
-                # The newest at a station is the last in its row.
-                del self._boxes[message.car.number]
-                self._boxes[message.car.number] = 0 if message.station == ANY_STATION else message.station
+        match fact:
+            case RouteTold(goes_on=False):
+                begin_us = self._clock.log_us(self._seen.vehicles[fact.node].begin_ms, time_us)
+                self._bodies[fact.node].since_us = begin_us or time_us
+            case LegTold(step=step) if step.step == self._seen.vehicles[step.sender].current:
+                self._go(step.sender, time_us)
+            case StepTold(report=report, is_news=True):
+                self._bodies[report.sender].since_us = self._clock.log_us(report.at_ms, time_us) or time_us
+                self._go(report.sender, time_us)
+            case LaneTold(word=word, is_news=True):
+                words = "is blocked" if word.blocked else "is free again"
+                self.view.say(time_us, f"{self.words.place(word.lane)} {words}")
+            case LoadTold(word=word):
+                self._on_box(word)
 
-    def _on_vehicle(self, message: Message, time_us: int) -> None:
-        """What a vehicle says of its own plan."""
-        body = self._bodies[message.sender]
-        match message:
-            case PlanHead():
-                self._on_head(message, time_us)
-            case PlanStep() if body.version == message.version and message.entity in self.site.entities:
-                body.steps[message.step] = message
-                if message.step == body.current:
-                    self._go(message.sender, body, time_us)
-            case StepReport():
-                self._on_report(message, time_us)
+    def _on_box(self, word: CarAt) -> None:
+        """The newest at a station is the last in its row."""
+        if self._boxes.pop(word.car.number, None) is not None:
+            self._boxes[word.car.number] = 0 if word.station == ANY_STATION else word.station
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:
         """Follow a drive's slot and motion, where its bus is heard."""
@@ -126,31 +117,13 @@ class TerminalScene:
             body.entity, body.slot = message.entity, message.slot
             self._in_slot(node, body, time_us, at_end=message.at_end or is_still)
 
-    def _on_head(self, head: PlanHead, time_us: int) -> None:
-        body = self._bodies[head.sender]
-        if body.version == head.version:
-            return
-        is_same_story = body.begin_ms == head.begin_ms and body.version is not None
-        body.version, body.begin_ms, body.count, body.steps = head.version, head.begin_ms, head.steps, {}
-        if not is_same_story:
-            body.current, body.since_us = 0, self._clock.log_us(head.begin_ms, time_us) or time_us
-
-    def _on_report(self, report: StepReport, time_us: int) -> None:
-        body = self._bodies[report.sender]
-        if report.result is not StepResult.DONE or report.version != body.version:
-            return
-        if report.step + 1 <= body.current:
-            return
-        body.current = report.step + 1
-        body.since_us = self._clock.log_us(report.at_ms, time_us) or time_us
-        self._go(report.sender, body, time_us)
-
-    def _go(self, node: int, body: _SeenVehicle, time_us: int) -> None:
+    def _go(self, node: int, time_us: int) -> None:
         """The step in hand begins."""
-        step = body.steps.get(body.current)
+        body, vehicle = self._bodies[node], self._seen.vehicles[node]
+        step = vehicle.step
         if step is None:
             return
-        before_ms = body.steps[body.current - 1].end_ms if body.current - 1 in body.steps else 0
+        before_ms = vehicle.steps[vehicle.current - 1].end_ms if vehicle.current - 1 in vehicle.steps else 0
         length_us = max(0, step.end_ms - before_ms) * 1000
         if body.entity != step.entity or body.slot == 0:
             body.entity, body.slot = step.entity, 0
@@ -181,30 +154,28 @@ class TerminalScene:
         body = self._bodies.get(node)
         if body is None:
             return {"where": "", "car": None}
-        aboard = self.view.aboard.get(node)
-        step = body.steps.get(body.current)
+        aboard = self.view.history.loads.aboard.get(node)
+        vehicle = self._seen.vehicles[node]
+        step = vehicle.step
         doing = step.action.name.lower().replace("_", " ") if step is not None and step.action is not _DRIVING else ""
         told: list[list[object]] = []
-        for later in self._to_come(body):
-            end_us = self._clock.log_us(body.begin_ms + later.end_ms, now_us)
+        for later in vehicle.to_come():
+            end_us = self._clock.log_us(vehicle.begin_ms + later.end_ms, now_us)
             what = later.action.name.lower().replace("_", " ")
             told.append([end_us, f"{what} {self.words.place(later.entity)}"])
         return {
             "where": f"{self.words.place(body.entity)}{f', {doing}' if doing else ''}",
             "car": self.words.load(aboard) if aboard is not None else None,
             "path": body.path,
-            "ahead": self._ahead(node, body),
+            "ahead": self._ahead(node, vehicle),
             "held": self._held(node),
             "told": told,
         }
 
-    def _to_come(self, body: _SeenVehicle) -> Iterator[PlanStep]:
-        return (body.steps[number] for number in range(body.current, body.count) if number in body.steps)
-
-    def _ahead(self, node: int, body: _SeenVehicle) -> list[str | list[float]]:
+    def _ahead(self, node: int, vehicle: VehicleSeen) -> list[str | list[float]]:
         """The way to come: lanes by their shapes, the one in hand too; other places by their spots."""
         found: list[str | list[float]] = []
-        for step in self._to_come(body):
+        for step in vehicle.to_come():
             if step.entity in self._lines:
                 one: str | list[float] = str(step.entity)
             elif self.site.entities[step.entity].kind is EntityKind.AREA:
@@ -236,7 +207,7 @@ class TerminalScene:
             if one.kind is EntityKind.STATION:
                 row = [self.site.boxes[number - 1].name for number, at in self._boxes.items() if at == one.number]
                 marks[str(one.number)] = {"count": len(row), "lines": row}
-        for lane, blocked in self._blocked.items():
+        for lane, blocked in self._seen.blocked.items():
             if blocked:
                 marks[str(lane)] = {"state": "blocked", "lines": ["blocked"]}
         return {"marks": marks, "things": []}

@@ -4,7 +4,6 @@ Nobody plans for it. It moves only into slots whose rights it holds, in the orde
 section 5), so a wrong mirror costs time and nothing else. In an area every vehicle has a bay of its own.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import KindCode, MachineState, Reason, TaskPhase, TokenKind
@@ -28,6 +27,7 @@ from onboard.systems.terminal.plan import Load
 from onboard.systems.terminal.planner import Planner
 from onboard.systems.terminal.records import StepOverRecord
 from onboard.systems.terminal.site import EntityKind, Terminal
+from onboard.systems.terminal.steps import TABLE, ActionDeed, ActionFinding
 from onboard.systems.terminal.traffic import Owned
 from onboard.ways.cars import CarFleet, car_fleet, car_mirror
 from onboard.ways.tokens import car_token
@@ -76,19 +76,11 @@ class Vehicle:
     _retry_at_us: int | None = None
     _may_retry: bool = False
     _told_blocked: bool = False
-    _actions: dict[Action, Callable[[Owned, int], list[Effect]]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self.body = VehicleParts(self.fleet.node_id)
         self.planner = Planner(self.fleet, self.generation, self.body)
         self.manual = VehicleMode(self.fleet.node_id)
-        self._actions = {
-            Action.GOTO: self._goto,
-            Action.DOCK: self._dock,
-            Action.PICK_UP: self._pick_up,
-            Action.PUT_DOWN: self._put_down,
-            Action.UNDOCK: self._undock,
-        }
 
     # --- the Behaviour -----------------------------------------------------------------------------------------
 
@@ -175,7 +167,7 @@ class Vehicle:
         effects = self.planner.speak(now_us)
         if effects or owned is None:
             return effects
-        return self._actions[owned.plan.steps[owned.current].action](owned, now_us)
+        return self._step(owned, now_us)
 
     def next_wake(self) -> int | None:
         """Repeats and retries of the devices, and the planner's turn."""
@@ -218,30 +210,105 @@ class Vehicle:
             return self._done(owned, now_us)
         return []
 
-    def _goto(self, owned: Owned, now_us: int) -> list[Effect]:
-        """Cross the entity in hand, slot by slot, and enter the next one (M11: the way inside is the drive's)."""
-        move, steps, current = self.body.move, owned.plan.steps, owned.current
-        assert move is not None
-        following = steps[current + 1].entity
+    def _step(self, owned: Owned, now_us: int) -> list[Effect]:
+        """One line of ``TABLE`` for the action in hand."""
+        action = owned.plan.steps[owned.current].action
+        match TABLE[action, self._found(action, owned)]:
+            case ActionDeed.END | ActionDeed.END_ABOARD | ActionDeed.END_PUT_DOWN as deed:
+                return self._of_load(deed, owned, now_us) + self._done(owned, now_us)
+            case ActionDeed.TELL_OBSTACLE:
+                self._told_blocked = True
+                return self._report(StepResult.BLOCKED, owned, now_us)
+            case ActionDeed.TELL_FAILURE:
+                self._retry_at_us = now_us + RETRY_US
+                return self._report(StepResult.FAILED, owned, now_us)
+            case ActionDeed.ASK_FOR_BOX:
+                return self.fleet.tokens.want(self._box_token(self._box(owned)), now_us)
+            case ActionDeed.HANDLE:
+                self._may_retry = False
+                return self._handle(action, 0 if action in (Action.DOCK, Action.UNDOCK) else self._box(owned), now_us)
+            case ActionDeed.NEXT_SLOT | ActionDeed.CROSS | ActionDeed.NEXT_ENTITY | ActionDeed.BACK_TO_AREA as deed:
+                return self._move_on(deed, owned, now_us)
+        return []
+
+    def _report(self, result: StepResult, owned: Owned, now_us: int) -> list[Effect]:
+        return [Send(self.planner.report(owned, owned.current, now_us, result))]
+
+    def _found(self, action: Action, owned: Owned) -> ActionFinding:
+        """What drive, handler, rights and mirror come to."""
+        move, handler = self.body.move, self.body.handler
+        assert move is not None and handler is not None
+        match action:
+            case Action.GOTO:
+                return self._found_on_way(move, owned)
+            case Action.DOCK:
+                if handler.gear is HandlerMode.DOCKED and not self.body.is_handling:
+                    return ActionFinding.DONE
+                return self._found_at_station(handler, owned) if self.body.stands_ready else ActionFinding.AT_WORK
+            case Action.PICK_UP:
+                box = self._box(owned)
+                if not self.fleet.tokens.holds(self._box_token(box)):
+                    return ActionFinding.NO_RIGHT
+                is_aboard = handler.box == box and not self.body.is_handling
+                return ActionFinding.DONE if is_aboard else self._found_at_station(handler, owned)
+            case Action.PUT_DOWN:
+                is_put = handler.box == 0 and not self.body.is_handling
+                return ActionFinding.DONE if is_put else self._found_at_station(handler, owned)
+            case Action.UNDOCK:
+                return self._found_leaving(move, handler, owned)
+
+    def _found_on_way(self, move: MoveState, owned: Owned) -> ActionFinding:
+        """Across the entity in hand, slot by slot, into the next one (M11: inside, the way is the drive's)."""
+        following = owned.plan.steps[owned.current + 1].entity
         if move.entity == following:
-            return self._done(owned, now_us)
+            return ActionFinding.DONE
         if self.body.is_moving:
-            return []
+            return ActionFinding.AT_WORK
         if move.mode is MoveMode.BLOCKED and not self._told_blocked:
-            self._told_blocked = True
-            return [Send(self.planner.report(owned, current, now_us, StepResult.BLOCKED))]
+            return ActionFinding.OBSTACLE
         if not self.manual.may_begin(owned):
-            return []
+            return ActionFinding.HELD
         here = self.site.entities[move.entity]
         if here.kind is EntityKind.LANE and move.slot < here.capacity:
-            return self._enter(move.entity, move.slot + 1, following, now_us)
+            return ActionFinding.IN_LANE
         if here.kind is EntityKind.AREA and self.body.towards() != following:
-            return self.body.go(self._permit(move.entity, move.slot), move.entity, move.slot, following, now_us)
+            return ActionFinding.CROSSES_ELSEWHERE
         if following in self.mirror.traffic.blocked:
-            return []
+            return ActionFinding.CLOSED
+        return ActionFinding.AT_END
+
+    def _found_at_station(self, handler: HandlerState, owned: Owned) -> ActionFinding:
+        if self.body.is_handling or self._retry_at_us is not None:
+            return ActionFinding.AT_WORK
+        if not self.manual.may_begin(owned):
+            return ActionFinding.HELD
+        is_news = handler.gear is HandlerMode.FAILED and not self._may_retry
+        return ActionFinding.FAILED if is_news else ActionFinding.READY
+
+    def _found_leaving(self, move: MoveState, handler: HandlerState, owned: Owned) -> ActionFinding:
+        """Undocked and back in the bay of the area: the station is free."""
+        if move.entity == self._area(owned):
+            return ActionFinding.DONE
+        if handler.gear is not HandlerMode.FREE or self.body.is_handling:
+            return self._found_at_station(handler, owned)
+        if self.body.is_moving:
+            return ActionFinding.AT_WORK
+        return ActionFinding.AT_END if self.manual.may_begin(owned) else ActionFinding.HELD
+
+    def _area(self, owned: Owned) -> int:
+        return self.site.entities[owned.plan.steps[owned.current].entity].area
+
+    def _move_on(self, deed: ActionDeed, owned: Owned, now_us: int) -> list[Effect]:
+        """Into the slot, across the area or into the entity that comes next."""
+        move, steps, current = self.body.move, owned.plan.steps, owned.current
+        assert move is not None
+        following = self._area(owned) if deed is ActionDeed.BACK_TO_AREA else steps[current + 1].entity
+        if deed is ActionDeed.NEXT_SLOT:
+            return self._enter(move.entity, move.slot + 1, following, now_us)
+        if deed is ActionDeed.CROSS:
+            return self.body.go(self._permit(move.entity, move.slot), move.entity, move.slot, following, now_us)
         onward = steps[current + 2].entity if current + 2 < len(steps) else 0
-        slot = self.mirror.entry_slot(following, self.fleet.node_id)
-        return self._enter(following, slot, onward, now_us)
+        return self._enter(following, self.mirror.entry_slot(following, self.fleet.node_id), onward, now_us)
 
     def _enter(self, entity: int, slot: int, towards: int, now_us: int) -> list[Effect]:
         """Ask for the right to a slot and go there once it is held and the slot in hand is crossed."""
@@ -285,69 +352,33 @@ class Vehicle:
 
     # --- at stations -------------------------------------------------------------------------------------------
 
-    def _load(self, owned: Owned) -> Load | None:
+    def _load(self, owned: Owned) -> Load:
         step = owned.current
-        return next((load for load in owned.plan.loads if step in (load.pick, load.put)), None)
+        return next(load for load in owned.plan.loads if step in (load.pick, load.put))
+
+    def _box(self, owned: Owned) -> int:
+        return self._load(owned).box
 
     def _handle(self, action: Action, box: int, now_us: int) -> list[Effect]:
-        owned = self.owned
-        if self.body.is_handling or self._retry_at_us is not None or owned is None or not self.manual.may_begin(owned):
-            return []
-        assert self.body.handler is not None
-        if self.body.handler.gear is HandlerMode.FAILED and not self._may_retry:
-            self._retry_at_us = now_us + RETRY_US
-            return [Send(self.planner.report(owned, owned.current, now_us, StepResult.FAILED))]
-        self._may_retry = False
+        """Order the handler, with the right to the slot, and to the box where there is one."""
         move = self.body.move
         assert move is not None
         of_box = [self._box_token(box)] if box else []
         return self.body.handle(self._permit(move.entity, move.slot, *of_box), action, box, now_us)
 
-    def _dock(self, owned: Owned, now_us: int) -> list[Effect]:
-        assert self.body.handler is not None
-        if self.body.handler.gear is HandlerMode.DOCKED and not self.body.is_handling:
-            return self._done(owned, now_us)
-        return self._handle(Action.DOCK, 0, now_us) if self.body.stands_ready else []
-
-    def _pick_up(self, owned: Owned, now_us: int) -> list[Effect]:
-        """Only with the right to the box: its custodian gives it to whoever plans to carry it."""
-        load = self._load(owned)
-        assert load is not None and self.body.handler is not None
-        key = self._box_token(load.box)
-        if not self.fleet.tokens.holds(key):
-            return self.fleet.tokens.want(key, now_us)
-        if self.body.handler.box == load.box and not self.body.is_handling:
-            aboard = self._state_box(load.box, ANY_STATION)
-            return [*aboard, self._phase(load.task, TaskPhase.LOADED, 0), *self._done(owned, now_us)]
-        return self._handle(Action.PICK_UP, load.box, now_us)
-
-    def _put_down(self, owned: Owned, now_us: int) -> list[Effect]:
-        load = self._load(owned)
-        assert load is not None and self.body.handler is not None
-        if self.body.handler.box == 0 and not self.body.is_handling:
-            station = owned.plan.steps[owned.current].entity
-            effects: list[Effect] = [Record(box_record(self._box_at(load.box, station)))]
-            effects += self._state_box(load.box, station)
-            key = self._box_token(load.box)
-            if self.fleet.tokens.holds(key):
-                effects += self.fleet.tokens.give(key, self.site.desk, now_us)
-            return [*effects, self._phase(load.task, TaskPhase.DONE, station), *self._done(owned, now_us)]
-        return self._handle(Action.PUT_DOWN, load.box, now_us)
-
-    def _undock(self, owned: Owned, now_us: int) -> list[Effect]:
-        """Undocked and back in the bay of the area: the station is free."""
-        move, handler = self.body.move, self.body.handler
-        assert move is not None and handler is not None
-        area = self.site.entities[owned.plan.steps[owned.current].entity].area
-        if move.entity == area:
-            return self._done(owned, now_us)
-        if handler.gear is not HandlerMode.FREE or self.body.is_handling:
-            return self._handle(Action.UNDOCK, 0, now_us)
-        if self.body.is_moving or not self.manual.may_begin(owned):
+    def _of_load(self, deed: ActionDeed, owned: Owned, now_us: int) -> list[Effect]:
+        """What is said of the box that was just picked up or put down; nothing of any other action."""
+        if deed is ActionDeed.END:
             return []
-        steps = owned.plan.steps
-        towards = steps[owned.current + 2].entity if owned.current + 2 < len(steps) else 0
-        return self._enter(area, self.mirror.entry_slot(area, self.fleet.node_id), towards, now_us)
+        load, station = self._load(owned), owned.plan.steps[owned.current].entity
+        if deed is ActionDeed.END_ABOARD:
+            return [*self._state_box(load.box, ANY_STATION), self._phase(load.task, TaskPhase.LOADED, 0)]
+        effects: list[Effect] = [Record(box_record(self._box_at(load.box, station)))]
+        effects += self._state_box(load.box, station)
+        key = self._box_token(load.box)
+        if self.fleet.tokens.holds(key):
+            effects += self.fleet.tokens.give(key, self.site.desk, now_us)
+        return [*effects, self._phase(load.task, TaskPhase.DONE, station)]
 
     def _phase(self, task: Reference, phase: TaskPhase, station: int) -> Effect:
         return Send(TaskReport(self.fleet.node_id, task, phase, station or ANY_STATION, Reason.NONE))

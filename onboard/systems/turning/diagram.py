@@ -1,7 +1,9 @@
 """A turning cell over time: a row a lathe, a bar for each order, light while it is set up for, dark while it turns."""
 
 from onboard.contract.messages import Message, Reference
-from onboard.contract.turning import LathePhase, LatheProgress
+from onboard.contract.turning import LathePhase
+from onboard.history.history import Fact
+from onboard.systems.turning.history import ProgressTold
 from onboard.systems.turning.site import Turning
 from onboard.trace.chart.over_time import Bar, Panel, Rows
 
@@ -20,17 +22,14 @@ class TurningDiagram(Rows):
         self.panels = [self._panel]
         self._open: dict[tuple[int, Reference], tuple[LathePhase, int]] = {}
 
-    def take(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """A lathe tells how far an order is."""
-        if not isinstance(message, LatheProgress) or message.sender not in self._rows:
+        if not isinstance(fact, ProgressTold) or not fact.is_news:
             return
-        key = message.sender, Reference(message.manager, message.task)
-        known = self._open.get(key)
-        if known is not None and known[0] is message.lathe_phase:
-            return
+        key = fact.word.sender, fact.task
         self._close(key, time_us)
-        if message.lathe_phase in _OPACITY:
-            self._open[key] = message.lathe_phase, time_us
+        if fact.word.lathe_phase in _OPACITY:
+            self._open[key] = fact.word.lathe_phase, time_us
 
     def _close(self, key: tuple[int, Reference], time_us: int) -> None:
         phase, since_us = self._open.pop(key, (LathePhase.FINISHED, 0))

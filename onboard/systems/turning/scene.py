@@ -1,10 +1,10 @@
 """The turning cell: nothing drives there, so each lathe is a card with its orders, the parts made and worn edges."""
 
-from collections import OrderedDict
-
 from onboard.contract.messages import Message, Reference
-from onboard.contract.turning import BillBar, LathePhase, LatheProgress, NcMode
+from onboard.contract.turning import LathePhase, LatheProgress, NcMode
 from onboard.contract.turning_device import NcState, ToolState
+from onboard.history.history import Fact
+from onboard.systems.turning.history import ProgressTold, turning_history
 from onboard.systems.turning.site import Turning
 from onboard.trace.scene.scene import Json, shape, still
 from onboard.trace.view import SiteView
@@ -13,8 +13,6 @@ from onboard.trace.view import SiteView
 WIDTH, HEIGHT, GAP = 300.0, 250.0, 24.0
 #: Lathes side by side.
 COLUMNS = 3
-#: Prices that are remembered: the newest.
-MOST_KEPT = 256
 
 
 class TurningScene:
@@ -24,10 +22,9 @@ class TurningScene:
         self.site = site
         self.view = view
         self.words = view.words
-        self._progress: dict[int, OrderedDict[Reference, LatheProgress]] = {node: OrderedDict() for node in site.lathes}
+        self._seen = turning_history(view.history)
         self._modes: dict[int, NcMode] = {}
         self._worn: dict[tuple[int, int], int] = {}
-        self._prices: dict[tuple[int, Reference], int] = {}
 
     def layout(self) -> Json:
         """A card for each lathe."""
@@ -41,25 +38,11 @@ class TurningScene:
         size = {"width": GAP + columns * (WIDTH + GAP), "height": GAP + rows * (HEIGHT + GAP)}
         return {"plan": {**size, "shapes": shapes}}
 
-    def feed(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Follow bills, lathes, jobs and calls for the plan."""
-        match message:
-            case BillBar():
-                self._prices[message.sender, Reference(message.manager, message.task)] = message.total_ct
-                if len(self._prices) > MOST_KEPT:
-                    del self._prices[next(iter(self._prices))]
-            case LatheProgress() if message.sender in self._progress:
-                self._on_progress(message, time_us)
-
-    def _on_progress(self, message: LatheProgress, time_us: int) -> None:
-        task, row = Reference(message.manager, message.task), self._progress[message.sender]
-        known = row.get(task)
-        if known is None or known.lathe_phase is not message.lathe_phase:
-            words = message.lathe_phase.name.lower().replace("_", " ")
-            self.view.say(time_us, f"{self.view.name(message.sender)}: {self.words.thing(task)}, {words}")
-        row[task] = message
-        if message.lathe_phase is LathePhase.FINISHED:
-            del row[task]
+        if isinstance(fact, ProgressTold) and fact.is_news:
+            words = fact.word.lathe_phase.name.lower().replace("_", " ")
+            self.view.say(time_us, f"{self.view.name(fact.word.sender)}: {self.words.thing(fact.task)}, {words}")
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:
         """What a numerical control does, and its edges."""
@@ -71,7 +54,7 @@ class TurningScene:
 
     def machine(self, node: int, now_us: int) -> Json:
         """As in the port; a lathe is drawn as its card."""
-        row = self._progress.get(node)
+        row = self._seen.progress.get(node)
         if row is None:
             return {"where": "", "car": None}
         here = next((one for one in row.values() if one.lathe_phase is not LathePhase.QUEUED), None)
@@ -84,7 +67,7 @@ class TurningScene:
         """Lines and bars of every card."""
         marks: Json = {}
         for node, lathe in self.site.lathes.items():
-            row = self._progress[node]
+            row = self._seen.progress[node]
             bars = [
                 [f"order {task.number}", one.made / max(1, one.batch), f"{one.made} of {one.batch}"]
                 for task, one in row.items()
@@ -104,7 +87,7 @@ class TurningScene:
         return {"marks": marks, "things": []}
 
     def _line(self, node: int, task: Reference, one: LatheProgress) -> str:
-        price = self._prices.get((node, task))
+        price = self._seen.prices.get((node, task))
         cost = f", {price / 100:.2f} a part" if price is not None else ""
         return f"{self.words.thing(task)}: {one.lathe_phase.name.lower().replace('_', ' ')}{cost}"
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from onboard.contract.messages import BusTime, Message
+from onboard.contract.messages import Message
 from onboard.core.site import Site
-from onboard.history.clock import LoggedBusTime
+from onboard.history.history import Fact, History
 from onboard.systems.words import words_of
 from onboard.trace.chart.svg import SvgDrawing, colour, dashes
 from onboard.trace.listener import LoggedMessage
@@ -86,7 +86,7 @@ class Rows:
         self.first_us, self.last_us = 0 if from_us is None else from_us, 0
         self._name, self._machines = site.name, sorted(site.machines)
         self._until_us, self._is_begun = until_us, from_us is not None
-        self._clock = LoggedBusTime()
+        self.history = History(site)
 
     def feed(self, logged: LoggedMessage) -> None:
         """Take up one message of the fleet bus; what came before the time that is shown is heard all the same."""
@@ -95,13 +95,12 @@ class Rows:
         if not self._is_begun:
             self._is_begun, self.first_us = True, logged.time_us
         self.last_us = max(self.last_us, logged.time_us)
-        if isinstance(logged.message, BusTime):
-            self._clock.feed(logged.message, logged.time_us)
+        fact = self.history.feed(logged.message, logged.time_us)
         self.words.hear(logged.message)
-        self.take(logged.message, logged.time_us)
+        self.take(logged.message, fact, logged.time_us)
 
-    def take(self, message: Message, time_us: int) -> None:
-        """Take up one message at ``time_us``; each system's rows say which they draw."""
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
+        """Take up one message at ``time_us``, and what it told; each system's rows say which they draw."""
         raise NotImplementedError
 
     def end(self, time_us: int) -> None:
@@ -109,7 +108,7 @@ class Rows:
 
     def log_us(self, bus_ms: int, near_us: int) -> int:
         """The time of the log of a bus time in ms; ``near_us`` itself where nobody told bus time."""
-        found = self._clock.log_us(bus_ms, near_us)
+        found = self.history.clock.log_us(bus_ms, near_us)
         return near_us if found is None else found
 
     def draw(self, start_us: int) -> SvgDrawing:

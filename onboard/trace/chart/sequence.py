@@ -14,7 +14,6 @@ from onboard.contract.codes import (
     DeskText,
     DoorPosition,
     DriveMode,
-    Grade,
     LightColour,
     Operation,
     ShuttleMode,
@@ -24,20 +23,23 @@ from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import (
     BayState,
     CallForProposals,
-    CarAt,
     DeskEvent,
     DeskOrder,
     DoorState,
     DriveState,
     Itinerary,
     Message,
-    Progress,
     Reference,
     ShuttleState,
     TaskReport,
 )
 from onboard.core.site import Site
-from onboard.history.calls import BidMade, CallAnswered, CallFact, CallOpened, Calls
+from onboard.history.calls import BidMade, CallAnswered, CallOpened
+from onboard.history.history import History
+from onboard.history.loads import LoadTold
+from onboard.history.places import Place, PlaceTold
+from onboard.history.plans import PlanTold
+from onboard.history.tasks import TaskTold
 from onboard.trace.chart.svg import SvgDrawing
 from onboard.trace.listener import LoggedMessage
 from onboard.trace.words import Words
@@ -80,7 +82,7 @@ class _Story:
         self.owner = 0
         self.operation: Operation | None = None
         self.calls: set[tuple[int, int]] = set()
-        self._history = Calls()
+        self._history = History(site, is_bounded=False)
         self.offers: set[tuple[int, int]] = set()
         self._lifts = {site.stewards[track]: track for track in ways.lifts}
         self._platforms = set(ways.platforms)
@@ -97,9 +99,9 @@ class _Story:
         for receiver, text, step in self._fleet(message, logged.time_us) if logged.is_fleet else self._device(message):
             yield Arrow(logged.time_us, message.sender, receiver, text, step)
 
-    def _dealt(self, fact: CallFact | None) -> Iterator[tuple[int, str, int]]:
+    def _dealt(self, fact: CallOpened | BidMade | CallAnswered) -> Iterator[tuple[int, str, int]]:
         """What a message tells of the task's calls."""
-        if fact is None or fact.call is None or fact.call.terms.task != self.task:
+        if fact.call is None or fact.call.terms.task != self.task:
             return
         call = fact.call.terms
         match fact:
@@ -113,20 +115,21 @@ class _Story:
                 yield from self._answer(call, fact)
 
     def _fleet(self, message: Message, time_us: int) -> Iterator[tuple[int, str, int]]:
-        yield from self._dealt(self._history.feed(message, time_us))
-        match message:
-            case Itinerary() if (message.sender, message.version) in self.offers:
-                yield ALL, f"tentative itinerary, {len(message.legs)} legs", self._park(9)
-            case Itinerary() if message.grade is Grade.FIRM and self._is_ours(message):
-                yield ALL, f"itinerary {message.version}, {len(message.legs)} legs", self._once("plan", self._park(11))
-            case TaskReport() if message.task == self.task:
-                yield from self._report(message)
-            case CarAt() if message.car == self.car and self._changed("car", message.station):
+        match self._history.feed(message, time_us):
+            case CallOpened() | BidMade() | CallAnswered() as fact:
+                yield from self._dealt(fact)
+            case PlanTold(plan=plan) if (plan.sender, plan.version) in self.offers:
+                yield ALL, f"tentative itinerary, {len(plan.legs)} legs", self._park(9)
+            case PlanTold(plan=plan) as fact if fact.is_firm and self._is_ours(plan):
+                yield ALL, f"itinerary {plan.version}, {len(plan.legs)} legs", self._once("plan", self._park(11))
+            case TaskTold(report=report) if report.task == self.task:
+                yield from self._report(report)
+            case LoadTold(word=word) if word.car == self.car and self._changed("car", word.station):
                 names = self._words.system
-                where = "aboard" if message.station == ANY_STATION else f"at {names.place(message.station)}"
-                yield ALL, f"{names.thing(message.car)} {where}", 0
-            case Progress():
-                yield from self._progress(message)
+                where = "aboard" if word.station == ANY_STATION else f"at {names.place(word.station)}"
+                yield ALL, f"{names.thing(word.car)} {where}", 0
+            case PlaceTold(node=node, place=place):
+                yield from self._place(node, place)
 
     def _call(self, call: CallForProposals) -> Iterator[tuple[int, str, int]]:
         self.calls.add((call.sender, call.call))
@@ -158,13 +161,14 @@ class _Story:
         where = "" if "station" in names.silent else f", {names.place(report.station)}"
         yield ALL, f"task {report.phase.name.lower()}{where}", self._park(step)
 
-    def _progress(self, progress: Progress) -> Iterator[tuple[int, str, int]]:
-        if progress.sender == self.owner:
-            aboard = (progress.track, progress.index) in self._platforms
+    def _place(self, node: int, place: Place) -> Iterator[tuple[int, str, int]]:
+        index = place.segment.index
+        if node == self.owner:
+            aboard = place.segment in self._platforms
             if self._changed("aboard", aboard) and (aboard or self._changed("boarded", True) is False):
                 yield ALL, "on the platform" if aboard else "off the platform", self._after(17 if aboard else 20)
-        elif progress.sender in self._lifts and self.owner and self._changed(progress.sender, progress.index):
-            yield ALL, f"lift at floor {progress.index}", self._after(18 if progress.speed_mm_s else 19)
+        elif node in self._lifts and self.owner and self._changed(node, index):
+            yield ALL, f"lift at floor {index}", self._after(18 if place.speed_mm_s else 19)
 
     def _device(self, message: Message) -> Iterator[tuple[int, str, int]]:
         match message:

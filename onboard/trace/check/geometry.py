@@ -12,7 +12,6 @@ from onboard.contract.codes import TokenKind
 from onboard.contract.messages import DriveOrder, Progress
 from onboard.core.site import Segment, Site
 from onboard.trace.check.tokens_seen import Token
-from onboard.ways.lifts import is_same_stop, platform_on
 from onboard.ways.site import TrackKind, way_site
 
 PLATFORM_INDEX = 0
@@ -110,7 +109,8 @@ def sent_through(site: Site, body: ReportedPosition, order: DriveOrder) -> list[
     if aim is None or aim.track == body.track:
         return [] if aim is None else swept(site, body, aim.position_mm)
     lift = ways.platforms.get(here)
-    there = None if lift is None else platform_on(ways, lift, aim.track)
+    sills = () if lift is None else ways.tracks[lift].joins
+    there = next((ways.beyond(sill) for sill in sills if sill.track == aim.track), None)
     if there is not None:
         # By another door of the platform on which it stands.
         body = replace(body, track=there.track, index=there.index, position_mm=ways.position_mm(there))
@@ -164,8 +164,7 @@ def floors_of(site: Site, lift: ReportedPosition) -> list[int]:
     ways = way_site(site)
     joins = ways.tracks[lift.track].joins
     here = min(len(joins), max(1, lift.index))
-    numbered = enumerate(joins, start=1)
-    return [sill.track for index, sill in numbered if is_same_stop(ways, lift.track, here, index)]
+    return [sill.track for sill in ways.doors(lift.track, here)]
 
 
 def _index_at(position_mm: float, pitch_mm: int) -> int:

@@ -22,7 +22,6 @@ from onboard.core.site import Segment, Site
 from onboard.trace.check.event import LogEvent
 from onboard.trace.check.geometry import ReportedPosition, body_of, floors_of
 from onboard.trace.check.tokens_seen import TokensSeen
-from onboard.ways.lifts import platform_on
 from onboard.ways.site import way_site
 
 #: A machine that was not heard for so long counts as silent, us: three missing heartbeats (dbc/fleet.dbc).
@@ -108,7 +107,7 @@ class BusPicture:
         if lift_track is None or lift is None or body.track in floors_of(self.site, lift):
             return body
         ways, floor = way_site(self.site), floors_of(self.site, lift)[0]
-        at = platform_on(ways, lift_track, floor) or Segment(floor, body.index)
+        at = next(ways.beyond(sill) for sill in ways.tracks[lift_track].joins if sill.track == floor)
         return replace(body, track=at.track, index=at.index, position_mm=ways.position_mm(at))
 
     def feed(self, event: LogEvent[Message]) -> None:

@@ -5,7 +5,7 @@ import sys
 
 from onboard.contract.messages import Reference
 from onboard.core.site import Site
-from onboard.history.calls import Calls
+from onboard.history.history import History
 from onboard.systems.contract import codecs_for
 from onboard.trace.commands.common import (
     Commands,
@@ -59,18 +59,19 @@ def run_calls(args: argparse.Namespace) -> int:
     """Print every call of the log, or those for one task. Raises ``TraceError`` for systems without calls."""
     site = site_of(args)
     task = task_of(args.task, site)
-    listener, calls, words = Listener(codecs_for(site)), Calls(), Words(site)
+    listener, words = Listener(codecs_for(site)), Words(site)
+    history = History(site, is_bounded=False)
     start_us: int | None = None
     with open_log(args) as log:
         for said in listener.messages(log):
             start_us = said.time_us if start_us is None else start_us
             if said.is_fleet:
                 words.hear(said.message)
-                calls.feed(said.message, said.time_us)
+                history.feed(said.message, said.time_us)
                 done = words.system.finished(said.message)
                 if done is not None:
-                    calls.finish(done, said.time_us)
-    shown = [call for call in calls.all if task is None or call.terms.task == task]
+                    history.calls.finish(done, said.time_us)
+    shown = [call for call in history.calls.all if task is None or call.terms.task == task]
     for call in shown:
         print("\n".join(call_lines(call, words, start_us or 0)))
     print(f"{len(shown)} calls, {sum(len(call.bids) for call in shown)} bids")

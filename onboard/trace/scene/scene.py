@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
 from onboard.contract.messages import Message
+from onboard.history.history import Fact
 
 #: A value for JSON.
 Json = dict[str, Any]
@@ -25,8 +26,8 @@ class Scene(Protocol):
     def layout(self) -> Json:
         """What never changes; a key ``plan`` holds its ``width``, ``height`` and ``shapes``."""
 
-    def feed(self, message: Message, time_us: int) -> None:
-        """One message of the fleet bus."""
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
+        """One message of the fleet bus, and what the history made of it."""
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:
         """One message of a machine's device bus, where it is heard."""

@@ -2,6 +2,7 @@
 
 from onboard.contract.messages import Message
 from onboard.core.site import Site
+from onboard.history.history import Fact
 from onboard.systems.registry import part
 from onboard.trace.scene.scene import Json, Scene
 from onboard.trace.view import SiteView
@@ -14,7 +15,7 @@ class PlainScene:
         """An empty plan, 1000 x 60: nobody has said how to draw this system."""
         return {"plan": {"width": 1000, "height": 60, "shapes": []}}
 
-    def feed(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Nothing is drawn, so no message changes anything."""
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:

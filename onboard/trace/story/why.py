@@ -7,23 +7,14 @@ fleet bus said last before it: silence, a wait that was announced, a refusal, a 
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.contract.codes import CallResult, Grade, LegAction, ManualMode, Operation, Reason, TaskPhase, TokenKind
-from onboard.contract.messages import (
-    CallForProposals,
-    Heartbeat,
-    Itinerary,
-    Leg,
-    ManualState,
-    Message,
-    Progress,
-    Reference,
-    TaskReport,
-    TokenRefusal,
-    Waiting,
-)
+from onboard.contract.codes import CallResult, LegAction, Operation, Reason, TaskPhase, TokenKind
+from onboard.contract.messages import CallForProposals, Leg, Message, Reference, TaskReport
 from onboard.core.serial import ms_after
 from onboard.core.site import Segment, Site, Station
-from onboard.history.calls import CallAnswered, CallOpened, Calls, is_task
+from onboard.history.calls import CallAnswered, CallOpened, is_task
+from onboard.history.history import History
+from onboard.history.lives import Beat
+from onboard.history.tasks import TaskTold
 from onboard.systems.words import plain
 from onboard.trace.words import Words
 from onboard.ways.site import way_site
@@ -79,33 +70,17 @@ class TaskStory:
         return (self.parts[-1].end_us if self.parts else self.begin_us) - self.begin_us
 
 
-@dataclass
-class _WaitingMachine:
-    at: Segment | None = None
-    is_moving: bool = False
-    heard_us: int = 0
-    legs: tuple[Leg, ...] = ()
-    leg: int = 0
-    wait: Waiting | None = None
-    refusal: tuple[int, TokenRefusal] | None = None
-    boot: int | None = None
-    #: Started anew and has not moved since.
-    is_fresh: bool = False
-    #: A person holds it, and it has come to rest.
-    is_held: bool = False
-    #: What it does by its own last word, in a system whose machines tell that.
-    deed: str = ""
-
-
 class WaitingStory:
-    """A fold over the fleet bus: feed every message in the order of the log, then ``finish``."""
+    """A view of a history of its own: feed every message in the order of the log, then ``finish``."""
 
     def __init__(self, site: Site, words: Words | None = None) -> None:
         self.tasks: dict[Reference, TaskStory] = {}
         self._site = site
         self._words = words or Words(site)
-        self._calls = Calls()
-        self._bodies: dict[int, _WaitingMachine] = {}
+        self._history = History(site, is_bounded=False)
+        self._lives = self._history.lives
+        #: What each does by its own last word, in a system whose machines tell that.
+        self._deeds: dict[int, str] = {}
         self._open: list[TaskStory] = []
         self._silence_us = MISSED_BEATS * site.timing.heartbeat_us
         self._now_us: int | None = None
@@ -115,38 +90,22 @@ class WaitingStory:
         time_us = max(time_us, self._now_us or time_us)
         self._settle(time_us)
         self._now_us = time_us
-        body = self._body(message.sender)
-        if isinstance(message, Heartbeat):
-            self._on_heartbeat(body, message, time_us)
-        body.heard_us = time_us
+        fact = self._history.feed(message, time_us)
+        if isinstance(fact, Beat) and fact.is_restart:
+            self._on_restart(message.sender, fact.heard_us, time_us)
         self._words.hear(message)
-        body.deed = self._words.system.deed(message) or body.deed
-        self._deal(message, time_us)
-        match message:
-            case TaskReport():
-                self._on_report(message, time_us)
-            case Progress():
-                self._on_progress(body, message)
-            case Itinerary() if message.grade is Grade.FIRM:
-                body.legs, body.leg = message.legs, 0
-            case Waiting():
-                body.wait = message
-            case ManualState():
-                body.is_held = message.at_rest and message.manual_mode is not ManualMode.AUTOMATIC
-            case TokenRefusal():
-                self._body(message.requester).refusal = (time_us, message)
-
-    def _deal(self, message: Message, time_us: int) -> None:
-        """What a message tells of calls, and of tasks that no report ends."""
+        self._deeds[message.sender] = self._words.system.deed(message) or self._deeds.get(message.sender, "")
         done = self.tasks.get(self._words.system.finished(message) or Reference(0, 0))
         if done is not None and done.end_us is None:
             done.phases.setdefault(TaskPhase.DONE, time_us)
             self._end(done, time_us)
-        match self._calls.feed(message, time_us):
-            case CallOpened() as fact if is_task(fact.call.terms):
+        match fact:
+            case CallOpened() if is_task(fact.call.terms):
                 self._on_call(fact.call.terms, time_us)
-            case CallAnswered() as fact:
+            case CallAnswered():
                 self._on_answer(fact)
+            case TaskTold():
+                self._on_report(fact.report, time_us)
 
     def finish(self) -> None:
         """The log has ended: what is still waited for lasts until then."""
@@ -155,16 +114,10 @@ class WaitingStory:
 
     # --- messages ----------------------------------------------------------------------------------------------
 
-    def _body(self, node: int) -> _WaitingMachine:
-        return self._bodies.setdefault(node, _WaitingMachine())
-
-    def _on_heartbeat(self, body: _WaitingMachine, beat: Heartbeat, time_us: int) -> None:
-        if body.boot is not None and body.boot != beat.boot:
-            body.is_fresh, body.is_moving, body.wait, body.refusal = True, False, None, None
-            for story in self._open:
-                if beat.sender == (story.owner or story.caller):
-                    _put_down(story, body.heard_us, time_us, Cause("was off, and started anew", beat.sender))
-        body.boot = beat.boot
+    def _on_restart(self, node: int, heard_us: int, time_us: int) -> None:
+        for story in self._open:
+            if node == (story.owner or story.caller):
+                _put_down(story, heard_us, time_us, Cause("was off, and started anew", node))
 
     def _on_call(self, call: CallForProposals, time_us: int) -> None:
         story = self.tasks.get(call.task)
@@ -199,14 +152,6 @@ class WaitingStory:
         story.end_us = time_us
         self._open.remove(story)
 
-    def _on_progress(self, body: _WaitingMachine, progress: Progress) -> None:
-        at = Segment(progress.track, progress.index)
-        is_moving = progress.speed_mm_s != 0
-        if is_moving or at != body.at:
-            body.wait = body.refusal = None
-            body.is_fresh = False
-        body.at, body.is_moving, body.leg = at, is_moving, progress.leg
-
     # --- time --------------------------------------------------------------------------------------------------
 
     def _settle(self, now_us: int) -> None:
@@ -214,8 +159,8 @@ class WaitingStory:
         for story in self._open:
             begin_us = story.parts[-1].end_us if story.parts else story.begin_us
             whom = story.owner or story.caller
-            heard_us = self._body(whom).heard_us
-            if now_us - heard_us > self._silence_us:
+            heard_us = self._lives.heard_us.get(whom, 0)
+            if self._is_silent(whom, now_us):
                 # Nobody could know at first; now all since its last word is put down to the silence.
                 _put_down(story, heard_us, now_us, Cause("silent: crashed, cut off or switched off", whom))
             elif now_us > begin_us:
@@ -224,22 +169,22 @@ class WaitingStory:
     def _cause(self, story: TaskStory, now_us: int) -> Cause:
         if not story.owner:
             return self._negotiation(story)
-        if self._body(story.owner).is_held:
+        if self._history.hands.is_at_rest(story.owner):
             return Cause("held by a person", story.owner)
         before = next((one for one in self._open if one is not story and self._goes_first(one, story)), None)
         if before is not None:
             return Cause(f"still busy with task {self._words.reference(before.task)}", story.owner)
-        body = self._body(story.owner)
         if not way_site(self._site).tracks:
             # Machines of other systems tell no place that this fold knows; what they do is in their system's words.
             phase = max(story.phases, default=TaskPhase.AWARDED)
-            return Cause(body.deed or f"has the task, {plain(phase.name)}", story.owner)
-        lift = self._lift_under(body)
+            return Cause(self._deeds.get(story.owner) or f"has the task, {plain(phase.name)}", story.owner)
+        at = self._at(story.owner)
+        lift = way_site(self._site).platforms.get(at) if at is not None else None
         if lift is not None:
-            return self._ride(story, body, lift, now_us)
-        if body.is_moving:
+            return self._ride(story, lift, now_us)
+        if self._is_moving(story.owner):
             return Cause("drives", story.owner)
-        return self._standing(story, body, now_us)
+        return self._standing(story, now_us)
 
     def _negotiation(self, story: TaskStory) -> Cause:
         if story.result is not None:
@@ -254,66 +199,74 @@ class WaitingStory:
         begun = TaskPhase.STARTED in story.phases or TaskPhase.LOADED in story.phases
         return not begun and (TaskPhase.STARTED in other.phases or other.begin_us < story.begin_us)
 
-    def _lift_under(self, body: _WaitingMachine) -> int | None:
-        """Lift track of the platform on which a robot stands."""
-        return way_site(self._site).platforms.get(body.at) if body.at is not None else None
+    def _is_silent(self, node: int, now_us: int) -> bool:
+        return now_us - self._lives.heard_us.get(node, 0) > self._silence_us
 
-    def _ride(self, story: TaskStory, body: _WaitingMachine, lift: int, now_us: int) -> Cause:
+    def _at(self, node: int) -> Segment | None:
+        """Where a machine is, before its first word at home; None for who is no machine of the site."""
+        place = self._history.places.by_node.get(node)
+        return place.segment if place is not None else None
+
+    def _is_moving(self, node: int) -> bool:
+        place = self._history.places.by_node.get(node)
+        return place is not None and place.speed_mm_s != 0 and node not in self._lives.fresh
+
+    def _ride(self, story: TaskStory, lift: int, now_us: int) -> Cause:
         node = self._site.stewards[lift]
-        cabin = self._body(node)
-        if now_us - cabin.heard_us > self._silence_us:
+        if self._is_silent(node, now_us):
             return Cause("silent, with the robot on its platform", node)
-        if body.is_moving:
+        if self._is_moving(story.owner):
             return Cause("drives over the sill", story.owner)
         return Cause("carries the robot", node)
 
     def _lift_awaited(self, node: int, now_us: int) -> Cause:
-        cabin = self._body(node)
-        if now_us - cabin.heard_us > self._silence_us:
+        if self._is_silent(node, now_us):
             return Cause("silent while awaited at the sill", node)
-        return Cause("started anew, awaited at the sill" if cabin.is_fresh else "is not ready at the sill", node)
+        is_fresh = node in self._lives.fresh
+        return Cause("started anew, awaited at the sill" if is_fresh else "is not ready at the sill", node)
 
-    def _standing(self, story: TaskStory, body: _WaitingMachine, now_us: int) -> Cause:
-        if body.wait is not None:
-            if body.wait.track in way_site(self._site).lifts:
-                return self._lift_awaited(self._site.stewards[body.wait.track], now_us)
-            at, why = self._words.system.slot(body.wait.track, body.wait.index), plain(body.wait.reason.name)
-            return Cause(f"in the way at {at}: {why}", body.wait.blocker or story.owner)
-        leg = body.legs[body.leg] if body.leg < len(body.legs) else None
-        following = body.legs[body.leg + 1] if body.leg + 1 < len(body.legs) else None
-        work = self._work(body)
+    def _standing(self, story: TaskStory, now_us: int) -> Cause:
+        owner = story.owner
+        _, wait = self._lives.waits.get(owner, (0, None))
+        if wait is not None:
+            if wait.track in way_site(self._site).lifts:
+                return self._lift_awaited(self._site.stewards[wait.track], now_us)
+            at, why = self._words.system.slot(wait.track, wait.index), plain(wait.reason.name)
+            return Cause(f"in the way at {at}: {why}", wait.blocker or owner)
+        near = self._history.plans.ahead(owner)[:2]
+        leg, following = near[0] if near else None, near[1] if len(near) > 1 else None
+        work = self._work(owner, near)
         if work is not None:
             place = self._words.system.place(Station(work.track, work.from_index, work.side).number)
             done, noun = TaskPhase.LOADED in story.phases, self._words.system.noun
-            return Cause(f"{'leaves' if done else 'takes'} the {noun} at {place}", story.owner)
-        if body.is_fresh:
-            return Cause("started anew: finds its place and the others' plans first", story.owner)
-        refused = self._refused(body, now_us)
+            return Cause(f"{'leaves' if done else 'takes'} the {noun} at {place}", owner)
+        if owner in self._lives.fresh:
+            return Cause("started anew: finds its place and the others' plans first", owner)
+        refused = self._refused(owner, now_us)
         if refused is not None:
             return refused
         ride = next((one for one in (leg, following) if one is not None and one.action is LegAction.RIDE), None)
-        if ride is not None and (leg is ride or self._is_at_end(body, leg)):
+        if ride is not None and (leg is ride or self._is_at_end(owner, leg)):
             return self._lift_awaited(self._site.stewards.get(ride.track, 0), now_us)
         if leg is not None and leg.action is LegAction.STAND:
             return self._planned_wait(story, following)
-        return Cause("about to move: rights asked for, orders on their way", story.owner)
+        return Cause("about to move: rights asked for, orders on their way", owner)
 
-    def _work(self, body: _WaitingMachine) -> Leg | None:
+    def _work(self, owner: int, near: tuple[Leg, ...]) -> Leg | None:
         """The plan's leg of taking or leaving a car right here: progress counts it with the way before it."""
-        near = body.legs[body.leg : body.leg + 2]
         for leg in near:
-            is_here = leg.action is LegAction.WORK and body.at == Segment(leg.track, leg.from_index)
-            if is_here and (leg is near[0] or self._is_at_end(body, near[0])):
+            is_here = leg.action is LegAction.WORK and self._at(owner) == Segment(leg.track, leg.from_index)
+            if is_here and (leg is near[0] or self._is_at_end(owner, near[0])):
                 return leg
         return None
 
-    def _is_at_end(self, body: _WaitingMachine, leg: Leg | None) -> bool:
-        return leg is not None and body.at == Segment(leg.track, leg.to_index)
+    def _is_at_end(self, owner: int, leg: Leg | None) -> bool:
+        return leg is not None and self._at(owner) == Segment(leg.track, leg.to_index)
 
-    def _refused(self, body: _WaitingMachine, now_us: int) -> Cause | None:
-        if body.refusal is None or now_us - body.refusal[0] > _REFUSAL_US:
+    def _refused(self, owner: int, now_us: int) -> Cause | None:
+        told_us, refusal = self._lives.refusals.get(owner, (0, None))
+        if refusal is None or now_us - told_us > _REFUSAL_US:
             return None
-        refusal = body.refusal[1]
         if refusal.token_kind is TokenKind.SEGMENT and refusal.token >> 8 in way_site(self._site).lifts:
             # Platform and gate are asked for in turn: to the customer it is one wait.
             return self._lift_awaited(refusal.sender, now_us)
@@ -326,11 +279,11 @@ class WaitingStory:
         if following is None:
             return Cause("stands as planned", story.owner)
         low, high = sorted((following.from_index, following.to_index))
-        for node, other in self._bodies.items():
+        for node, plan in self._history.plans.firm.items():
             if node != story.owner and any(
                 leg.track == following.track and low <= max(leg.from_index, leg.to_index)
                 and min(leg.from_index, leg.to_index) <= high and ms_after(leg.end_ms, following.end_ms) <= 0
-                for leg in other.legs
+                for leg in plan.legs
             ):  # fmt: skip
                 return Cause("goes first, by plan", node)
         return Cause("stands as planned", story.owner)

@@ -13,6 +13,10 @@ class ShopWords(SiteWords):
         """What is polished goes nowhere."""
         return ""
 
+    def place(self, number: int) -> str:
+        """There is one place."""
+        return "the shop"
+
     def done(self, load: Reference, station: int) -> str:
         """A part that is done."""
         return f"has polished {self.thing(load)}"

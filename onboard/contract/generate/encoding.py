@@ -1,0 +1,293 @@
+"""Straight-line functions from message objects to bytes as Python text.
+
+A frame is cut into words of 1, 2, 4 or 8 bytes, and ``struct`` packs them; a signal that crosses a cut is taken in
+parts. Of all cuts the cheapest is taken, by the nanoseconds that CPython 3.11 needs for each step on the machine of
+docs/figures.md (bench/codec.py). Its whole numbers have digits of 30 bits and fast ways for sums and products of one
+digit. Where a signal ends where its word ends, ``struct`` checks its range, for nothing.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from onboard.contract.generate.decoding import function_name, shape
+from onboard.contract.generate.model import TUPLES, YES_NO, DbcMessage, Field
+from onboard.wire.dbc_file import SignalLayout
+
+#: Letters of ``struct`` by length in bytes.
+_LETTERS = {1: "B", 2: "H", 4: "I", 8: "Q"}
+_DIGIT_BITS = 30
+#: Signals as short have a dictionary for what they add to a word: 18 kB at most.
+_TABLE_BITS = 8
+_FRAME_BYTES = 8
+#: What steps cost, in ns: least squares over the twelve likeliest cuts of every message. A word more, one of more than
+#: a digit put together, the whole frame as one number; ``&`` and ``>>``; ``*`` within a digit, to more than one and by
+#: more than one; ``+`` within a digit and beyond; a table instead, less the check; to make a negative number a
+#: positive one, half of all being so; to check a range, and one of more than a digit.
+_WORD_NS, _BIG_WORD_NS, _FRAME_NS, _AND_NS, _SHIFT_NS = 1, 10, 14, 7, 11
+_TIMES_NS, _CROSS_TIMES_NS, _LONG_TIMES_NS, _PLUS_NS, _LONG_PLUS_NS = 5, 8, 14, 9, 10
+_TABLE_NS, _SIGN_NS, _CHECK_NS, _LONG_CHECK_NS = -8, 10, 11, 20
+
+
+class Piece(NamedTuple):
+    """Bits ``first`` to ``first + bits`` of a signal, at the bit ``at`` of a word."""
+
+    signal: SignalLayout
+    first: int
+    bits: int
+    at: int
+
+    @property
+    def has_sign(self) -> bool:
+        """Whether it is the upper end of a signal, or all of it."""
+        return self.first + self.bits == self.signal.bits
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it is all of its signal."""
+        return self.bits == self.signal.bits
+
+
+class Word(NamedTuple):
+    """Bytes ``start`` to ``start + length`` of a frame; without pieces they are 0."""
+
+    start: int
+    length: int
+    pieces: tuple[Piece, ...]
+
+    @property
+    def closing(self) -> SignalLayout | None:
+        """The signal that ends with the word, None where none does: ``struct`` refuses what it cannot hold."""
+        last = self.pieces[-1]
+        return last.signal if last.has_sign and last.at + last.bits == self.length * 8 else None
+
+    @property
+    def letter(self) -> str:
+        """The word in a format of ``struct``."""
+        if not self.pieces:
+            return "x" * self.length
+        letter = _LETTERS[self.length]
+        return letter.lower() if self.closing is not None and self.closing.signed else letter
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it is a whole frame that ``int.to_bytes`` writes."""
+        return bool(self.pieces) and self.letter == "Q"
+
+
+def words(frame: DbcMessage) -> tuple[Word, ...]:
+    """The cheapest cut of a frame into words."""
+    best: dict[int, tuple[int, tuple[Word, ...]]] = {0: (0, ())}
+    for end in range(1, frame.layout.length + 1):
+        found = []
+        for size in reversed(_LETTERS):
+            if end - size in best:
+                cost, before = best[end - size]
+                word = Word(end - size, size, tuple(_pieces(frame, (end - size) * 8, end * 8)))
+                found.append((cost + _cost(word), (*before, word)))
+        best[end] = min(found, key=lambda one: one[0])
+    return best[frame.layout.length][1]
+
+
+def _pieces(frame: DbcMessage, low: int, high: int) -> Iterator[Piece]:
+    for signal in sorted(frame.layout.signals, key=lambda one: one.shift):
+        first, end = max(signal.shift, low), min(signal.shift + signal.bits, high)
+        if first < end:
+            yield Piece(signal, first - signal.shift, end - first, first - low)
+
+
+def _cost(word: Word) -> int:
+    """Nanoseconds of a word, less those of the checks that it spares."""
+    if not word.pieces:
+        return 0
+    last, closing = word.pieces[-1], word.closing
+    cost = _FRAME_NS if word.length == _FRAME_BYTES else _WORD_NS
+    if word.letter == "I" and len(word.pieces) > 1 and last.at + last.bits > _DIGIT_BITS:
+        cost += _BIG_WORD_NS
+    cost += sum(_piece_cost(word, piece) for piece in word.pieces)
+    if closing is not None and not closing.choices:
+        check = _LONG_CHECK_NS if closing.maximum >= 1 << _DIGIT_BITS else _CHECK_NS
+        cost -= check * (_is_free(closing, is_low=True) + _is_free(closing, is_low=False)) // 2
+    return cost
+
+
+def _piece_cost(word: Word, piece: Piece) -> int:
+    signal, is_long = piece.signal, piece.at + piece.bits > _DIGIT_BITS
+    cost = (0 if piece.has_sign else _AND_NS) + (_SHIFT_NS if piece.first else 0)
+    cost += 0 if piece.is_whole or signal.bits <= _DIGIT_BITS else _BIG_WORD_NS
+    if signal.signed and piece.has_sign and word.closing is not signal:
+        cost += _SIGN_NS
+    if not piece.at:
+        return cost
+    cost += _LONG_PLUS_NS if is_long else _PLUS_NS
+    if _is_fixed(word, piece):
+        return cost + (_TIMES_NS if signal.choices else _TABLE_NS)
+    if piece.at >= _DIGIT_BITS:
+        return cost + _LONG_TIMES_NS
+    return cost + (_CROSS_TIMES_NS if is_long else _TIMES_NS)
+
+
+def _is_free(signal: SignalLayout, *, is_low: bool) -> bool:
+    """Whether one end of a signal's range is that of its bits."""
+    low = -(1 << signal.bits - 1) if signal.signed else 0
+    if signal.scale != 1 or signal.offset:
+        return False
+    return signal.minimum == low if is_low else signal.maximum == low + (1 << signal.bits) - 1
+
+
+def _is_from_table(word: Word, piece: Piece) -> bool:
+    """Whether a dictionary has what a piece adds to its word: it takes the place of a product and of a check."""
+    signal = piece.signal
+    is_small = piece.is_whole and piece.bits <= _TABLE_BITS and not signal.signed and signal.scale == 1
+    return is_small and piece.at > 0 and not signal.choices and (word.is_number or word.closing is not signal)
+
+
+def _table(piece: Piece) -> tuple[str, str]:
+    """Name and value of that dictionary."""
+    signal = piece.signal
+    name = f"_FROM_{signal.minimum}_TO_{signal.maximum}_AT_{piece.at}"
+    ends = f"{signal.minimum}, {signal.maximum + 1}" if signal.minimum else f"{signal.maximum + 1}"
+    return name, f"{{value: value << {piece.at} for value in range({ends})}}"
+
+
+def _is_fixed(word: Word, piece: Piece) -> bool:
+    """Whether a piece needs no product: it comes out of a table, or is yes or no above the lowest bit."""
+    return _is_from_table(word, piece) or (piece.signal.choices == YES_NO and piece.at > 0)
+
+
+class _Lines:
+    """A function in the making: its statements, and the names that its expressions use for signals."""
+
+    def __init__(self, frame: DbcMessage) -> None:
+        self.frame = frame
+        self.words = tuple(word for word in words(frame))
+        self.body: list[str] = []
+        self.names: dict[str, str] = {}
+        #: Signals whose range, or one end of it, is not checked before they are packed.
+        self.late: list[str] = []
+        for field in frame.fields:
+            self._take(field)
+
+    def _take(self, field: Field) -> None:
+        """Get a field's values and refuse those out of range."""
+        whole = field.name
+        if field.kind in TUPLES:
+            self.body.append(f"    {whole} = message.{whole}")
+        for number, signal in enumerate(field.signals):
+            source = f"{whole}.{TUPLES[field.kind][number]}" if field.kind in TUPLES else f"message.{whole}"
+            checks = list(self._checks(field, number)) if field.kind in ("int", *TUPLES) else []
+            pieces = [piece for word in self.words for piece in word.pieces if piece.signal == signal]
+            closes = any(word.closing == signal for word in self.words if word.pieces)
+            is_turned = signal.signed and not closes
+            if not checks and len(pieces) == 1 and not is_turned:
+                self.names[signal.name] = source
+                continue
+            self.names[signal.name] = signal.name
+            self.body += [f"    {signal.name} = {source}", *checks]
+            if signal.scale != 1 and len(pieces) > 1:
+                self.body.append(f"    {signal.name} = {_scaled(signal, signal.name)}")
+            if is_turned:
+                self.body += [f"    if {signal.name} < 0:", f"        {signal.name} += 0x{1 << signal.bits:X}"]
+
+    def _checks(self, field: Field, number: int) -> Iterator[str]:
+        signal = field.signals[number]
+        name = signal.name
+        word = next((word for word in self.words if word.pieces and word.closing == signal), None)
+        low = word is not None and _is_free(signal, is_low=True)
+        high = word is not None and _is_free(signal, is_low=False)
+        if any(_is_from_table(word, piece) for word in self.words for piece in word.pieces if piece.signal == signal):
+            low = high = True
+        if low or high:
+            path = f"{field.name}.{TUPLES[field.kind][number]}" if field.kind in TUPLES else name
+            self.late.append(f'("{self.frame.layout.name}.{path}", {signal.minimum}, {signal.maximum})')
+        if low and high:
+            return
+        wrong = f"{name} > {signal.maximum}" if low else f"{name} < {signal.minimum}"
+        yield f"    if {wrong}:" if low or high else f"    if not {signal.minimum} <= {name} <= {signal.maximum}:"
+        where = f'"{self.frame.layout.name}.{name}"'
+        yield f"        raise OutOfRangeError({where}, {name}, {signal.minimum}, {signal.maximum})"
+
+    def result(self) -> tuple[str, str]:
+        """The expression of the bytes, and what it raises for a value out of its range."""
+        used = [word for word in self.words if word.pieces]
+        errors = []
+        if any(_is_from_table(word, piece) for word in used for piece in word.pieces):
+            errors.append("KeyError")
+        if used and used[0].is_number:
+            errors += ["OverflowError"] if used[0].closing else []
+            made = f'({self._number(used[0])}).to_bytes({_FRAME_BYTES}, "little")'
+        else:
+            errors.append("struct.error")
+            made = f"{_packer(self.words)[0]}({', '.join(self._number(word) for word in used)})"
+        return made, errors[0] if len(errors) == 1 else f"({', '.join(errors)})"
+
+    def _number(self, word: Word) -> str:
+        """The expression that makes a word of its pieces, those of one digit of a whole number together."""
+        digits: list[list[Piece]] = []
+        for piece in word.pieces:
+            is_apart = _is_fixed(word, piece)
+            fits = digits and not _is_fixed(word, digits[-1][0]) and not is_apart
+            if fits and piece.at + piece.bits - digits[-1][0].at <= _DIGIT_BITS:
+                digits[-1].append(piece)
+            else:
+                digits.append([piece])
+        sums = []
+        for digit in digits:
+            if _is_fixed(word, digit[0]):
+                sums.append(self._fixed(digit[0]))
+                continue
+            total = " + ".join(_times(self._term(word, piece), piece.at - digit[0].at) for piece in digit)
+            shift = digit[0].at
+            sums.append(_times(f"({total})" if shift and len(digit) > 1 else total, shift))
+        return " + ".join(sums)
+
+    def _fixed(self, piece: Piece) -> str:
+        name = self.names[piece.signal.name]
+        if piece.signal.choices:
+            return f"(0x{1 << piece.at:X} if {name} else 0)"
+        return f"{_table(piece)[0]}[{name}]"
+
+    def _term(self, word: Word, piece: Piece) -> str:
+        """What a piece has of its signal."""
+        signal = piece.signal
+        name = self.names[signal.name]
+        if piece.is_whole:
+            term = _scaled(signal, name)
+            return f"({term})" if term != name and len(word.pieces) > 1 else term
+        term = f"{name} >> {piece.first}" if piece.first else name
+        if not piece.has_sign:
+            term += f" & 0x{(1 << piece.bits) - 1:X}"
+        return f"({term})" if len(word.pieces) > 1 else term
+
+
+def _scaled(signal: SignalLayout, name: str) -> str:
+    """What a signal holds of a value."""
+    if signal.scale == 1:
+        return name
+    return f"({name} - {signal.offset}) // {signal.scale}" if signal.offset else f"{name} // {signal.scale}"
+
+
+def _times(term: str, shift: int) -> str:
+    return f"{term} * 0x{1 << shift:X}" if shift else term
+
+
+def pack_function(frame: DbcMessage) -> str:
+    """The function from a message to its bytes."""
+    lines = _Lines(frame)
+    made, errors = lines.result()
+    text = [f"def pack_{function_name(frame)}(message: {frame.layout.name}) -> bytes:", *lines.body]
+    if not lines.late:
+        return "\n".join([*text, f"    return {made}"]) + "\n"
+    text += ["    try:", f"        return {made}", f"    except {errors} as error:"]
+    return "\n".join([*text, f"        raise refusal(message, {', '.join(lines.late)}) from error"]) + "\n"
+
+
+def tools(frame: DbcMessage) -> set[tuple[str, str]]:
+    """Names and values of what a frame's function uses."""
+    cut = words(frame)
+    found = {_table(piece) for word in cut for piece in word.pieces if _is_from_table(word, piece)}
+    return found if any(word.is_number for word in cut) else found | {_packer(cut)}
+
+
+def _packer(cut: tuple[Word, ...]) -> tuple[str, str]:
+    layout = "<" + "".join(word.letter for word in cut)
+    return f"_PACK_{shape(layout)}", f'struct.Struct("{layout}").pack'

@@ -1,0 +1,1 @@
+"""The car park: what tests of every system must know of it."""

@@ -1,0 +1,41 @@
+"""A machine that bids and does nothing starves nobody, on any system that calls: served, or told why."""
+
+import pytest
+
+from bus_sim.campaign.strangers import StrangerPlan, play_pair
+from bus_sim.cli import main
+from bus_sim.sites import find_site
+from bus_sim.systems.orders import OrderArrivals
+from bus_sim.systems.registry import simulated_of
+from bus_sim.systems.stranger import Stranger
+from tests.conformance.cases import CASES
+from tests.conformance.runs import site_file, site_of
+from tests.thinned import some
+
+BESIDE = [(case.system, how, case.orders) for case in CASES.values() if case.orders is not None for how in Stranger]
+#: Nobody there bids by the core's calls.
+WITHOUT = [name for name in CASES if simulated_of(site_of(name)).worker is None]
+
+
+@pytest.mark.parametrize(("system", "how", "orders"), some(BESIDE, 6))
+def test_orders_are_served_or_told_why_beside_a_stranger(system: str, how: Stranger, orders: OrderArrivals) -> None:
+    limit_s = simulated_of(site_of(system)).patience_s(site_of(system), orders, 1)
+    pair = play_pair(StrangerPlan(site_file(system), how, orders, limit_s), 1)
+    assert pair.is_good, pair.line()
+    assert pair.strange.served, "not all of them refused"
+
+
+def test_two_desks_that_want_one_box_get_two() -> None:
+    """Who had won it for one desk dropped it as the other called for it, and one mission got a box too few."""
+    site = find_site("terminal")
+    system = simulated_of(site)
+    orders = system.usual(site, {})
+    limit_s = system.patience_s(site, orders, 5)
+    pair = play_pair(StrangerPlan("terminal", Stranger.LIAR, orders, limit_s), 5)
+    assert pair.is_good, pair.line()
+
+
+@pytest.mark.parametrize("system", WITHOUT)
+def test_a_site_on_which_nobody_can_be_a_stranger_says_so(system: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["campaign", site_file(system), "--stranger", "stands", "--seeds", "1-1"]) == 2
+    assert "where no machine bids by the calls of all" in capsys.readouterr().err
