@@ -11,8 +11,12 @@ from rich.live import Live
 from rich.text import Text
 
 from bus_sim.systems.car_park.car_labels import bay_letters, car_labels
+from bus_sim.systems.car_park.show_plan import draw_plans
+from bus_sim.systems.car_park.slots import boxed, named, style
 from onboard.contract.codes import KindCode, MachineState, Side
 from onboard.core.site import Segment, Station
+from onboard.systems.car_park.outlines import is_elevation
+from onboard.systems.car_park.site import car_park
 from onboard.trace.view import SiteView
 from onboard.ways.lifts import lift_at, lift_tracks, sill
 from onboard.ways.site import TrackKind, WaySite
@@ -28,7 +32,6 @@ _ENOUGH = 1_000
 
 #: Columns before an alley: its floor and side.
 _LABEL = 5
-_LOADED = "bold reverse green"
 _STATE_WORDS = {
     MachineState.STARTING: "starting",
     MachineState.IDLE: "idle",
@@ -86,9 +89,9 @@ def draw_floor(site: WaySite, view: SiteView, track: int, cell: int = CELLS[0]) 
             station = Station(track, index, side)
             car = taken.get(station.number)
             if station in compartments:
-                row.append(_boxed(labels[car] if car else "I/O", "[]", cell), style="bold magenta")
+                row.append(boxed(labels[car] if car else "I/O", "[]", cell), style="bold magenta")
             elif station in places:
-                row.append(_boxed(labels[car] if car else "", "||", cell), style="cyan" if car else "dim")
+                row.append(boxed(labels[car] if car else "", "||", cell), style="cyan" if car else "dim")
             elif site.spurs.get(station.segment) is not None and _is_at_spur(station, places | compartments):
                 row.append_text(_spur(view, Segment(site.spurs[station.segment], 1), cell))
             else:
@@ -106,20 +109,8 @@ def _is_at_spur(station: Station, stations: set[Station]) -> bool:
 def _spur(view: SiteView, inside: Segment, cell: int) -> Text:
     node = next((node for node, place in view.history.places.by_node.items() if place.segment == inside), None)
     if node is None:
-        return Text(_boxed("", "()", cell), style="dim")
-    return Text(_boxed(view.name(node)[-3:], "()", cell), style=_style(view, [node]))
-
-
-def _style(view: SiteView, nodes: list[int]) -> str:
-    """Of machines drawn in one place: whether any of them carries a car."""
-    return _LOADED if any(node in view.history.loads.aboard for node in nodes) else "bold green"
-
-
-def _boxed(text: str, box: str, cell: int) -> str:
-    """Text of one position; a narrow one has no walls, and an empty place is a dash."""
-    if cell >= CELLS[0]:
-        return f"{box[0]}{text[-3:]:^3}{box[1]}"
-    return f"{text[-cell:] or '-':^{cell}}"
+        return Text(boxed("", "()", cell), style="dim")
+    return Text(boxed(view.name(node)[-3:], "()", cell), style=style(view, [node]))
 
 
 def _alley(site: WaySite, view: SiteView, track: int, cell: int) -> Text:
@@ -139,8 +130,7 @@ def _alley(site: WaySite, view: SiteView, track: int, cell: int) -> Text:
         if nodes is None:
             row.append(f"{'.':^{cell}}", style="dim")
         else:
-            name = view.name(nodes[0])
-            row.append(f"{name[:4] if cell > 4 else name[-cell:]:^{cell}}", style=_style(view, nodes))
+            row.append(named(view, nodes[0], cell), style=style(view, nodes))
     row.append_text(_shaft(site, view, track, site.tracks[track].length + 1, cell))
     return row
 
@@ -213,8 +203,12 @@ def _headed(text: str, width: int) -> Text:
 def _floors(site: WaySite, view: SiteView, width: int, room: int, events: int) -> list[Text]:
     """All floors, the highest first, so that ``events`` of ``room`` lines are left.
 
-    Each has three lines, or one where that is too much; what has no room even so are the highest.
+    Each has three lines, or one where that is too much; what has no room even so are the highest. Where floors are more
+    than an alley each they are drawn from above.
     """
+    park = car_park(site)
+    if not is_elevation(park):
+        return draw_plans(park, view, width)[-max(1, room - events) :]
     cell = cell_width(site, width)
     tracks = sorted((n for n, t in site.tracks.items() if t.kind is TrackKind.ALLEY), reverse=True)
     if FLOOR_LINES * len(tracks) + events <= room:

@@ -21,10 +21,13 @@ from onboard.history.rights import RightTold
 from onboard.trace.chart.over_time import BOTTOM, GAP, LEFT, RIGHT, TOP, WIDTH, name_machines, time_axis
 from onboard.trace.chart.svg import SvgDrawing, colour, dashes
 from onboard.trace.listener import LoggedMessage
-from onboard.ways.site import way_site
+from onboard.ways.lifts import stop_mm
+from onboard.ways.site import Track, TrackKind, WaySite, way_site
 
-#: Height of a segment's row, and of a lift's floor, pixels.
-_ROW, _MOST_HEIGHT = 14.0, 260.0
+#: How far from a track's ends its drives may tell of, segments: a platform, and what is missed of its mark.
+_BEYOND = 1.5
+#: Height of a segment's row at most, of a panel at least, and of the longest at most, pixels.
+_ROW, _LEAST_HEIGHT, _MOST_HEIGHT = 14.0, 42.0, 260.0
 
 
 class TrackPoint(NamedTuple):
@@ -110,6 +113,9 @@ class Watcher:
         if track is None:
             return
         place = segment.index - 1 + at.offset_mm / track.pitch_mm
+        if not -_BEYOND <= place <= track.length - 1 + _BEYOND:
+            # On the way through a lift in line, told by the track that it left.
+            return
         point = TrackPoint(time_us, place, at.speed_mm_s)
         run = self._open.get(node)
         if run is not None and run[0] == segment.track:
@@ -189,10 +195,16 @@ def watch(
 
 
 def draw(site: Site, picture: TrackDiagram, start_us: int) -> SvgDrawing:
-    """The diagram: a panel for each floor, lift and spur; seconds since ``start_us`` along the top."""
+    """The diagram: a panel for each alley, spur and lift; seconds since ``start_us`` along the top.
+
+    The highest floor comes first, lifts last with their highest floor at the top; all panels have one scale.
+    """
     ways = way_site(site)
-    tracks = list(ways.tracks.values())
-    heights = [min(_MOST_HEIGHT, _ROW * max(3, track.length + 2)) for track in tracks]
+    tracks = sorted(ways.tracks.values(), key=lambda one: _order(ways, one))
+    lengths = {track.number: _segments(ways, track) for track in tracks}
+    longest_mm = max((lengths[track.number] + 2) * track.pitch_mm for track in tracks)
+    px_mm = min(_ROW / min(track.pitch_mm for track in tracks), _MOST_HEIGHT / longest_mm)
+    heights = [max(_LEAST_HEIGHT, (lengths[track.number] + 2) * track.pitch_mm * px_mm) for track in tracks]
     drawing = SvgDrawing(WIDTH, TOP + sum(heights) + GAP * len(tracks) + BOTTOM, f"{site.name}: time and space")
     numbers = {node: number for number, node in enumerate(sorted(site.machines))}
     moving = [site.machines[node] for node in sorted({node for node, _, _ in picture.runs} & set(site.machines))]
@@ -203,21 +215,45 @@ def draw(site: Site, picture: TrackDiagram, start_us: int) -> SvgDrawing:
     top = float(TOP)
     for track, height in zip(tracks, heights, strict=True):
         is_lift = track.number in ways.lifts
-        name = f"lift {site.machines[site.stewards[track.number]].name}" if is_lift else f"track {track.number}"
+        lift_name = next((one.name for one in site.machines.values() if one.home.track == track.number), "")
+        name = f"lift {lift_name}" if is_lift else f"track {track.number}"
         drawing.area([(LEFT, top), (WIDTH - RIGHT, top), (WIDTH - RIGHT, top + height), (LEFT, top + height)],
                      "#f3f3f3", opacity=1)  # fmt: skip
         drawing.text(8, top + 12, name)
         speed_mm_s = (ways.lift if is_lift else ways.carrier).speed_mm_s
         panel = _Panel(
-            drawing, picture, track.number, top, height, track.length, scale, track.pitch_mm, max(1, speed_mm_s)
+            drawing,
+            picture,
+            track.number,
+            top,
+            height,
+            lengths[track.number],
+            scale,
+            track.pitch_mm,
+            max(1, speed_mm_s),
         )
-        panel.rows(is_lift=is_lift)
+        if is_lift:
+            panel.levels = [ways.level(sill.track) for sill in track.joins]
+            panel.stops = [stop_mm(ways, track.number, stop) / track.pitch_mm for stop in range(1, track.length + 1)]
+        panel.rows()
         panel.bands(picture.reservations, numbers, 0.22, "reserved", site)
         panel.bands(picture.authority, numbers, 0.38, "authority", site)
         panel.runs(numbers)
         top += height + GAP
     time_axis(drawing, picture.first_us, picture.last_us, start_us, top)
     return drawing
+
+
+def _segments(ways: WaySite, track: Track) -> float:
+    """How long a track is in its pitches: a shaft from its lowest stop to its highest, and one floor."""
+    return (
+        1 + stop_mm(ways, track.number, track.length) / track.pitch_mm if track.number in ways.lifts else track.length
+    )
+
+
+def _order(ways: WaySite, track: Track) -> tuple[int, int]:
+    """Floors from the highest, each with its spurs, then lifts."""
+    return (0 if track.kind is TrackKind.LIFT else -ways.level(track.number)), track.number
 
 
 @dataclass
@@ -227,23 +263,35 @@ class _Panel:
     track: int
     top: float
     height: float
-    length: int
+    length: float
     scale: float
     pitch_mm: int
     speed_mm_s: int
+    #: Of a lift: the floors of its stops, and their heights in pitches; it has the highest at the top.
+    levels: list[int] = field(default_factory=list)
+    stops: list[float] = field(default_factory=list)
 
     def x(self, time_us: float) -> float:
         return min(WIDTH - RIGHT, max(LEFT, LEFT + (time_us - self.picture.first_us) * self.scale))
 
     def y(self, place: float) -> float:
         """Platforms lie beside an alley, at both ends: places -1 and the length."""
-        share = (place + 1.5) / (self.length + 2)
+        share = (self._along(place) + 1.5) / (self.length + 2)
+        share = 1 - share if self.stops else share
         return self.top + self.height * min(1.0, max(0.0, share))
 
-    def rows(self, *, is_lift: bool) -> None:
+    def _along(self, place: float) -> float:
+        """Where a place is in pitches: between a lift's stops by their heights."""
+        if not self.stops:
+            return place
+        low = max(0, min(len(self.stops) - 1, int(place)))
+        high = min(len(self.stops) - 1, low + 1)
+        return self.stops[low] + (self.stops[high] - self.stops[low]) * min(1.0, max(0.0, place - low))
+
+    def rows(self) -> None:
         every = max(1, round(12 / (self.height / (self.length + 2))))
-        for index in range(1, self.length + 1, every):
-            label = f"floor {index}" if is_lift else f"p({self.track},{index})"
+        for index in range(1, (len(self.levels) or round(self.length)) + 1, every):
+            label = f"floor {self.levels[index - 1]}" if self.levels else f"p({self.track},{index})"
             self.drawing.text(LEFT - 4, self.y(index - 1) + 4, label, anchor="end", fill="#666666")
 
     def bands(self, bands: list[Band], numbers: dict[int, int], opacity: float, what: str, site: Site) -> None:

@@ -1,0 +1,81 @@
+"""Buildings of more than an alley a floor: in the terminal, on the page, as a drawing; the highest floor first."""
+
+import re
+from xml.etree import ElementTree
+
+import pytest
+
+from bus_sim.cli import main
+from bus_sim.sites import find_site, layout_names
+from bus_sim.systems.car_park.show_plan import draw_plans
+from onboard.contract.codes import Side
+from onboard.core.site import Station
+from onboard.systems.car_park.building import draw
+from onboard.systems.car_park.outlines import Outlines
+from onboard.systems.car_park.scene import CarParkScene
+from onboard.systems.car_park.site import car_park
+from onboard.trace.view import SiteView
+
+
+def test_the_terminal_shows_each_floor_with_who_is_there() -> None:
+    site = car_park(find_site("twin"))
+    lines = [row.plain for row in draw_plans(site, SiteView(site), 112)]
+    starts = [number for number, line in enumerate(lines) if line[:2].strip()]
+    assert [lines[number][:2].strip() for number in starts] == ["3", "2", "1"]
+    floors = ["\n".join(lines[one:other]) for one, other in zip(starts, [*starts[1:], len(lines)], strict=True)]
+    assert ["MR2" in floors[0], "MR1" in floors[1]] == [True, True]
+    assert floors[2].count("I/O") == 2
+    assert floors[2].count("=") == 2, "both lifts stand at the lowest floor"
+    # A column of a floor is one slot: two alleys of fourteen, and between them two lobbies of each lift.
+    assert [len(re.findall(r"(?<!\S)\.(?!\S)", floor)) for floor in floors] == [
+        2 * 14 + 4 - 1,
+        2 * 14 + 4 - 1,
+        2 * 14 + 4,
+    ]
+
+
+def test_a_branch_goes_off_to_the_side_on_which_it_is_written() -> None:
+    outlines = Outlines(car_park(find_site("branch")))
+    stem, way = outlines.track(3), outlines.track(1)
+    assert stem.low == way.high, "it begins at the alley's edge"
+    assert stem.high - stem.low == 10 * 2_400
+    place = outlines.station(Station(1, 1, Side.FAR))
+    assert (place.low, place.high - place.low, place.right - place.left) == (way.high, 5_400, 2_400)
+
+
+@pytest.mark.parametrize("name", layout_names())
+def test_nothing_lies_on_anything(name: str) -> None:
+    outlines = Outlines(car_park(find_site(name)))
+    site = outlines.site
+    for level in outlines.levels:
+        stations = [one for one in (*site.places, *site.compartments.values()) if site.level(one.track) == level]
+        boxes = [*map(outlines.station, stations), *map(outlines.track, outlines.tracks_on(level))]
+        boxes += [outlines.platform(lift) for lift in outlines.lifts_on(level)]
+        for number, one in enumerate(boxes):
+            assert not any(one.overlaps(other) for other in boxes[number + 1 :]), (name, level)
+
+
+def test_the_page_is_told_where_everything_is() -> None:
+    site = car_park(find_site("ring"))
+    building = CarParkScene(site, SiteView(site)).layout()["building"]
+    assert [level for level, _, _ in building["floors"]] == [2, 1]
+    right, up, left, down = (building["lines"][number][2:] for number in (1, 3, 5, 7))
+    assert (right, up, left, down) == ([1, 0], [0, -1], [-1, 0], [0, 1]), "y grows downwards"
+    small = car_park(find_site("small"))
+    assert CarParkScene(small, SiteView(small)).layout()["building"] is None
+
+
+def test_a_drawing_is_svg_with_the_highest_floor_first(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sites", "inline", "--draw", "-"]) == 0
+    root = ElementTree.fromstring(capsys.readouterr().out)
+    words = [
+        (element.text or "", float(element.get("y", "0"))) for element in root.iter() if element.tag.endswith("text")
+    ]
+    heads = sorted((y, text) for text, y in words if re.fullmatch(r"floor \d, .*", text))
+    assert [text for _, text in heads] == ["floor 4, 8 m", "floor 3, 5.5 m", "floor 2, 2.5 m", "floor 1, 0 m"]
+    assert {"Mid", "Fast", "Street", "Roof", "MR1", "MR2"} <= {text for text, _ in words}
+
+
+@pytest.mark.parametrize("name", ["level1", "standard"])
+def test_a_straight_building_is_drawn_as_well(name: str) -> None:
+    assert str(draw(car_park(find_site(name)))).endswith("</svg>\n")
