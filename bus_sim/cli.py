@@ -21,7 +21,7 @@ from bus_sim.publish import PublishError, check_mqtt
 from bus_sim.serve.bridge import parse_bus_specs
 from bus_sim.serve.socketcand import ServeError
 from bus_sim.session import run_site
-from bus_sim.sites import SiteNotFoundError, find_site, site_names, site_text
+from bus_sim.sites import SiteNotFoundError, find_site, layout_names, site_names, site_text
 from bus_sim.systems.registry import UnknownSystemError, own_commands, simulated_of
 from bus_sim.systems.system import SimulatedSystem
 from bus_sim.virtual_time import DeadlockError, StandstillError
@@ -32,6 +32,7 @@ from onboard.config.site_report import site_report
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError
 from onboard.io.signals import terminated_as_interrupted
+from onboard.systems.registry import part
 from onboard.web.address import WebError
 from onboard.web.address import is_installed as is_web_installed
 from onboard.wire.site_dbc import site_dbc
@@ -80,6 +81,7 @@ def build_parser() -> argparse.ArgumentParser:
     dbc.add_argument("site", nargs="?", default="level1", help="name of a shipped site, or a site file")
     sites = commands.add_parser("sites", help="list the shipped sites, or tell what one holds and can lose")
     sites.add_argument("site", nargs="?", help="name of a shipped site, or a site file")
+    sites.add_argument("--draw", metavar="FILE", help="draw the building to scale, as SVG (- for standard output)")
     add_campaign(commands)
     add_attack(commands)
     for module in own_commands():
@@ -243,7 +245,21 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _sites(args: argparse.Namespace) -> int:
-    print("\n".join(site_names() if args.site is None else site_report(find_site(args.site))))
+    if args.draw is None:
+        known = [*site_names(), *layout_names()]
+        print("\n".join(known if args.site is None else site_report(find_site(args.site))))
+        return 0
+    if args.site is None:
+        raise OptionError("--draw: of which site? name one before it")
+    site = find_site(args.site)
+    building = part(site.system, "building")
+    if building is None:
+        raise OptionError(f"--draw: no drawing of a {site.system} by itself; bus-sim run {args.site} --web shows it")
+    if args.draw == "-":
+        sys.stdout.write(str(building.draw(site)))
+        return 0
+    Path(args.draw).write_text(str(building.draw(site)), encoding="utf-8")
+    print("\n".join([*site_report(site), f"drawn: {args.draw}"]))
     return 0
 
 

@@ -1,15 +1,13 @@
 """Typed look-ups in a TOML document that note every mistake and go on with a stand-in value."""
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from onboard.config.problems import Problems, nearest
 from onboard.config.toml_lines import Document, KeyPath, path_text
-from onboard.core.site import Segment
 
-_SEGMENT = re.compile(r"p\(\s*(\d{1,3})\s*,\s*(\d{1,3})\s*\)")
+_T = TypeVar("_T")
 _TYPE_NAMES = {
     bool: "true or false",
     int: "a whole number",
@@ -109,17 +107,20 @@ class TomlTable:
         value: list[Any] | None = self._get(name, list, words, required=False)
         return value
 
-    def segment(self, name: str) -> Segment | None:
-        """A position written ``p(track,index)``; None where it is missing or not of this form."""
-        form = 'a position such as "p(1,4)", which is floor 1, index 4'
+    def parsed(self, name: str, parse: Callable[[str], _T | None], what: str, form: str) -> _T | None:
+        """A text as ``parse`` understands it; None where it is missing, or of another ``form`` and so not ``what``."""
         value = self._get(name, str, form, required=True)
         if value is None:
             return None
-        found = _SEGMENT.fullmatch(value)
+        found = parse(value)
         if found is None:
-            self.bad(name, value, "not a position", f"write {form}")
-            return None
-        return Segment(int(found.group(1)), int(found.group(2)))
+            self.bad(name, value, f"not {what}", f"write {form}")
+        return found
+
+    def flag(self, name: str, *, default: bool) -> bool:
+        """True or false; the default where the key is missing or of another type."""
+        value = self._get(name, bool, "true or false", required=False)
+        return default if value is None else bool(value)
 
     def table(self, name: str, *, required: bool = False) -> "TomlTable":
         """A table within; an empty one where it is missing. Ask once for each."""

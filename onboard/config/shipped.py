@@ -1,6 +1,7 @@
 """Sites that ship with a package, by name: wherever a site file is named, such a name will do.
 
-A package offers its folder of site files under the entry point ``onboard.sites``; what boards carry offers none.
+A package offers its folder of site files, and the folders in it, under the entry point ``onboard.sites``; what boards
+carry offers none.
 """
 
 from pathlib import Path
@@ -24,6 +25,7 @@ def shipped_sites() -> dict[str, "Traversable"]:
     from importlib.resources import files  # noqa: PLC0415  # see above
 
     folders = [files(entry.load()) for entry in entry_points(group=GROUP)]
+    folders += [below for folder in folders for below in folder.iterdir() if below.is_dir()]
     found = {file.name.removesuffix(_SUFFIX): file for folder in folders for file in folder.iterdir() if _is_site(file)}
     return dict(sorted(found.items()))
 

@@ -66,7 +66,8 @@ class CallTerms(SetFrame):
     #: Bus time after which no bid counts. The initiator counts a bid received up to its guard before this, by its own
     #: bus time. 0 to 4294967295 ms.
     deadline_ms: int
-    #: Station at which the load is: track << 8 | side << 7 | index; 65535: the bidder chooses. 0 to 65535.
+    #: Station at which the load is: track << 8 | side << 7 | index; 65535: the bidder chooses; 65281 to 65295: it
+    #: chooses a place for a car of class 1 to 15. 0 to 65535.
     from_station: int
 
 
@@ -173,7 +174,8 @@ class CallForProposals(Message):
     #: Bus time after which no bid counts. The initiator counts a bid received up to its guard before this, by its own
     #: bus time. 0 to 4294967295 ms.
     deadline_ms: int
-    #: Station at which the load is: track << 8 | side << 7 | index; 65535: the bidder chooses. 0 to 65535.
+    #: Station at which the load is: track << 8 | side << 7 | index; 65535: the bidder chooses; 65281 to 65295: it
+    #: chooses a place for a car of class 1 to 15. 0 to 65535.
     from_station: int
     #: Station to which the load shall go: track << 8 | side << 7 | index; 65535: the bidder chooses. 0 to 65535.
     to_station: int

@@ -28,13 +28,14 @@ class DriveOrder(Message):
 
     #: Grows by one with every new target; a repeat has the same. 0 to 255.
     sequence: int
-    #: Wanted position of the carrier's centre along its track; 0 is segment 1, of a spur its mouth is one pitch before.
-    #: -2147483648 to 2147483647 mm.
+    #: Wanted position of the carrier's centre along its track; 0 is segment 1, the mouth of a linked end is one pitch
+    #: beyond it. On a site that is not straight each track begins elsewhere on the tape, so that the number tells the
+    #: track. -2147483648 to 2147483647 mm.
     target_mm: int
     #: Highest speed for this move; 0 brakes to a stand. 0 to 65535 mm/s.
     speed_limit_mm_s: int
-    #: 1: the track is the spur at whose mouth the carrier is, 0: its alley. A drive that is not turned that way turns
-    #: first, standing in the mouth; elsewhere it refuses.
+    #: 1: the track lies across the main direction of the site, as a spur does, 0: along it. A drive that is not turned
+    #: that way turns first, standing in the mouth; elsewhere it refuses.
     across: bool = False
 
 
@@ -101,8 +102,8 @@ class DriveState(Message):
 
     #: Sequence of the last order taken up. 0 to 255.
     sequence: int
-    #: Position of the carrier's centre along its track; in the mouth of a spur, turned towards it, one pitch below 0.
-    #: -2147483648 to 2147483647 mm.
+    #: Position of the carrier's centre along its track; in a mouth, turned towards a track, one pitch beyond its end.
+    #: By the same tape as target_mm. -2147483648 to 2147483647 mm.
     position_mm: int
     #: Speed. -32768 to 32767 mm/s.
     speed_mm_s: int
@@ -110,7 +111,8 @@ class DriveState(Message):
     mode: DriveMode
     #: 1: the fine sensor sees a segment's mark, the carrier is within 5 mm of its centre.
     at_mark: bool
-    #: 1: turned towards a spur, which then is the track; it changes at the end of a turn.
+    #: 1: turned across the main direction of the site, as in a spur, which then is the track; it changes at the end of
+    #: a turn.
     across: bool = False
 
 

@@ -46,7 +46,7 @@ class ItineraryLeg(SetFrame):
     leg: int
     #: Side of the station where the action is WORK.
     side: Side
-    #: Alley 1 to 127 (its floor), lift 128 to 191, spur 192 to 254. 1 to 254.
+    #: Alley 1 to 127 (its floor, where each floor has one), lift 128 to 191, spur 192 to 254. 1 to 254.
     track: int
     #: Segment in which the leg begins; on an alley 0 and length + 1 are the platforms of the lifts at its ends. 0 to
     #: 255.
@@ -160,7 +160,7 @@ class Leg(NamedTuple):
 
     #: What the machine does.
     action: LegAction
-    #: Alley 1 to 127 (its floor), lift 128 to 191, spur 192 to 254. 1 to 254.
+    #: Alley 1 to 127 (its floor, where each floor has one), lift 128 to 191, spur 192 to 254. 1 to 254.
     track: int
     #: Segment in which the leg begins; on an alley 0 and length + 1 are the platforms of the lifts at its ends. 0 to
     #: 255.

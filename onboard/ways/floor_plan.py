@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from onboard.contract.codes import Side
 from onboard.core.site import Segment
+from onboard.ways.lifts import is_same_stop
 from onboard.ways.site import Track, TrackKind, WaySite
 
 
@@ -125,10 +126,19 @@ def side_of(track: Track, index: int) -> Side:
 def _by_lifts(plan: FloorPlan, site: WaySite, here: int) -> Iterator[tuple[int, Line]]:
     line = plan.lines[here]
     for lift in site.lifts:
-        sills = site.tracks[lift].joins
-        for at in [at_mm(plan, site, site.beyond(sill)) for sill in sills if sill.track == here]:
-            for other in sills:
-                yield other.track, _from(at, line.dx, line.dy, site.beyond(other).index, _pitch(site, other))
+        joins = site.tracks[lift].joins
+        doors = [(site.beyond(sill), _face(site, lift, stop)) for stop, sill in enumerate(joins, start=1)]
+        for platform, face in [door for door in doors if door[0].track == here]:
+            at = at_mm(plan, site, platform)
+            for other, other_face in doors:
+                is_alike = (platform.index == 0) is (other.index == 0)
+                turn = 1 if is_alike is (face == other_face) else -1
+                yield other.track, _from(at, turn * line.dx, turn * line.dy, other.index, _pitch(site, other))
+
+
+def _face(site: WaySite, lift: int, stop: int) -> int:
+    """On which face of the platform a door is: the first one of every stop on face 0, the second on the other."""
+    return 1 if stop > 1 and is_same_stop(site, lift, stop - 1, stop) else 0
 
 
 def _mismatches(plan: FloorPlan, site: WaySite) -> list[str]:

@@ -64,29 +64,31 @@ class _Finder:
         self.fronts = site.fronts(*BayUse)
         self.kept = kept_free(site)
         self.needed = {station.segment for station in site.places} | set(self.fronts)
-        self.taken: dict[int, tuple[Segment, ...]] = {}
+        self.taken: dict[int, list[tuple[Segment, ...]]] = {}
 
     def find(self) -> Room:
-        tracks = [track for track in self.site.tracks.values() if track.kind is not TrackKind.LIFT]
+        tracks = [track.number for track in self.site.tracks.values() if track.kind is not TrackKind.LIFT]
         refused = []
-        for track in sorted(tracks, key=lambda one: (one.kind is not TrackKind.SPUR, one.number)):
-            stretch = self._stretch(track.number)
+        for track in sorted(tracks, key=lambda one: (self.site.tracks[one].kind is not TrackKind.SPUR, one)):
+            stretch = self._best(track)
             if stretch is None:
-                refused.append((track.number, self._why_not(track.number)))
+                refused.append((track, self._why_not(track)))
             else:
-                self.taken[track.number] = stretch
-        return Room(dict(sorted(self.taken.items())), tuple(sorted(refused)))
+                self.taken[track] = [stretch]
+        for track, stretches in self.taken.items():
+            stretches += [one for one in self._stretches(track) if one not in stretches and not self._cuts(track, one)]
+        found = {track: tuple(one for stretch in self.taken[track] for one in stretch) for track in sorted(self.taken)}
+        return Room(found, tuple(sorted(refused)))
 
-    def _stretch(self, track: int) -> tuple[Segment, ...] | None:
-        """The stretch between junctions that cuts the least off, and nothing but places of its own track."""
+    def _best(self, track: int) -> tuple[Segment, ...] | None:
+        """The stretch between junctions that hides the fewest places of its own track, and cuts nothing else off."""
         if track in {front.track for front in self.fronts}:
             return None
-        found = []
-        for number, stretch in enumerate(self._stretches(track)):
-            cut = self._cut_off([*(one[0] for one in self.taken.values()), stretch[0]])
-            if not cut:
-                hidden = self._hidden(stretch[0])
-                found.append((hidden, -len(stretch), number, stretch))
+        found = [
+            (self._hidden(stretch[0]), -len(stretch), number, stretch)
+            for number, stretch in enumerate(self._stretches(track))
+            if not self._cuts(track, stretch)
+        ]
         return min(found)[3] if found else None
 
     def _stretches(self, track: int) -> Iterator[tuple[Segment, ...]]:
@@ -106,15 +108,23 @@ class _Finder:
         first = self.fronts[:1]
         return self.network.from_any(first, closed=closed) & self.network.to_any(first, closed=closed)
 
-    def _cut_off(self, resting: list[Segment]) -> frozenset[Segment]:
-        """What would be needed and could not be reached with machines at rest there, themselves included."""
-        bodies = {one: set(standing_segments(self.site, one)) for one in resting}
+    def _cuts(self, track: int, stretch: tuple[Segment, ...]) -> frozenset[Segment]:
+        """What would be needed and could not be reached with a machine there, the resting ones themselves included.
+
+        All stretches that were taken up are closed at once, though one on each track will be at most: so it holds
+        whichever they are in.
+        """
+        taken = {**self.taken, track: [*self.taken.get(track, ()), stretch]}
+        bodies = {
+            number: set().union(*(standing_segments(self.site, one[0]) for one in stretches))
+            for number, stretches in taken.items()
+        }
         closed = set().union(*bodies.values())
-        own = {one.track for one in resting}
-        lost = {one for one in self.needed if one.track not in own} - self._ground(closed)
-        for one, body in bodies.items():
-            if one not in self._ground(closed - body):
-                lost.add(one)
+        lost = {one for one in self.needed if one.track not in taken} - self._ground(closed)
+        for number, stretches in taken.items():
+            ground = self._ground(closed - bodies[number])
+            beside = {one for one in self.needed if one.track == number}
+            lost |= (beside | {one[0] for one in stretches}) - ground
         return frozenset(lost)
 
     def _hidden(self, resting: Segment) -> int:
@@ -127,7 +137,7 @@ class _Finder:
         stretches = list(self._stretches(track))
         if not stretches:
             return "every segment is a sill, a mouth or before a compartment"
-        cut = self._cut_off([*(one[0] for one in self.taken.values()), stretches[0][0]])
+        cut = self._cuts(track, stretches[0])
         return f"a machine at {stretches[0][0]} would cut off {', '.join(map(str, sorted(cut)[:3]))}" + (
             f" and {len(cut) - 3} more" if len(cut) > 3 else ""
         )

@@ -152,6 +152,13 @@ class WaySite(Site):
         track = self.tracks[sill.track]
         return Segment(sill.track, 0 if sill.index == 1 and track.low is None else track.length + 1)
 
+    def doors(self, lift: int, lift_index: int) -> list[Segment]:
+        """Sills of a lift's doors at one stop, by the index of any of them."""
+        track = self.tracks[lift]
+        heights_mm = track.heights_mm or range(track.length)
+        height_mm = heights_mm[lift_index - 1]
+        return [sill for sill, other_mm in zip(track.joins, heights_mm, strict=True) if other_mm == height_mm]
+
     @cached_property
     def spurs(self) -> dict[Segment, int]:
         """Spur track by its mouth, for pictures; the first of several at one mouth."""
@@ -210,7 +217,10 @@ class WaySite(Site):
             seen.add(track)
 
     def position_mm(self, segment: Segment) -> int:
-        """Centre of a segment along its track, in mm from that of index 1."""
+        """Centre of a segment along its track, in mm from that of index 1; of a stop of a lift its height."""
+        heights_mm = self.tracks[segment.track].heights_mm
+        if 0 < segment.index <= len(heights_mm):
+            return heights_mm[segment.index - 1]
         return (segment.index - 1) * self.tracks[segment.track].pitch_mm
 
 

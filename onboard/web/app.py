@@ -23,7 +23,7 @@ SNAPSHOTS_S = 10
 #: Most viewers at a time, and the longest command, bytes: a page that is left open must not fill the memory.
 MOST_VIEWERS = 32
 MOST_COMMAND_BYTES = 4_096
-_SCRIPTS = ("page.js", "draw.js", "plan.js", "paint.js")
+_SCRIPTS = ("page.js", "draw.js", "building.js", "plan.js", "paint.js")
 _TYPES = {"index.html": "text/html", "page.css": "text/css", **dict.fromkeys(_SCRIPTS, "text/javascript")}
 #: Everything comes from this server, and nobody may put the page into a frame.
 _POLICY = "default-src 'self'; img-src data:; style-src 'self' 'unsafe-inline'; frame-ancestors 'none'"

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from bus_sim.cli import main as bus_sim
-from bus_sim.sites import site_names
+from bus_sim.sites import layout_names, site_names
 from deploy.__main__ import main as deploy
 from onboard.cli import main as onboard
 from onboard.config.shipped import shipped_sites, site_source
@@ -30,7 +30,7 @@ COMMANDS = [
 
 def test_every_shipped_site_is_found_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert list(shipped_sites()) == site_names()
+    assert list(shipped_sites()) == sorted([*site_names(), *layout_names()])
     assert site_source(Path("small"))[1] == "small.toml"
 
 

@@ -77,7 +77,7 @@ ONE_MISTAKE = {
     "lift to no floor": (
         'end = "right"',
         'end = "right"\nfloors = []',
-        "s.toml:17: lifts[1].floors = []: no floor at all; a lift stops at every floor of its shaft; write [1, 2]",
+        "s.toml:17: lifts[1].floors = []: no floor at all; write such as [1, 2]",
     ),
     "lift with its floors from the top": (
         'end = "right"',

@@ -12,6 +12,7 @@ def test_of_the_standard_site() -> None:
     assert site_report(load_site(SITES / "standard.toml")) == [
         "floors: 5 of 20 positions, 1 spur",
         "places: 191",
+        "reached: every place from an entry, and from every place an exit (compartments: 3 in and out)",
         "machines: 3 compartments (IOC1, IOC2, IOC3), 2 lifts (ER1, ER2), 4 robots (MR1, MR2, MR3, MR4)",
         "refuges for 5 (floors 2 to 5, spur 192), 4 robots",
         "without ER1 (floors 1 to 5): all places can be reached; "
@@ -25,6 +26,7 @@ def test_of_one_alley() -> None:
     assert site_report(load_site(SITES / "level1.toml")) == [
         "floors: 1 of 12 positions",
         "places: 23",
+        "reached: every place from an entry, and from every place an exit (compartments: 1 in and out)",
         "machines: 1 compartment (IOC1), 1 robot (MR1)",
         "refuges for 1 (floor 1), 1 robot",
     ]

@@ -237,7 +237,7 @@ def test_bad_rows_end_a_command_with_status_2(tmp_path: Path, capsys: pytest.Cap
         ([], "table.csv:2: arrival '2019-07-24T05:00' has no UTC offset; write it as"),
         (["--inside", "some"], "--inside some: must be a number of cars from 0 to"),
         (["--inside", "recorded"], "--inside recorded: who came before the day; add --day D"),
-        (["--counts", "x.csv"], "--sessions: does not go with --counts; leave one of them out"),
+        (["--counts", "x.csv"], "--sessions: does not go with --counts; leave one out"),
         (["--inside", "3", "--one-car", "5"], "--inside 3: does not go with --one-car; leave one of them out"),
     ],
 )

@@ -104,7 +104,7 @@ def _parts_of(system: str) -> Iterator[tuple[str, Layer]]:
         "history": fold,
         "words": words,
         **dict.fromkeys(("constants", "layout", "machines", "missions_reader", "reader", "report", "room"), config),
-        **dict.fromkeys(("chart", "checks", "diagram", "scene", "traffic"), history),
+        **dict.fromkeys(("building", "chart", "checks", "diagram", "scene", "traffic"), history),
     }
     folder = FOLDER / system
     yield from ((f"{own}.{noun}", rule) for noun, rule in parts.items() if _is_part(folder / noun))

@@ -1,11 +1,14 @@
 """Sites of every form, made of plain values: corners, branches, rings, stubs, lifts in line, one-way alleys."""
 
+import random
 from dataclasses import replace
 
 from onboard.contract.codes import KindCode, Side
 from onboard.core.site import Machine, Segment, Station
 from onboard.systems.car_park.site import CarPark
-from onboard.ways.site import Axis, Track, TrackKind, charted
+from onboard.ways.room import resting_room
+from onboard.ways.site import Axis, BayUse, Track, TrackKind, charted
+from tests.sites import one_floor
 from tests.ways.lines import line_site
 
 PITCH_MM = 2_400
@@ -89,4 +92,73 @@ def branched() -> CarPark:
         spur(192, 1, at(1, 7)),
         lift(128, at(192, 1), at(4, 6)),
         bays=(Station(1, 2, Side.NEAR),),
+    )
+
+
+def drawn(seed: int) -> CarPark:
+    """A building by chance: floors with an alley each, branches off them, loops that go one way, spurs, and lifts.
+
+    Two lifts reach all floors and some, at any heights; the first may have a second door to an alley in line.
+    """
+    chance = random.Random(seed)
+    floors, length = chance.randint(1, 3), chance.randint(9, 12)
+    tracks: list[Track] = []
+    for level in range(1, floors + 1):
+        tracks += _storey(chance, level, 10 * (level - 1) + 1, length)
+    heights_mm = tuple(level * 2_500 + (level > 1) * chance.choice((0, 4_000)) for level in range(floors))
+    roots = [track for track in tracks if track.kind is TrackKind.ALLEY and not track.ends]
+    if floors > 1:
+        behind = [alley(100, 3, level=1)] * chance.randint(0, 1)
+        sills = [at(root.number, 1) for root in roots] + [at(100, 3) for _ in behind]
+        tracks += [*behind, lift(128, *_by_height(sills, (*heights_mm, 0)), heights_mm=_sorted(heights_mm, behind))]
+        second = sorted(chance.sample(range(floors), chance.randint(2, floors)))
+        doors = [at(roots[floor].number, roots[floor].length) for floor in second]
+        tracks.append(
+            lift(129, *doors, heights_mm=tuple(heights_mm[floor] - heights_mm[second[0]] for floor in second))
+        )
+    return network(*tracks, bays=(Station(1, 2, Side.NEAR),), robots=chance.randint(2, 3))
+
+
+def _by_height(sills: list[Segment], heights_mm: tuple[int, ...]) -> list[Segment]:
+    return [sill for _, sill in sorted(zip(heights_mm, sills, strict=False), key=lambda pair: pair[0])]
+
+
+def _sorted(heights_mm: tuple[int, ...], behind: list[Track]) -> tuple[int, ...]:
+    return tuple(sorted((*heights_mm, *[0] * len(behind))))
+
+
+def _storey(chance: random.Random, level: int, number: int, length: int) -> list[Track]:
+    """An alley, a branch with a branch of its own, a spur, and a loop round which carriers go one way."""
+    root = alley(number, length, level=level)
+    tracks = [root, spur(192 + level, chance.randint(1, 3), at(number, 3), chance.choice(list(Side)))]
+    if chance.random() < 0.7:
+        tracks.append(alley(number + 1, chance.randint(2, 5), at(number, 4), side=Side.NEAR, level=level))
+        if chance.random() < 0.5:
+            tracks.append(alley(number + 2, chance.randint(1, 4), at(number + 1, 2), side=chance.choice(list(Side))))
+    if chance.random() < 0.7:
+        depth, way = chance.randint(1, 3), chance.choice((-1, 0, 1))
+        tracks += [
+            alley(number + 3, depth, at(number, 5), one_way=way),
+            alley(number + 4, 2, at(number + 3, depth), at(number + 5, depth), side=Side.NEAR, one_way=way),
+            alley(number + 5, depth, at(number, 8), one_way=-way),
+        ]
+    return tracks
+
+
+def running(shape: CarPark, robots: int = 2, uses: dict[int, BayUse] | None = None) -> CarPark:
+    """The same ways with machines and times to run: robots at home where machines rest, bay 1 steward of all alleys."""
+    usual = one_floor()
+    machines = {node: one for node, one in shape.machines.items() if one.kind is KindCode.COMPARTMENT}
+    lifts = {track: 5 + number for number, track in enumerate(shape.lifts)}
+    machines |= {node: Machine(node, f"ER{node}", KindCode.LIFT, at(track, 1)) for track, node in lifts.items()}
+    homes = resting_room(shape).slots[:robots]
+    machines |= {node: Machine(node, f"MR{node}", KindCode.ROBOT, home) for node, home in enumerate(homes, start=11)}
+    stewards = {track: lifts.get(track, 1) for track in shape.tracks}
+    return replace(
+        usual,
+        tracks=shape.tracks,
+        places=shape.places,
+        machines=machines,
+        stewards=stewards,
+        bay_uses=uses or {},
     )

@@ -1,6 +1,7 @@
 """Who comes to a car park in ``bus-sim run``: the day, the hour or the cars that a person asked for."""
 
 from argparse import Namespace
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
@@ -114,7 +115,9 @@ def asked_day(args: Namespace, *, live: bool) -> ParkingDay:
             f"--without {args.without[0]}: a window's warm-up is hurried, and a controller in another process lives at "
             "the clock's pace; leave out --hour and --window"
         )
-    check_together(args)
+    check_together(args, ("one_car", "random", "by_hand"))
+    if args.counts is not None and args.stalls:
+        raise DemandError(f"--stalls {args.stalls}: does not go with --counts, which knows no stalls; leave it out")
     inside, overnight = asked_inside(args)
     return ParkingDay(
         sessions=args.sessions,
@@ -147,13 +150,11 @@ def asked_inside(args: Namespace) -> tuple[int, bool]:
     return int(text), False
 
 
-def check_together(args: Namespace) -> None:
-    """Raise ``DemandError`` for two options that say differently who comes."""
-    others = ("sessions", "one_car", "random", "by_hand")
-    given = [f"--{name.replace('_', '-')}" for name in others if getattr(args, name, None) not in (None, False)]
-    if args.counts is not None and (given or getattr(args, "stalls", "")):
-        raise DemandError(f"{(given or ['--stalls'])[0]}: does not go with --counts; leave one of them out")
-    drawn = [option for option in given if option != "--sessions"]
+def check_together(args: Namespace, others: Sequence[str] = ()) -> None:
+    """Raise ``DemandError`` for two options that say differently who comes; ``others`` besides the tables by name."""
+    drawn = [f"--{name.replace('_', '-')}" for name in others if getattr(args, name) not in (None, False)]
+    if args.counts is not None and (args.sessions is not None or drawn):
+        raise DemandError(f"{['--sessions', *drawn][args.sessions is None]}: does not go with --counts; leave one out")
     if args.inside is not None and drawn:
         raise DemandError(f"--inside {args.inside}: does not go with {drawn[0]}; leave one of them out")
 

@@ -12,6 +12,7 @@ from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.kinematics import run_duration_us
+from onboard.ways.site import BayUse
 
 #: A driver gets in and drives out within this, us: 10 to 30 s (constants of the SimPy study in the systems list).
 DRIVER_US = 20_000_000
@@ -43,6 +44,8 @@ class BayGeneration:
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         """When this bay stands locked and empty (bus ms), or None for anything but RECEIVE."""
+        if self.site.bay_uses.get(self.machine.node_id) is BayUse.ENTRY:
+            return None
         if call.operation is not Operation.RECEIVE or call.criterion is not Criterion.FINISH_TIME:
             return None
         ready_us = from_bus_ms(call.deadline_ms, now_us) + self.site.timing.door_us

@@ -21,7 +21,7 @@ from onboard.contract.messages import Award, BayState, CallForProposals, Referen
 from onboard.core.authority import TokenKey
 from onboard.core.effects import Effect, Send
 from onboard.core.negotiation import RequestedTerms
-from onboard.systems.car_park.site import CarLimits
+from onboard.systems.car_park.site import ANY_CLASS, CarLimits, CarPark
 from onboard.ways.mirror import WayMirror
 from onboard.ways.tokens import car_token
 
@@ -160,13 +160,23 @@ def forget_tickets(tickets: deque[Reference], mirror: WayMirror) -> None:
         tickets.remove(car)
 
 
-def turned_away(bay: BayState, limits: CarLimits, mirror: WayMirror) -> DeskText | None:
+def turned_away(bay: BayState, park: CarPark, mirror: WayMirror) -> DeskText | None:
     """What the driver of a car is told that the park does not take; None for one that it takes."""
-    if not fits(bay, limits):
+    if not fits(bay, park.cars) or not any(park.takes(place, class_in(bay, park)) for place in park.places):
         return DeskText.CAR_TOO_LARGE
-    return None if mirror.free_places() else DeskText.FULL
+    return None if has_room(bay, park, mirror) else DeskText.FULL
 
 
-def refusal_text(mirror: WayMirror) -> DeskText:
+def refusal_text(bay: BayState | None, park: CarPark, mirror: WayMirror) -> DeskText:
     """What a customer is told whom nobody can serve; that nobody can although there is room is not called full."""
-    return DeskText.OUT_OF_ORDER if mirror.free_places() else DeskText.FULL
+    return DeskText.OUT_OF_ORDER if has_room(bay, park, mirror) else DeskText.FULL
+
+
+def class_in(bay: BayState | None, park: CarPark) -> int:
+    """The class of the car in a bay, by its sensors; ``ANY_CLASS`` before they have said anything."""
+    return ANY_CLASS if bay is None else park.car_class(bay.length_mm, bay.height_mm, bay.load_kg)
+
+
+def has_room(bay: BayState | None, park: CarPark, mirror: WayMirror) -> bool:
+    """Whether a place is free for the class of the car in a bay."""
+    return any(park.takes(place, class_in(bay, park)) for place in mirror.free_places())

@@ -24,7 +24,7 @@ from onboard.contract.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.contract.constants import ANY_STATION, NOBODY, OUTSIDE, TASK_VERSION_BITS
+from onboard.contract.constants import NOBODY, OUTSIDE, TASK_VERSION_BITS
 from onboard.contract.messages import (
     BayState,
     CarAt,
@@ -54,9 +54,10 @@ from onboard.systems.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, S
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.outputs import BayOutputs
 from onboard.systems.car_park.program import Program
-from onboard.systems.car_park.site import car_park
+from onboard.systems.car_park.site import car_park, open_end
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.ways.mirror import WayFleet
+from onboard.ways.site import BayUse
 from onboard.ways.tokens import car_token
 
 
@@ -82,8 +83,9 @@ class Compartment:
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
         self.outputs = BayOutputs(self.fleet.node_id, self.fleet.motion, station_token(self.station))
-        site, machine = car_park(self.fleet.site), self.fleet.machine
-        self._robots = CarParkGeneration(site, machine, self.fleet.mirror, Program(site))
+        self._park = site = car_park(self.fleet.site)
+        self._use = site.bay_uses.get(self.fleet.node_id, BayUse.BOTH)
+        self._robots = CarParkGeneration(site, self.fleet.machine, self.fleet.mirror, Program(site))
         self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)
         self.stewardship.replay(self.memory)
         self.tickets.extend(self.memory.tickets)
@@ -220,7 +222,7 @@ class Compartment:
         return effects + self._call_for(job, now_us)
 
     def _call_for(self, job: BayTask, now_us: int) -> list[Effect]:
-        source, sink = self.station.number, ANY_STATION
+        source, sink = self.station.number, open_end(bay_task.class_in(self.bay, self._park))
         if job.operation is Operation.RETRIEVE:
             where = custody.place_of(self.fleet, job.car)
             if where is None:
@@ -296,6 +298,8 @@ class Compartment:
         if record is None or record.station == OUTSIDE:
             return [self.outputs.show(DeskText.UNKNOWN_TICKET, car)]
         job = self.job if self.job is not None and self.job.car == car else None
+        if self._use is BayUse.ENTRY and job is None:
+            return [self.outputs.show(DeskText.OUT_OF_ORDER, car)]
         in_hand = job is not None and job.operation is Operation.RETRIEVE
         new = not in_hand and bay_task.queue_ticket(self.tickets, car, urgent=urgent)
         noted: list[Effect] = [ticket_record(car, urgent=urgent)] if new else []
@@ -357,17 +361,16 @@ class Compartment:
         if self.tickets and is_empty and custody.place_of(self.fleet, self.tickets[0]) is not None:
             self._go(BayPhase.RESERVING)
             return [self.outputs.light_up(LightColour.RED), *self.outputs.door(DoorName.INPUT, DoorAction.CLOSE)]
-        if self.outputs.light is not LightColour.GREEN and not self.bay.load_kg:
-            return [self.outputs.light_up(LightColour.GREEN)]
-        return []
+        colour = LightColour.RED if self._use is BayUse.EXIT else LightColour.GREEN
+        return [self.outputs.light_up(colour)] if self.outputs.light is not colour and not self.bay.load_kg else []
 
     def _admit(self, now_us: int) -> list[Effect]:
         """Steps 2 to 5: check the car, print the ticket, call, turn the light red and close the input door."""
         assert self.bay is not None
-        bay, limits = self.bay, car_park(self.fleet.site).cars
-        if not bay.load_kg:
+        bay = self.bay
+        if not bay.load_kg or self._use is BayUse.EXIT:
             return []
-        turned_away = bay_task.turned_away(bay, limits, self.fleet.mirror)
+        turned_away = bay_task.turned_away(bay, self._park, self.fleet.mirror)
         if turned_away is not None:
             return [self.outputs.show(turned_away, Reference(0, 0))]
         car, number = self.memory.next_reference(self.fleet)
@@ -443,7 +446,7 @@ class Compartment:
         text = DeskText.CAR_READY
         if job.is_given_back:
             job.wait(now_us)
-            text = text if job.car in self.tickets else bay_task.refusal_text(self.fleet.mirror)
+            text = text if job.car in self.tickets else bay_task.refusal_text(self.bay, self._park, self.fleet.mirror)
         return [*self.outputs.door(DoorName.INPUT, DoorAction.OPEN), self.outputs.show(text, job.car)]
 
     def _when_handover(self, now_us: int) -> list[Effect]:

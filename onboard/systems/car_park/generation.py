@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.contract.codes import Criterion, Grade, LegAction, Operation
-from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import CallForProposals, Stamp
 from onboard.core.negotiation import NeededAnswers, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
@@ -25,7 +24,7 @@ from onboard.systems.car_park.program import (
     StationWork,
     to_itinerary,
 )
-from onboard.systems.car_park.site import CarPark
+from onboard.systems.car_park.site import CarPark, class_of_end
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayMirror
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
@@ -213,7 +212,8 @@ class CarParkGeneration:
                 alternatives.append(Alternative(place, None, bound_us))
                 continue
             if place.segment not in routes:
-                routes[place.segment] = self._route(call, place, segment, start_us, now_us, reservations)
+                route = self._route(call, place, segment, start_us, now_us, reservations)
+                routes[place.segment] = route if route is not None and kept + len(route.legs) < MAX_STEPS else None
             route = routes[place.segment]
             if route is None:
                 alternatives.append(Alternative(place, None))
@@ -236,7 +236,7 @@ class CarParkGeneration:
         _, segment, start_us = start
         places = self._candidates(call, now_us)
         taken_us = None
-        if len(places) >= FEW_PLACES and call.from_station != ANY_STATION:
+        if len(places) >= FEW_PLACES and class_of_end(call.from_station) is None:
             take, _ = self._visits(call, places[0], start_us)
             route = self._plan(reservations, segment, start_us, (take,), now_us)
             if route is None:
@@ -290,7 +290,8 @@ class CarParkGeneration:
         """
         visits = tuple(self._work_visit(work, now_us) for work in works)
         route = self._plan(self.mirror.reservations, origin, start_us, visits, now_us)
-        return None if route is None else _steps_of(route, works)
+        # A few steps may be kept before these.
+        return None if route is None or len(route.legs) + 3 > MAX_STEPS else _steps_of(route, works)
 
     def _work_visit(self, work: StationWork, now_us: int) -> Visit:
         if work.handling is CarHandling.TAKE and work.station in self.site.compartments.values():
@@ -316,7 +317,7 @@ class CarParkGeneration:
         bounds: dict[Segment, int] = {}
         begun: tuple[int, Visit, Visit] | None = None
         for place in _one_a_segment(places):
-            if begun is None or call.from_station == ANY_STATION:
+            if begun is None or class_of_end(call.from_station) is not None:
                 # Otherwise the car is taken at the same time and left in as long a time at whatever place.
                 take, leave = self._visits(call, place, start_us)
                 here = take.segment if origin is None else origin
@@ -348,25 +349,24 @@ class CarParkGeneration:
 
     def ends(self, call: CallForProposals, place: Station) -> tuple[Station, Station]:
         """Where the car is taken and where it is left; ``place`` stands for the end that the call leaves open."""
-        source = place if call.from_station == ANY_STATION else Station.from_number(call.from_station)
-        sink = place if call.to_station == ANY_STATION else Station.from_number(call.to_station)
-        return source, sink
+        return _end(call.from_station, place), _end(call.to_station, place)
 
     def _all_candidates(self, call: CallForProposals) -> list[Station]:
-        if ANY_STATION not in (call.from_station, call.to_station):
+        car_class = open_class(call)
+        if car_class is None:
             return [Station.from_number(call.to_station)]
-        return list(self.site.places)
+        return [place for place in self.site.places if self.site.takes(place, car_class)]
 
     def _candidates(self, call: CallForProposals, now_us: int) -> list[Station]:
         """Stations that the bidder may choose: free places nobody is on the way to, or the one that the call names."""
-        if ANY_STATION not in (call.from_station, call.to_station):
-            return self._all_candidates(call)
-        return self.free_places(now_us)
+        car_class = open_class(call)
+        return self._all_candidates(call) if car_class is None else self.free_places(now_us, car_class)
 
-    def free_places(self, now_us: int) -> list[Station]:
-        """Places at which no car stands and that nobody has promised, in the site's order."""
+    def free_places(self, now_us: int, car_class: int) -> list[Station]:
+        """Places for a class of car at which none stands and that nobody has promised, in the site's order."""
         promised = self._promised(now_us)
-        return [place for place in self.mirror.free_places() if place.number not in promised]
+        free = [place for place in self.mirror.free_places() if place.number not in promised]
+        return [place for place in free if self.site.takes(place, car_class)]
 
     def _promised(self, now_us: int) -> set[int]:
         """Places at which somebody's plan, or mine, will work: two parkings never aim at one place (row P42)."""
@@ -393,6 +393,16 @@ class CarParkGeneration:
         """When a call closes, or closed; now where that is read in a time that was not its caller's: work in hand."""
         deadline_us = from_bus_ms(call.deadline_ms, now_us)
         return deadline_us if deadline_us <= now_us + STAMP_AHEAD_US else now_us
+
+
+def open_class(call: CallForProposals) -> int | None:
+    """The class of car for which a call leaves an end open, None where it names both."""
+    found = [class_of_end(end) for end in (call.from_station, call.to_station)]
+    return next((one for one in found if one is not None), None)
+
+
+def _end(station: int, place: Station) -> Station:
+    return Station.from_number(station) if class_of_end(station) is None else place
 
 
 def _one_a_segment(places: list[Station]) -> list[Station]:

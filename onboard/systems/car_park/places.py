@@ -8,7 +8,6 @@ lower stamp; the other leaves its car elsewhere. A place in which a car stands i
 from dataclasses import dataclass
 
 from onboard.contract.codes import LegAction
-from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import Itinerary
 from onboard.core.authority import station_token
 from onboard.core.site import Station
@@ -16,6 +15,7 @@ from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.program import CarHandling, HandlingPhase, StationWork
+from onboard.systems.car_park.site import ANY_CLASS, class_of_end
 from onboard.ways.mirror import WayFleet
 
 
@@ -33,7 +33,7 @@ class PlaceChoice:
             work
             for work in self.generation.program.works()
             if work.handling is CarHandling.LEAVE
-            and work.call.to_station == ANY_STATION
+            and class_of_end(work.call.to_station) is not None
             and not self._is_begun(work)
             and (custody.others_in(self.fleet.mirror, work.station, work.car) or self._is_anothers(work.station))
         ]
@@ -41,7 +41,7 @@ class PlaceChoice:
     def instead(self, work: StationWork, now_us: int) -> list[Station]:
         """Free places that nobody has promised, the nearest to where the car was to be left first."""
         here = work.station
-        free = self.generation.free_places(now_us)
+        free = self.generation.free_places(now_us, class_of_end(work.call.to_station) or ANY_CLASS)
         return sorted(free, key=lambda one: (one.track != here.track, abs(one.index - here.index)))
 
     def _is_begun(self, work: StationWork) -> bool:

@@ -1,10 +1,14 @@
 """What a car park is, in lines for a person: size, machines, refuges, and what the loss of a lift strands."""
 
+from collections import Counter
+
 from onboard.contract.codes import KindCode
 from onboard.core.site import Machine, Segment, Station
 from onboard.systems.car_park.room import ranges_text, robots_of, robots_text, room_text
+from onboard.systems.car_park.site import CarPark
 from onboard.ways.reach import hidden_by, reached, stranded_by
-from onboard.ways.site import TrackKind, WaySite
+from onboard.ways.room import reachable
+from onboard.ways.site import BayUse, Track, TrackKind
 
 _KINDS = (
     (KindCode.COMPARTMENT, "compartment"),
@@ -13,33 +17,98 @@ _KINDS = (
 )
 
 
-def lines(site: WaySite) -> list[str]:
-    """One line each on floors, places, machines and refuges, then one on each lift."""
+def lines(site: CarPark) -> list[str]:
+    """What was proved: floors, places by class, what is reached, machines, refuges; what each lift's loss cuts off."""
     lifts = [machine for machine in site.machines.values() if machine.kind is KindCode.LIFT]
     return [
-        _floors_line(site),
-        f"places: {len(site.places)}",
+        *_floors_lines(site),
+        _places_line(site),
+        _reached_line(site),
         f"machines: {', '.join(_machine_words(site, kind, word) for kind, word in _KINDS if _named(site, kind))}",
         f"{room_text(site, robots_of(site))}, {robots_text(robots_of(site))}",
         *(_loss_line(site, lift) for lift in lifts),
+        *_one_way_lines(site),
     ]
 
 
-def _floors_line(site: WaySite) -> str:
-    lengths = {track.length for track in site.tracks.values() if track.kind is TrackKind.ALLEY}
-    count = sum(1 for track in site.tracks.values() if track.kind is TrackKind.ALLEY)
+def _floors_lines(site: CarPark) -> list[str]:
+    """Floors and lengths of alleys; where a floor has several alleys, which they are and what the file calls them."""
+    by_level: dict[int, list[Track]] = {}
+    for track in site.tracks.values():
+        # A lobby before a lift is no alley that anybody named.
+        if track.kind is TrackKind.ALLEY and (not track.ends or track.number in site.alley_names):
+            by_level.setdefault(site.level(track.number), []).append(track)
+    lengths = {track.length for tracks in by_level.values() for track in tracks}
     spurs = sum(1 for track in site.tracks.values() if track.kind is TrackKind.SPUR)
     span = f"{min(lengths)} to {max(lengths)}" if len(lengths) > 1 else f"{max(lengths)}"
     beside = f", {_counted(spurs, 'spur')}" if spurs else ""
-    return f"floors: {count} of {span} positions{beside}"
+    if all(len(tracks) == 1 for tracks in by_level.values()):
+        return [f"floors: {len(by_level)} of {span} positions{beside}"]
+    count = sum(map(len, by_level.values()))
+    return [
+        f"floors: {len(by_level)}, with {count} alleys of {span} positions{beside}",
+        *(
+            f"floor {level}: {', '.join(_alley_words(site, one) for one in by_level[level])}"
+            for level in sorted(by_level)
+        ),
+    ]
 
 
-def _machine_words(site: WaySite, kind: KindCode, word: str) -> str:
+def _alley_words(site: CarPark, track: Track) -> str:
+    name = site.alley_names.get(track.number)
+    return f"p({track.number},1) to p({track.number},{track.length}){f' is {name}' if name else ''}"
+
+
+def _places_line(site: CarPark) -> str:
+    if not site.classes:
+        return f"places: {len(site.places)}"
+    numbers = Counter(site.place_class.get(place.number, 0) for place in site.places)
+    parts = [f"{numbers[number]} {one.name}" for number, one in enumerate(site.classes, start=1)]
+    return f"places: {len(site.places)}: {', '.join([*parts, f'{numbers[0]} for any car'])}"
+
+
+def _reached_line(site: CarPark) -> str:
+    """The loader refuses a site of which this is not true (``reader/built.py``)."""
+    bays = Counter(site.bay_uses.get(node, BayUse.BOTH) for node in site.compartments)
+    words = {BayUse.BOTH: "in and out", BayUse.ENTRY: "in only", BayUse.EXIT: "out only"}
+    parts = [f"{bays[use]} {words[use]}" for use in (BayUse.BOTH, BayUse.ENTRY, BayUse.EXIT) if bays[use]]
+    lost = len(reachable(site).lost_places) + len(reachable(site).no_way_out)
+    what = "every place from an entry, and from every place an exit" if not lost else f"all but {lost} places"
+    return f"reached: {what} (compartments: {', '.join(parts)})"
+
+
+def _one_way_lines(site: CarPark) -> list[str]:
+    """One-way alleys, ring by ring: each goes on into the next; the others by themselves."""
+    after = {one.number: _next_one_way(site, one) for one in site.tracks.values() if one.one_way}
+    lines, seen = [], set[int]()
+    for first, second in after.items():
+        ring, here = [first], second
+        while here is not None and here not in ring and here in after:
+            ring.append(here)
+            here = after[here]
+        if here == first and first not in seen:
+            seen |= set(ring)
+            lines.append(f"one way round on floor {site.level(first)}: alleys {', '.join(map(str, ring))}")
+    alone = [number for number in after if number not in seen]
+    return lines + ([f"one way: alleys {ranges_text(alone)}"] if alone else [])
+
+
+def _next_one_way(site: CarPark, track: Track) -> int | None:
+    """The one-way alley at the end to which a one-way alley goes, or that goes off from its last slots."""
+    last = track.length if track.one_way > 0 else 1
+    mouth = track.high if track.one_way > 0 else track.low
+    if mouth is not None:
+        return mouth.track
+    off = [end.track for end in site.links.get(Segment(track.number, last), ())]
+    return next((number for number in off if site.tracks[number].one_way), None)
+
+
+def _machine_words(site: CarPark, kind: KindCode, word: str) -> str:
     names = _named(site, kind)
     return f"{_counted(len(names), word)} ({', '.join(names)})"
 
 
-def _named(site: WaySite, kind: KindCode) -> list[str]:
+def _named(site: CarPark, kind: KindCode) -> list[str]:
     return [machine.name for machine in site.machines.values() if machine.kind is kind]
 
 
@@ -47,11 +116,11 @@ def _counted(count: int, word: str) -> str:
     return f"{count} {word}{'' if count == 1 else 's'}"
 
 
-def _loss_line(site: WaySite, lift: Machine) -> str:
+def _loss_line(site: CarPark, lift: Machine) -> str:
     """What stays possible when a lift is lost while every robot stands at its home."""
     track = lift.home.track
     stranded = stranded_by(site, track)
-    served = ranges_text([sill.track for sill in site.tracks[track].joins])
+    served = ranges_text(sorted({site.level(sill.track) for sill in site.tracks[track].joins}))
     parts = [_stranded_words(site, track, stranded) if stranded else "all places can be reached"]
     homes = [one.home for one in site.machines.values() if one.kind is KindCode.ROBOT]
     hidden = hidden_by(site, homes, lost=(track,)) if len(homes) > 1 else ()
@@ -61,8 +130,8 @@ def _loss_line(site: WaySite, lift: Machine) -> str:
     return f"without {lift.name} (floors {served}): {'; '.join(parts)}"
 
 
-def _stranded_words(site: WaySite, lost: int, stranded: tuple[Station, ...]) -> str:
-    floors = sorted({place.track for place in stranded})
+def _stranded_words(site: CarPark, lost: int, stranded: tuple[Station, ...]) -> str:
+    floors = sorted({site.level(place.track) for place in stranded})
     found = {segment.track for segment in reached(site, lost=(lost,))}
     robots = [one for one in site.machines.values() if one.kind is KindCode.ROBOT]
     there = [one.name for one in robots if _alley(site, one.home) not in found]
@@ -74,7 +143,7 @@ def _stranded_words(site: WaySite, lost: int, stranded: tuple[Station, ...]) -> 
     return words
 
 
-def _alley(site: WaySite, home: Segment) -> int:
+def _alley(site: CarPark, home: Segment) -> int:
     """The alley at which a home is, a spur's by its mouth."""
     track = site.tracks[home.track]
     return track.joins[0].track if track.kind is TrackKind.SPUR else track.number

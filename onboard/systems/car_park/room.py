@@ -2,7 +2,8 @@
 
 Without spurs, F floors take F - 1 carriers, and a lone carrier always finds room (design, section 5: beyond that,
 layouts of a model got stuck in 30 of 30 runs). So the alleys before compartments stay free, and so does an alley that
-is the only way to another; every other alley and every spur takes one carrier.
+is the only way to another; every other alley and every spur takes one carrier. Where alleys turn, branch or meet, the
+proof is that of ``onboard.ways.room``.
 """
 
 from itertools import groupby
@@ -13,6 +14,7 @@ from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.ways.reach import passages
 from onboard.ways.refuges import open_refuges
+from onboard.ways.room import resting_room
 from onboard.ways.site import TrackKind, WaySite
 
 
@@ -24,7 +26,7 @@ def robots_of(site: WaySite) -> int:
 def refuge_tracks(site: WaySite, robots: int) -> list[int]:
     """Alleys and spurs, by track number, in each of which one of ``robots`` carriers may stand for ever."""
     found = {segment.track for segment in open_refuges(site, ())}
-    if robots > 1:
+    if robots > 1 and not site.is_charted:
         alleys = {track.number for track in site.tracks.values() if track.kind is TrackKind.ALLEY}
         found -= passages(site) if len(alleys) > 1 else alleys
     return sorted(found)
@@ -41,19 +43,31 @@ def check_room(root: TomlTable, site: WaySite, fleet: FleetReader) -> None:
     taken: dict[int, str] = {}
     free = set(tracks) - {home.track for _, home in fleet.robots}
     for table, home in fleet.robots:
-        why = _why_not(home, tracks, taken)
+        why = _why_not(site, home, tracks, taken)
         if why:
             table.bad("home", table.values["home"], why, f"choose one of: {tracks_text(site, sorted(free))}")
         taken.setdefault(home.track, table.values["name"])
 
 
-def _why_not(home: Segment, tracks: list[int], taken: dict[int, str]) -> str:
+def _why_not(site: WaySite, home: Segment, tracks: list[int], taken: dict[int, str]) -> str:
     """Why a robot may not stand at its home for ever; empty where it may."""
     if home.track in taken:
         return f"{taken[home.track]} stands there already, and one may stand where another must pass"
+    if site.is_charted:
+        return _why_cut_off(site, home)
     if home.track not in tracks:
         return f"the alley of floor {home.track} is needed by all, so nobody may stand there for ever"
     return ""
+
+
+def _why_cut_off(site: WaySite, home: Segment) -> str:
+    if home in open_refuges(site, ()):
+        return ""
+    free = [one.index for one in resting_room(site).stretches.get(home.track, ())]
+    if free:
+        return f"nobody may stand there for ever; on this track positions {ranges_text(sorted(free))} are free"
+    refused = dict(resting_room(site).refused)
+    return refused.get(home.track, "nobody may stand there for ever")
 
 
 def robots_text(robots: int) -> str:
@@ -72,7 +86,7 @@ def room_text(site: WaySite, robots: int) -> str:
 def tracks_text(site: WaySite, tracks: list[int]) -> str:
     """Alleys and spurs in words, such as ``floors 2 to 5, spur 192``; ``tracks`` rise and are not empty."""
     parts = []
-    for kind, word in ((TrackKind.ALLEY, "floor"), (TrackKind.SPUR, "spur")):
+    for kind, word in ((TrackKind.ALLEY, "alley" if site.is_charted else "floor"), (TrackKind.SPUR, "spur")):
         numbers = [number for number in tracks if site.tracks[number].kind is kind]
         if numbers:
             parts.append(f"{word}{'s' if len(numbers) > 1 else ''} {ranges_text(numbers)}")

@@ -1,4 +1,8 @@
-"""The car park's elevation: tracks and places, cars, doors and bays, plans and segments held ahead of each robot."""
+"""The car park's picture: tracks and places, cars, doors and bays, plans and segments held ahead of each robot.
+
+Where each floor is one alley it is an elevation, which the page arranges by itself; any other building is drawn floor
+by floor from above, to scale, as ``_building`` arranges it.
+"""
 
 from typing import Any
 
@@ -6,6 +10,8 @@ from onboard.contract.codes import KindCode, LegAction, TokenKind
 from onboard.contract.messages import BayState, DoorState, Message, ShuttleState
 from onboard.core.site import Segment
 from onboard.history.history import Fact
+from onboard.systems.car_park.outlines import Outlines, is_elevation
+from onboard.systems.car_park.site import CarPark, car_park
 from onboard.trace.scene.scene import Json
 from onboard.trace.view import SiteView
 from onboard.ways.site import TrackKind, WaySite
@@ -42,7 +48,7 @@ class CarParkScene:
                 self._shuttles[node] = {"mm": message.extension_mm, "side": int(message.side)}
 
     def layout(self) -> Json:
-        """Tracks and places; ``blockable`` are the segments that a person may name."""
+        """Tracks and places; ``blockable`` are the segments that a person may name, ``building`` lies in mm."""
         site = self.site
         return {
             "carrier_mm": site.carrier_length_mm,
@@ -53,10 +59,12 @@ class CarParkScene:
                     "length": track.length,
                     "pitch_mm": track.pitch_mm,
                     "joins": [[join.track, join.index] for join in track.joins],
+                    "one_way": track.one_way,
                 }
                 for track in site.tracks.values()
             ],
             "places": [place.number for place in site.places],
+            "building": None if is_elevation(car_park(site)) else _building(car_park(site)),
             "blockable": [
                 str(Segment(track.number, index))
                 for track in site.tracks.values()
@@ -96,8 +104,8 @@ class CarParkScene:
         track = self.site.tracks.get(segment.track)
         if track is None or track.kind is not TrackKind.LIFT:
             return str(segment)
-        floor = track.joins[max(0, min(len(track.joins), segment.index) - 1)].track
-        return f"floor {floor}"
+        sill = track.joins[max(0, min(len(track.joins), segment.index) - 1)]
+        return f"floor {self.site.level(sill.track)}"
 
     def _plan(self, node: int, now_us: int) -> list[list[int]]:
         """What is left of a firm itinerary: [track, from, to, begin us, end us, is a ride or work] a leg."""
@@ -118,6 +126,54 @@ class CarParkScene:
         if self.site.machines[node].kind is not KindCode.ROBOT:
             return []
         return [[number >> 8, number & 0xFF] for number in self._history.rights.held_by(node, TokenKind.SEGMENT)]
+
+
+#: Room between two floors of the picture, mm, with a floor's name in it.
+_GAP_MM = 3_000
+#: Width of the page's picture by its height: floors are put beside each other where that makes them larger.
+_ASPECT = 1.7
+
+
+def _building(site: CarPark) -> Json:
+    """Where everything is drawn, mm, x to the right and y down: floors in rows, the highest first.
+
+    A line is where a track's index 1 is, and which way its index grows; a platform has a place for each of its stops.
+    """
+    outlines = Outlines(site)
+    levels = outlines.levels
+    boxes = [outlines.level(level) for level in levels]
+    left, low = min(box.left for box in boxes), min(box.low for box in boxes)
+    wide = max(box.right for box in boxes) - left + _GAP_MM
+    high = max(box.high for box in boxes) - low + _GAP_MM
+    columns = max(
+        range(1, len(levels) + 1), key=lambda many: min(_ASPECT / (many * wide), 1 / (_rows(levels, many) * high))
+    )
+    corner = {level: (at % columns * wide, at // columns * high + _GAP_MM) for at, level in enumerate(levels)}
+    top = high - _GAP_MM
+
+    def spot(level: int, x_mm: float, y_mm: float) -> list[float]:
+        x, y = corner[level]
+        return [x + x_mm - left, y + top - (y_mm - low)]
+
+    lines = outlines.plan.lines
+    return {
+        "width": columns * wide,
+        "height": _rows(levels, columns) * high + _GAP_MM,
+        "reach_mm": site.shuttle_reach_mm,
+        "floors": [[level, corner[level][0], corner[level][1]] for level in levels],
+        "lines": {
+            number: [*spot(site.level(number), line.x_mm, line.y_mm), line.dx, -line.dy]
+            for number, line in lines.items()
+        },
+        "platforms": {
+            lift: [spot(site.level(sill.track), *outlines.plan.shafts[lift]) for sill in site.tracks[lift].joins]
+            for lift in site.lifts
+        },
+    }
+
+
+def _rows(levels: list[int], columns: int) -> int:
+    return -(-len(levels) // columns)
 
 
 SCENE = CarParkScene

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import ClassVar
 
+from onboard.contract.constants import ANY_STATION
 from onboard.core.site import MotionNeeds, Site, Station
 from onboard.ways.site import Axis, WaySite
 from onboard.work.timing import DeviceTiming
@@ -43,6 +44,22 @@ ANY_CLASS = 0
 MOST_CLASSES = 15
 
 
+#: Numbers of no station: in a call for parking, wherever a car of class 1, 2 ... can stand, behind this.
+_OPEN_END = 0xFF00
+
+
+def open_end(car_class: int) -> int:
+    """What a call names in the stead of a station where any will do that takes cars of a class."""
+    return ANY_STATION if car_class == ANY_CLASS else _OPEN_END + car_class
+
+
+def class_of_end(station: int) -> int | None:
+    """The class of car for which an end of a call is open; None for a station's own number."""
+    if station == ANY_STATION:
+        return ANY_CLASS
+    return station - _OPEN_END if _OPEN_END < station <= _OPEN_END + MOST_CLASSES else None
+
+
 class RideCalls(Enum):
     """When a robot asks lifts for the rides of a task (row P39).
 
@@ -74,6 +91,8 @@ class CarPark(WaySite):
     classes: tuple[SizeClass, ...] = ()
     #: Number of a place's class by its station's number; who is not named takes every car of the site.
     place_class: dict[int, int] = field(default_factory=dict)
+    #: What the file calls alleys beside the one that each floor has by itself, by track number.
+    alley_names: dict[int, str] = field(default_factory=dict)
 
     def car_class(self, length_mm: int, height_mm: int, load_kg: int, *, charging: bool = False) -> int:
         """The first class that a car fits, ``ANY_CLASS`` where there is none."""

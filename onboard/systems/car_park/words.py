@@ -2,6 +2,7 @@
 
 from onboard.contract.codes import Operation, TaskPhase
 from onboard.contract.messages import Reference
+from onboard.systems.car_park.site import class_of_end
 from onboard.systems.words import SiteWords
 from onboard.ways.site import WaySite
 
@@ -16,7 +17,9 @@ class CarParkWords(SiteWords):
         self._bays = {station.number: node for node, station in site.compartments.items()}
 
     def place(self, number: int) -> str:
-        """A place, a compartment by its name, ``anywhere`` or ``outside``."""
+        """A place, a compartment by its name, ``anywhere``, for a class of car or for all, or ``outside``."""
+        if class_of_end(number):
+            return f"anywhere for class {class_of_end(number)}"
         return self.machine(self._bays[number]) if number in self._bays else super().place(number)
 
     def report(self, operation: Operation, phase: TaskPhase, load: Reference, station: int) -> str:

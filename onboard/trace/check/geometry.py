@@ -1,15 +1,15 @@
 """Where a body is, in slots: computed from the site file and a ``Progress`` alone.
 
 A slot is what has a token of its own (docs/network.md): a segment of an alley or spur, a lift's platform (index 0 of
-the lift's track), and a lift's gate (index 255), which whoever is over the sill holds. Index 0 of a spur is its mouth,
-one pitch before its segment: whoever is there is turned, or turning, and is in both slots.
+the lift's track), and a lift's gate (index 255), which whoever is over the sill holds. The index beyond a linked end is
+its mouth, one pitch away: whoever is there is turned, or turning, and is in both slots.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from onboard.contract.codes import TokenKind
-from onboard.contract.messages import Progress
+from onboard.contract.messages import DriveOrder, Progress
 from onboard.core.site import Segment, Site
 from onboard.trace.check.tokens_seen import Token
 from onboard.ways.site import TrackKind, way_site
@@ -39,10 +39,10 @@ class ReportedPosition:
 
 def body_of(site: Site, progress: Progress, time_us: int) -> ReportedPosition | None:
     """The body that a message tells of; None where the site has no such track."""
-    track = way_site(site).tracks.get(progress.track)
-    if track is None:
+    ways = way_site(site)
+    if progress.track not in ways.tracks:
         return None
-    position_mm = (progress.index - 1) * track.pitch_mm + progress.offset_mm
+    position_mm = ways.position_mm(Segment(progress.track, progress.index)) + progress.offset_mm
     return ReportedPosition(progress.sender, progress.track, progress.index, position_mm, progress.speed_mm_s, time_us)
 
 
@@ -50,11 +50,13 @@ def slots_of(site: Site, track: int, low_mm: float, high_mm: float) -> list[Segm
     """Slots that a robot's body from ``low_mm`` to ``high_mm`` is in, gates of the sills that it is over included."""
     ways = way_site(site)
     line = ways.tracks[track]
-    lowest = 0 if Segment(track, 0) in ways.platforms else 1
-    highest = line.length + (1 if Segment(track, line.length + 1) in ways.platforms else 0)
+    lowest = 0 if _goes_on(site, Segment(track, 0)) else 1
+    highest = line.length + _goes_on(site, Segment(track, line.length + 1))
     first, last = (_index_at(mm, line.pitch_mm) for mm in (low_mm + TOLERANCE_MM, high_mm - TOLERANCE_MM))
     indices = range(max(lowest, first), min(highest, last) + 1)
-    slots = [slot_at(site, Segment(track, index)) for index in indices]
+    slots: list[Segment] = []
+    for index in indices:
+        slots += [slot for slot in slots_at(site, Segment(track, index)) if slot not in slots]
     for one, other in pairwise(indices):
         lift = ways.platforms.get(Segment(track, one), ways.platforms.get(Segment(track, other)))
         if lift is not None:
@@ -62,35 +64,68 @@ def slots_of(site: Site, track: int, low_mm: float, high_mm: float) -> list[Segm
     return slots
 
 
-def spur_slots(site: Site, spur: int, low_mm: float) -> list[Segment]:
-    """Slots of a body that reaches down to ``low_mm`` on a spur's axis: with the mouth where it is over the border."""
-    track = way_site(site).tracks[spur]
-    inside = Segment(spur, 1)
-    return [track.joins[0], inside] if low_mm + TOLERANCE_MM < -track.pitch_mm / 2 else [inside]
+def _goes_on(site: Site, position: Segment) -> bool:
+    ways = way_site(site)
+    return position in ways.platforms or position in ways.mouths
 
 
 def occupied(site: Site, body: ReportedPosition) -> list[Segment]:
     """Slots that a robot's body is in."""
-    ways = way_site(site)
-    if ways.tracks[body.track].kind is TrackKind.SPUR:
-        return spur_slots(site, body.track, body.position_mm - ways.carrier_length_mm / 2)
-    if ways.tracks[body.track].kind is not TrackKind.ALLEY:
-        return [Segment(body.track, body.index)]
-    half_mm = ways.carrier_length_mm / 2
-    return slots_of(site, body.track, body.position_mm - half_mm, body.position_mm + half_mm)
+    return swept(site, body, body.position_mm)
 
 
 def swept(site: Site, body: ReportedPosition, until_mm: float) -> list[Segment]:
     """Slots that a robot's body is in and comes through until its centre is at ``until_mm`` on the same track."""
     ways = way_site(site)
-    if ways.tracks[body.track].kind is TrackKind.SPUR:
-        low_mm = min(float(body.position_mm), until_mm)
-        return spur_slots(site, body.track, low_mm - ways.carrier_length_mm / 2)
-    if ways.tracks[body.track].kind is not TrackKind.ALLEY:
+    if ways.tracks[body.track].kind is TrackKind.LIFT:
         return [Segment(body.track, body.index)]
     half_mm = ways.carrier_length_mm / 2
     low_mm, high_mm = sorted((float(body.position_mm), until_mm))
     return slots_of(site, body.track, low_mm - half_mm, high_mm + half_mm)
+
+
+def body_at(site: Site, body: ReportedPosition, tape_mm: int) -> ReportedPosition:
+    """A body where its drive says that it is; where it was told to be, if that is on no track."""
+    ways = way_site(site)
+    if not ways.is_charted:
+        return replace(body, position_mm=tape_mm)
+    told = ways.on_tape(tape_mm)
+    if told is None:
+        return body
+    index = _index_at(told.position_mm, ways.tracks[told.track].pitch_mm)
+    return replace(body, track=told.track, index=index, position_mm=told.position_mm)
+
+
+def sent_through(site: Site, body: ReportedPosition, order: DriveOrder) -> list[Segment]:
+    """Slots through which an order sends a body: along its track, or to turn where it is."""
+    ways, here = way_site(site), Segment(body.track, body.index)
+    if not ways.is_charted:
+        if order.across is ways.across(body.track):
+            return swept(site, body, order.target_mm)
+        # Into the spur of this mouth, or out of this one.
+        spurs = [end.track for end in ways.links.get(here, ())] if order.across else [body.track]
+        return slots_at(site, Segment(spurs[0], 0)) if spurs else [here]
+    aim = ways.on_tape(order.target_mm)
+    if aim is None or aim.track == body.track:
+        return [] if aim is None else swept(site, body, aim.position_mm)
+    lift = ways.platforms.get(here)
+    sills = () if lift is None else ways.tracks[lift].joins
+    there = next((ways.beyond(sill) for sill in sills if sill.track == aim.track), None)
+    if there is not None:
+        # By another door of the platform on which it stands.
+        body = replace(body, track=there.track, index=there.index, position_mm=ways.position_mm(there))
+        return swept(site, body, aim.position_mm)
+    ends = [here] if here in ways.mouths else [end for end in ways.links.get(here, ()) if end.track == aim.track]
+    return slots_at(site, ends[0]) if ends else [here]
+
+
+def slots_at(site: Site, position: Segment) -> list[Segment]:
+    """Slots of a body at a position: beyond a linked end it is turned, or turning, and in the mouth and inside."""
+    ways = way_site(site)
+    mouth = ways.mouths.get(position)
+    if mouth is None:
+        return [slot_at(site, position)]
+    return [mouth, ways.tracks[position.track].inside(position.index)]
 
 
 def slot_at(site: Site, position: Segment) -> Segment:
@@ -106,7 +141,7 @@ def lifts_under(site: Site, body: ReportedPosition) -> set[int]:
     word is older than where it is now, so it counts for nothing here.
     """
     track = way_site(site).tracks[body.track]
-    if track.kind is not TrackKind.ALLEY:
+    if track.kind is TrackKind.LIFT:
         return set()
     low_end = 2 * body.position_mm < (track.length - 1) * track.pitch_mm
     if body.speed_mm_s and (body.speed_mm_s > 0) is low_end:
@@ -120,9 +155,16 @@ def token_of(slot: Segment) -> Token:
 
 
 def floor_of(site: Site, lift: ReportedPosition) -> int:
-    """The alley at which a lift's platform is, by the nearest mark."""
-    joins = way_site(site).tracks[lift.track].joins
-    return joins[min(len(joins), max(1, lift.index)) - 1].track
+    """The alley at which a lift's platform is, by the nearest mark; the first of those to which it has doors."""
+    return floors_of(site, lift)[0]
+
+
+def floors_of(site: Site, lift: ReportedPosition) -> list[int]:
+    """The tracks to which a lift has doors where its platform is, by the nearest mark."""
+    ways = way_site(site)
+    joins = ways.tracks[lift.track].joins
+    here = min(len(joins), max(1, lift.index))
+    return [sill.track for sill in ways.doors(lift.track, here)]
 
 
 def _index_at(position_mm: float, pitch_mm: int) -> int:

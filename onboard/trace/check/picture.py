@@ -20,7 +20,7 @@ from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment, Site
 from onboard.trace.check.event import LogEvent
-from onboard.trace.check.geometry import ReportedPosition, body_of, floor_of
+from onboard.trace.check.geometry import ReportedPosition, body_of, floors_of
 from onboard.trace.check.tokens_seen import TokensSeen
 from onboard.ways.site import way_site
 
@@ -104,7 +104,11 @@ class BusPicture:
         """A carrier on a platform is at the floor where its lift is, which it tells only when it moves on."""
         lift_track = way_site(self.site).platforms.get(Segment(body.track, body.index))
         lift = self.bodies.get(self.site.stewards[lift_track]) if lift_track is not None else None
-        return body if lift is None else replace(body, track=floor_of(self.site, lift))
+        if lift_track is None or lift is None or body.track in floors_of(self.site, lift):
+            return body
+        ways, floor = way_site(self.site), floors_of(self.site, lift)[0]
+        at = next(ways.beyond(sill) for sill in ways.tracks[lift_track].joins if sill.track == floor)
+        return replace(body, track=at.track, index=at.index, position_mm=ways.position_mm(at))
 
     def feed(self, event: LogEvent[Message]) -> None:
         """Take up one message of the fleet bus before the rules see it."""

@@ -147,29 +147,45 @@ export class Stage {
 
   // A segment that nobody can pass, by somebody's word.
   drawBlocked(pen, snapshot) {
-    const { cell, floor } = this;
     pen.strokeStyle = css("--bad");
     pen.lineWidth = 2.5;
     for (const [number, index] of snapshot.blocked ?? []) {
       const track = this.tracks.get(number);
       if (!track || track.kind === "lift") continue;
-      const spot = track.kind === "alley" ? this.at(number, index) : this.at(...track.joins[0]);
-      const y = track.kind === "alley" ? spot.y : spot.y - floor * 0.3;
+      const box = this.crossBox(track, index);
       pen.beginPath();
-      pen.moveTo(spot.x - cell * 0.4, y - floor * 0.12);
-      pen.lineTo(spot.x + cell * 0.4, y + floor * 0.12);
-      pen.moveTo(spot.x + cell * 0.4, y - floor * 0.12);
-      pen.lineTo(spot.x - cell * 0.4, y + floor * 0.12);
+      pen.moveTo(box.x, box.y);
+      pen.lineTo(box.x + box.w, box.y + box.h);
+      pen.moveTo(box.x + box.w, box.y);
+      pen.lineTo(box.x, box.y + box.h);
       pen.stroke();
     }
     pen.lineWidth = 1;
   }
 
-  drawStation(pen, snapshot, track, index, side) {
+  // Where a segment that nobody can pass is crossed out.
+  crossBox(track, index) {
     const { cell, floor } = this;
-    const number = (track << 8) | (side << 7) | index;
+    const spot = track.kind === "alley" ? this.at(track.number, index) : this.at(...track.joins[0]);
+    const y = track.kind === "alley" ? spot.y : spot.y - floor * 0.3;
+    return { x: spot.x - cell * 0.4, y: y - floor * 0.12, w: cell * 0.8, h: floor * 0.24 };
+  }
+
+  // An alley's slot.
+  slot(track, index) {
     const spot = this.at(track, index);
-    const box = { x: spot.x - cell * 0.42, y: spot.y + (side === 1 ? -0.45 : 0.18) * floor, w: cell * 0.84, h: floor * 0.26 };
+    return { x: spot.x - this.cell / 2, y: spot.y - this.floor * 0.14, w: this.cell, h: this.floor * 0.28 };
+  }
+
+  stationBox(track, index, side) {
+    const { cell, floor } = this;
+    const spot = this.at(track, index);
+    return { x: spot.x - cell * 0.42, y: spot.y + (side === 1 ? -0.45 : 0.18) * floor, w: cell * 0.84, h: floor * 0.26 };
+  }
+
+  drawStation(pen, snapshot, track, index, side) {
+    const number = (track << 8) | (side << 7) | index;
+    const box = this.stationBox(track, index, side);
     const bay = this.bays.get(number);
     const car = snapshot.cars[number];
     if (bay) {
@@ -197,19 +213,21 @@ export class Stage {
     pen.strokeRect(box.x, box.y, box.w, box.h);
     pen.lineWidth = 1;
     const doors = machine.doors;
-    if (doors) {
-      const inside = box.y < this.at(machine.track, 1).y ? box.y + box.h : box.y;
-      const outside = inside === box.y ? box.y + box.h : box.y;
-      this.drawDoor(pen, box, outside, doors.input);
-      this.drawDoor(pen, box, inside, doors.output);
-      pen.fillStyle = doors.light === "green" ? css("--hold") : css("--bad");
-      pen.beginPath();
-      pen.arc(box.x + box.w + 4, outside, 3, 0, 7);
-      pen.fill();
-    }
+    if (doors) this.drawDoors(pen, box, bay, doors);
     const name = this.text(pen, car ? this.carName(car) : bay.name, box, car ? css("--card") : css("--bay"));
     if (hasFailed(machine)) crossOut(pen, box);
     this.hits.push({ ...box, what: "machine", id: bay.node, car, name, isCrossed: hasFailed(machine) });
+  }
+
+  drawDoors(pen, box, bay, doors) {
+    const inside = box.y < this.at(bay.station >> 8, 1).y ? box.y + box.h : box.y;
+    const outside = inside === box.y ? box.y + box.h : box.y;
+    this.drawDoor(pen, box, outside, doors.input);
+    this.drawDoor(pen, box, inside, doors.output);
+    pen.fillStyle = doors.light === "green" ? css("--hold") : css("--bad");
+    pen.beginPath();
+    pen.arc(box.x + box.w + 4, outside, 3, 0, 7);
+    pen.fill();
   }
 
   drawDoor(pen, box, y, state) {
@@ -234,14 +252,14 @@ export class Stage {
       for (const [track, index] of told.holds) {
         const row = this.tracks.get(track);
         if (!row || row.kind !== "alley") continue;
-        const spot = this.at(track, index);
-        pen.fillRect(spot.x - this.cell / 2, spot.y - this.floor * 0.14, this.cell, this.floor * 0.28);
+        const box = this.slot(track, index);
+        pen.fillRect(box.x, box.y, box.w, box.h);
         // Its edge in full colour: what is held is told apart from what is free without hues.
         if (!strong) continue;
         pen.globalAlpha = 1;
         pen.strokeStyle = css("--hold");
         pen.lineWidth = 2;
-        pen.strokeRect(spot.x - this.cell / 2 + 1, spot.y - this.floor * 0.14 + 1, this.cell - 2, this.floor * 0.28 - 2);
+        pen.strokeRect(box.x + 1, box.y + 1, box.w - 2, box.h - 2);
         pen.globalAlpha = 0.5;
       }
       pen.globalAlpha = strong ? 1 : 0.15;
@@ -300,13 +318,8 @@ export class Stage {
     const spot = this.where(machine.node, snapshot, nowUs);
     if (!spot) return;
     const told = snapshot.machines[machine.node];
-    const { cell, floor } = this;
-    const box = { x: spot.x - cell * 0.46, y: spot.y - floor * 0.13, w: cell * 0.92, h: floor * 0.26 };
-    if (told.shuttle && told.shuttle.mm > 50) {
-      const out = (told.shuttle.mm / 5400) * floor * 0.3 * (told.shuttle.side === 1 ? -1 : 1);
-      pen.fillStyle = css("--robot");
-      pen.fillRect(spot.x - cell * 0.12, Math.min(spot.y, spot.y + out), cell * 0.24, Math.abs(out));
-    }
+    const box = this.bodyBox(spot);
+    if (told.shuttle && told.shuttle.mm > 50) this.drawShuttle(pen, told, spot);
     pen.fillStyle = css("--robot");
     pen.fillRect(box.x, box.y, box.w, box.h);
     if (told.car) load(pen, box);
@@ -317,6 +330,18 @@ export class Stage {
     const name = this.text(pen, machine.name, box, css("--card"));
     if (hasFailed(told)) crossOut(pen, box);
     this.hits.push({ ...box, what: "machine", id: machine.node, name, isCrossed: hasFailed(told) });
+  }
+
+  bodyBox(spot) {
+    const { cell, floor } = this;
+    return { x: spot.x - cell * 0.46, y: spot.y - floor * 0.13, w: cell * 0.92, h: floor * 0.26 };
+  }
+
+  drawShuttle(pen, told, spot) {
+    const { cell, floor } = this;
+    const out = (told.shuttle.mm / 5400) * floor * 0.3 * (told.shuttle.side === 1 ? -1 : 1);
+    pen.fillStyle = css("--robot");
+    pen.fillRect(spot.x - cell * 0.12, Math.min(spot.y, spot.y + out), cell * 0.24, Math.abs(out));
   }
 
   // Who named it, without what the names of all compartments begin with, and its number there: IOC2/17 is 2/17 here. A

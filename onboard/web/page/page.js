@@ -1,5 +1,6 @@
 // The page: one socket, snapshots in, commands out. What is shown is what the bus told; the page itself knows nothing.
 
+import { Building } from "./building.js";
 import { Stage } from "./draw.js";
 import { Plan } from "./plan.js";
 
@@ -50,7 +51,8 @@ setInterval(() => {
 function take(told) {
   if (told.layout) {
     state.layout = told.layout;
-    stage = told.layout.plan ? new Plan($("#picture")) : new Stage($("#picture"));
+    const Drawn = told.layout.plan ? Plan : told.layout.building ? Building : Stage;
+    stage = new Drawn($("#picture"));
     stage.setLayout(told.layout);
     begin(told.layout);
   }

@@ -17,11 +17,14 @@ export function ready(canvas, width, height) {
   return ratio;
 }
 
-// A line of one colour on any ground: dashes over a solid casing in the page's own colour.
+// A line of one colour on any ground: dashes over a solid casing in the page's own colour. Where a point is null the line
+// has a gap: it goes on at the next.
 export function cased(pen, points, colour, width) {
   const stroke = () => {
     pen.beginPath();
-    points.forEach(([x, y], number) => (number ? pen.lineTo(x, y) : pen.moveTo(x, y)));
+    points.forEach((point, number) => {
+      if (point) number && points[number - 1] ? pen.lineTo(...point) : pen.moveTo(...point);
+    });
     pen.stroke();
   };
   pen.setLineDash([]);

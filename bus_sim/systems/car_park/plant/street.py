@@ -11,6 +11,7 @@ from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.world import CarParkWorld
 from onboard.contract.codes import DeskText
 from onboard.contract.messages import Reference
+from onboard.ways.site import BayUse
 
 #: What a text on the desk means to the customer whom it concerns.
 TEXTS: dict[DeskText, CustomerEvent] = {
@@ -126,7 +127,10 @@ class Street:
     # --- who goes where ----------------------------------------------------------------------------------------
 
     def _choose(self, customer: Customer) -> CompartmentPlant:
-        node_id = min(self._waiting, key=lambda node: (len(self._waiting[node]), node))
+        closed = BayUse.EXIT if customer.ticket is None else BayUse.ENTRY
+        uses = self._world.site.bay_uses
+        open_to = [node for node in self._waiting if uses.get(node, BayUse.BOTH) is not closed]
+        node_id = min(open_to, key=lambda node: (len(self._waiting[node]), node))
         return self._compartments[node_id]
 
     def _after_step(self, customer: Customer) -> None:

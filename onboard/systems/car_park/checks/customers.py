@@ -15,6 +15,7 @@ from onboard.contract.messages import (
     Reference,
     TaskReport,
 )
+from onboard.systems.car_park.site import CarPark
 from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
@@ -158,6 +159,10 @@ class FullMeansFull(Rule):
 
     def _on_word(self, event: LogEvent[DeskOrder]) -> None:
         places = len(way_site(self.picture.site).places)
+        if isinstance(self.picture.site, CarPark) and self.picture.site.classes:
+            # Full is full for the class of a car, and the desk does not say which.
+            self.picture.unjudged += 1
+            return
         if event.message.text is not DeskText.FULL or not self.picture.tokens.from_start:
             return
         # A car that is on its way out keeps its place until it is fetched, one on its way in has one already.

@@ -16,9 +16,10 @@ from onboard.trace.check.geometry import (
     ReportedPosition,
     body_of,
     floor_of,
+    floors_of,
     lifts_under,
     occupied,
-    swept,
+    sent_through,
     token_of,
 )
 from onboard.trace.check.picture import BusPicture
@@ -145,8 +146,8 @@ class PlatformThere(Rule):
         body = self.picture.bodies.get(event.message.sender)
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
-        body = self.picture.on_floor(body)
-        self._judge(event, body, swept(self.picture.site, body, event.message.target_mm), "is sent over")
+        site, body = self.picture.site, self.picture.on_floor(body)
+        self._judge(event, body, sent_through(site, body, event.message), "is sent over")
 
     def _judge(self, event: LogEvent[Message], body: ReportedPosition, slots: list[Segment], how: str) -> None:
         site, wrong = self.picture.site, False
@@ -154,7 +155,7 @@ class PlatformThere(Rule):
             lift = self.picture.bodies.get(site.stewards.get(slot.track, 0))
             if slot.index != GATE_INDEX or lift is None or lift.track != slot.track:
                 continue
-            if lift.speed_mm_s or floor_of(site, lift) != body.track:
+            if lift.speed_mm_s or body.track not in floors_of(site, lift):
                 wrong = True
                 where = "moves" if lift.speed_mm_s else f"is at floor {floor_of(site, lift)}"
                 if body.node not in self._told:

@@ -1,8 +1,6 @@
 """Motion: only under authority and inside it, and never two bodies in one slot (design, section 5)."""
 
-import math
 from collections.abc import Callable
-from dataclasses import replace
 
 from onboard.contract.codes import KindCode
 from onboard.contract.messages import DriveOrder, DriveState, Progress
@@ -11,10 +9,11 @@ from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.geometry import (
     TOLERANCE_MM,
     ReportedPosition,
+    body_at,
     body_of,
     lifts_under,
     occupied,
-    spur_slots,
+    sent_through,
     swept,
     token_of,
 )
@@ -86,18 +85,10 @@ class InsideAuthority(Rule):
         sensed_mm = self._sensed_mm.get(event.message.sender)
         if body is None or sensed_mm is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
-        site = self.picture.site
-        body = replace(self.picture.on_floor(body), position_mm=sensed_mm)
-        kind = way_site(site).tracks[body.track].kind
-        if kind is TrackKind.LIFT:
-            return
-        if event.message.across is (kind is TrackKind.SPUR):
-            slots = swept(site, body, event.message.target_mm)
-        else:
-            # Sent to turn where it is: into the spur of this mouth, or out of this one.
-            spur = way_site(site).spurs.get(Segment(body.track, body.index)) if event.message.across else body.track
-            slots = spur_slots(site, spur, -math.inf) if spur is not None else [Segment(body.track, body.index)]
-        self._judge(event, body, slots, "is sent through")
+        site, body = self.picture.site, self.picture.on_floor(body)
+        if way_site(site).tracks[body.track].kind is not TrackKind.LIFT:
+            slots = sent_through(site, body_at(site, body, sensed_mm), event.message)
+            self._judge(event, body, slots, "is sent through")
 
     def _judge(
         self,
@@ -146,13 +137,22 @@ class OneBody(Rule):
                 self.find(event, (body.node, other.node), f"both on the platform of lift {lift}")
             for one, two in ((body, other), (other, body)):
                 if self._is_in_mouth_of(one, two):
-                    self.find(event, (body.node, other.node), f"{one.node} in the mouth of spur {two.track}")
+                    self.find(event, (body.node, other.node), f"{one.node} in the mouth of {self._name(two.track)}")
+
+    def _name(self, track: int) -> str:
+        kind = way_site(self.picture.site).tracks[track].kind
+        return f"{'spur' if kind is TrackKind.SPUR else 'track'} {track}"
 
     def _is_in_mouth_of(self, one: ReportedPosition, two: ReportedPosition) -> bool:
-        """Whether a body on an alley is where another turns into a spur, or comes out of it."""
-        site = self.picture.site
-        if way_site(site).tracks[two.track].kind is not TrackKind.SPUR or len(occupied(site, two)) < 2:
-            return False
-        mouth = way_site(site).tracks[two.track].joins[0]
-        apart_mm = abs(one.position_mm - way_site(site).position_mm(mouth))
-        return one.track == mouth.track and apart_mm < way_site(site).carrier_length_mm - TOLERANCE_MM
+        """Whether a body is where another turns into a track, or comes out of it."""
+        ways = way_site(self.picture.site)
+        here = occupied(ways, two)
+        for _, mouth in ways.tracks[two.track].ends:
+            if mouth not in here:
+                continue
+            apart_mm = abs(one.position_mm - ways.position_mm(mouth))
+            if one.track == mouth.track and apart_mm < ways.carrier_length_mm - TOLERANCE_MM:
+                return True
+            if one.track not in (mouth.track, two.track) and mouth in occupied(ways, one):
+                return True
+        return False

@@ -5,15 +5,16 @@ from onboard.config.reader import TomlTable
 from onboard.config.toml_lines import path_text
 from onboard.contract.codes import KindCode
 from onboard.core.site import Machine, Segment
-from onboard.systems.car_park.layout import FIRST_LIFT, SIDES, Layout
-from onboard.ways.site import Track
+from onboard.systems.car_park.reader.layout import FIRST_LIFT, SIDES, Layout
+from onboard.ways.site import BayUse, Track
 
 _NOWHERE = Segment(0, 0)
 
 
-def read_fleet(root: TomlTable, layout: Layout) -> FleetReader:
-    """Lifts, compartments and robots of a site file."""
+def read_fleet(root: TomlTable, layout: Layout) -> tuple[FleetReader, dict[int, BayUse]]:
+    """Lifts, compartments and robots of a site file, and the compartments that are for one use only, by node-ID."""
     fleet = FleetReader()
+    uses: dict[int, BayUse] = {}
     for number, table in enumerate(layout.lifts, start=FIRST_LIFT):
         fleet.add(table, KindCode.LIFT, Segment(number, 1))
     for table in root.tables("compartments"):
@@ -21,12 +22,15 @@ def read_fleet(root: TomlTable, layout: Layout) -> FleetReader:
         station = layout.take(table, layout.find(table, "at"), side)
         if station is not None:
             layout.kept.setdefault(station.segment, f"the front of {path_text(table.path)} is")
+        use = BayUse(table.choice("use", [one.value for one in BayUse], BayUse.BOTH.value))
         fleet.add(table, KindCode.COMPARTMENT, station.segment if station is not None else _NOWHERE, station)
+        if use is not BayUse.BOTH and "node" not in table.wrong:
+            uses[table.values["node"]] = use
     for table in root.tables("robots"):
         home = _read_home(table, layout, fleet)
         fleet.robots.append((table, home))
         fleet.add(table, KindCode.ROBOT, home)
-    return fleet
+    return fleet, uses
 
 
 def _read_home(table: TomlTable, layout: Layout, fleet: FleetReader) -> Segment:
@@ -78,5 +82,8 @@ def _distance(layout: Layout, machine: Machine, track: Track) -> int:
 
 
 def _floors(layout: Layout, number: int) -> list[int]:
+    """The floors of a track; a lift's are those at which it stops."""
     track = layout.tracks.get(number)
-    return [sill.track for sill in track.joins] if track is not None and track.joins else [number]
+    if track is None or number in layout.level:
+        return [layout.level.get(number, number)]
+    return [layout.level.get(sill.track, sill.track) for sill in track.joins] or [number]

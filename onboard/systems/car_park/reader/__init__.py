@@ -6,12 +6,16 @@ from onboard.config.fleet import FleetReader
 from onboard.config.reader import Common, TomlTable
 from onboard.config.timing import read_timing
 from onboard.contract.codes import KindCode
-from onboard.systems.car_park.constants import read_constants
-from onboard.systems.car_park.layout import Layout, read_layout
-from onboard.systems.car_park.machines import read_fleet, read_stewards
+from onboard.systems.car_park.reader.alleys import read_layout
+from onboard.systems.car_park.reader.built import check_built
+from onboard.systems.car_park.reader.classes import check_heights, read_classes
+from onboard.systems.car_park.reader.constants import read_constants
+from onboard.systems.car_park.reader.layout import Layout
+from onboard.systems.car_park.reader.machines import read_fleet, read_stewards
+from onboard.systems.car_park.reader.positions import BASE
 from onboard.systems.car_park.room import check_room
 from onboard.systems.car_park.site import CarPark, RideCalls
-from onboard.ways.site import TrackKind
+from onboard.ways.site import BayUse, charted
 
 
 def read(root: TomlTable, common: Common) -> CarPark:
@@ -19,22 +23,24 @@ def read(root: TomlTable, common: Common) -> CarPark:
     problems, lift, bitrate = root.problems, root.table("lift"), common.bitrate
     floor_height_mm = lift.integer("floor_height_mm", 1000, 10_000, 2_500)
     layout = read_layout(root, floor_height_mm)
-    fleet = read_fleet(root, layout)
+    fleet, uses = read_fleet(root, layout)
     stewards = read_stewards(root.table("stewards"), layout, fleet)
-    constants = read_constants(root, lift, layout.pitch_mm)
+    constants = read_constants(root, lift, min(track.pitch_mm for track in layout.alleys()))
+    classes, place_class = read_classes(root, layout, constants.cars)
+    check_heights(layout, constants.cars, classes, place_class)
     robots = sum(1 for machine in fleet.by_node.values() if machine.kind is KindCode.ROBOT)
     timing = read_timing(root.table("timing"), robots, len(fleet.by_node), bitrate)
     negotiation = root.table("negotiation")
     rides = RideCalls(negotiation.choice("rides", [one.value for one in RideCalls], "after"))
     timing = replace(timing, sub_call_percent=negotiation.integer("sub_call_percent", 20, 80, 50))
-    _check_whole(root, layout, fleet)
+    _check_whole(root, layout, fleet, uses)
     root.check_unknown()
     problems.raise_if_any()
     site = CarPark(
         name=common.name,
         digest=0,
         bitrate=bitrate,
-        tracks=layout.tracks,
+        tracks=charted(layout.tracks),
         places=layout.places(),
         machines=dict(sorted(fleet.by_node.items())),
         stewards=stewards,
@@ -49,20 +55,32 @@ def read(root: TomlTable, common: Common) -> CarPark:
         cars=constants.cars,
         timing=timing,
         rides=rides,
+        bay_uses=uses,
+        classes=classes,
+        place_class=place_class,
+        alley_names={number: name for (_, name), number in layout.named.items() if name != BASE},
     )
+    site = check_built(root, site, layout)
+    problems.raise_if_any()
     if not common.crowded:
         check_room(root, site, fleet)
         problems.raise_if_any()
     return site
 
 
-def _check_whole(root: TomlTable, layout: Layout, fleet: FleetReader) -> None:
+def _check_whole(root: TomlTable, layout: Layout, fleet: FleetReader, uses: dict[int, BayUse]) -> None:
     """What no single key tells: that cars can come in and be carried to every place."""
     for kind, table in ((KindCode.COMPARTMENT, "compartments"), (KindCode.ROBOT, "robots")):
         if not root.values.get(table):
             root.bad(table, None, f"no {kind.name.lower()}", f"add at least one [[{table}]] table")
     if root.problems.found:
         return
+    bays = [uses.get(node, BayUse.BOTH) for node, one in fleet.by_node.items() if one.kind is KindCode.COMPARTMENT]
+    for use, other in ((BayUse.ENTRY, BayUse.EXIT), (BayUse.EXIT, BayUse.ENTRY)):
+        if all(one is other for one in bays):
+            root.bad(
+                "compartments", None, f"none for {use.value}", f'write use = "{use.value}", or none, at one of them'
+            )
     places = layout.places()
     if not places:
         root.bad("floors", None, "no place for a car", "take entries out of floors.without or add positions")
@@ -70,30 +88,30 @@ def _check_whole(root: TomlTable, layout: Layout, fleet: FleetReader) -> None:
 
 
 def _check_joined(root: TomlTable, layout: Layout, fleet: FleetReader) -> None:
-    """That every floor can be reached from every other, so from every compartment and by every robot."""
-    groups = _joined_floors(layout)
-    for floors in groups:
-        kinds = {machine.kind for machine in fleet.by_node.values() if _floor(layout, machine.home.track) in floors}
+    """That every alley can be reached from every other, so from every compartment and by every robot."""
+    groups = _joined_tracks(layout)
+    told = set()
+    for tracks in groups:
+        kinds = {machine.kind for machine in fleet.by_node.values() if machine.home.track in tracks}
         missing = [kind.name.lower() for kind in (KindCode.COMPARTMENT, KindCode.ROBOT) if kind not in kinds]
         if missing:
-            what = f"no {' and no '.join(missing)} can be reached from floor {min(floors)}"
-            root.bad("lifts", None, what, f"join floor {min(floors)} to the others by a lift")
+            here = layout.words(min(tracks))
+            name = layout.alley_name(min(tracks))
+            if name in told and not here.startswith("floor"):
+                continue
+            told.add(name)
+            what = f"no {' and no '.join(missing)} can be reached from {here}"
+            root.bad("lifts", None, what, f"join {here} to the others by a lift")
     if len(groups) > 1 and "lifts" not in root.wrong:
-        what = f"no way from floor {min(groups[0])} to floor {min(groups[1])}"
+        what = f"no way from {layout.words(min(groups[0]))} to {layout.words(min(groups[1]))}"
         root.bad("lifts", None, what, "join them by a lift, or write a site file for each")
 
 
-def _joined_floors(layout: Layout) -> list[set[int]]:
-    """The floors in groups between which lifts go."""
+def _joined_tracks(layout: Layout) -> list[set[int]]:
+    """The tracks in groups, between which one can drive or ride."""
     groups = [{alley.number} for alley in layout.alleys()]
     for track in layout.tracks.values():
-        if track.kind is TrackKind.LIFT:
-            served = {sill.track for sill in track.joins}
-            joined = [group for group in groups if group & served]
-            groups = [group for group in groups if not group & served] + [set().union(*joined)]
+        beside = {mouth.track for mouth in (*track.joins, track.high) if mouth is not None} | {track.number}
+        joined = [group for group in groups if group & beside]
+        groups = [group for group in groups if not group & beside] + [beside.union(*joined)]
     return groups
-
-
-def _floor(layout: Layout, track: int) -> int:
-    joins = layout.tracks[track].joins
-    return joins[0].track if joins else track

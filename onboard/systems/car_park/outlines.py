@@ -1,0 +1,121 @@
+"""Where everything of a building lies on its floor, in mm: slots, places, platforms. For proofs and for drawings.
+
+A slot is as long as its track's pitch and as wide as the narrowest alley's; a place is a pitch wide and as deep as the
+shuttle reaches, from the slot's edge outward. x grows with the index of a floor's own alley, y towards its far side.
+"""
+
+from typing import NamedTuple
+
+from onboard.contract.codes import Side
+from onboard.core.site import Segment, Station
+from onboard.systems.car_park.site import CarPark
+from onboard.ways.floor_plan import FloorPlan, at_mm, floor_plan
+from onboard.ways.site import TrackKind
+
+
+class Box(NamedTuple):
+    """A rectangle along the axes, mm."""
+
+    left: float
+    low: float
+    right: float
+    high: float
+
+    def overlaps(self, other: "Box") -> bool:
+        """Whether both share more than an edge."""
+        return self.left < other.right and other.left < self.right and self.low < other.high and other.low < self.high
+
+    def around(self, other: "Box") -> "Box":
+        """The smallest rectangle that holds both."""
+        return Box(
+            min(self.left, other.left),
+            min(self.low, other.low),
+            max(self.right, other.right),
+            max(self.high, other.high),
+        )
+
+
+class Outlines:
+    """The boxes of one site."""
+
+    def __init__(self, site: CarPark) -> None:
+        self.site = site
+        self.plan: FloorPlan = floor_plan(site)
+        #: Side of a usual slot: that of the narrowest alley.
+        self.slot_mm = min(track.pitch_mm for track in site.tracks.values() if track.kind is TrackKind.ALLEY)
+
+    @property
+    def levels(self) -> list[int]:
+        """The floors, the highest first."""
+        numbers = [track.number for track in self.site.tracks.values() if track.kind is not TrackKind.LIFT]
+        return sorted({self.site.level(number) for number in numbers}, reverse=True)
+
+    def slot(self, segment: Segment) -> Box:
+        """What a segment takes, or the position beyond an end: its pitch along the track, a usual slot across."""
+        (x, y), line = at_mm(self.plan, self.site, segment), self.plan.lines[segment.track]
+        along, across = self.site.tracks[segment.track].pitch_mm / 2, self.slot_mm / 2
+        wide, high = (along, across) if line.dx else (across, along)
+        return Box(x - wide, y - high, x + wide, y + high)
+
+    def track(self, number: int) -> Box:
+        """All slots of an alley or a spur."""
+        length = self.site.tracks[number].length
+        return self.slot(Segment(number, 1)).around(self.slot(Segment(number, length)))
+
+    def station(self, station: Station) -> Box:
+        """A place, or a compartment."""
+        line, reach_mm = self.plan.lines[station.track], self.site.shuttle_reach_mm
+        slot = self.slot(station.segment)
+        across = 1 if station.side is Side.FAR else -1
+        dx, dy = -line.dy * across, line.dx * across
+        if dx:
+            return (
+                Box(slot.right, slot.low, slot.right + reach_mm, slot.high)
+                if dx > 0
+                else Box(slot.left - reach_mm, slot.low, slot.left, slot.high)
+            )
+        return (
+            Box(slot.left, slot.high, slot.right, slot.high + reach_mm)
+            if dy > 0
+            else Box(slot.left, slot.low - reach_mm, slot.right, slot.low)
+        )
+
+    def platform(self, lift: int) -> Box:
+        """A lift's platform: a usual slot."""
+        (x, y), half = self.plan.shafts[lift], self.slot_mm / 2
+        return Box(x - half, y - half, x + half, y + half)
+
+    def level(self, level: int) -> Box:
+        """All that lies on a floor."""
+        boxes = [self.track(number) for number in self.tracks_on(level)]
+        stations = (*self.site.places, *self.site.compartments.values())
+        boxes += [self.station(one) for one in stations if self.site.level(one.track) == level]
+        boxes += [self.platform(lift) for lift in self.lifts_on(level)]
+        whole = boxes[0]
+        for box in boxes:
+            whole = whole.around(box)
+        return whole
+
+    def tracks_on(self, level: int) -> list[int]:
+        """Alleys, lobbies and spurs of a floor, in the site's order."""
+        tracks = self.site.tracks.values()
+        return [one.number for one in tracks if one.kind is not TrackKind.LIFT and self.site.level(one.number) == level]
+
+    def lifts_on(self, level: int) -> list[int]:
+        """The lifts that stop at a floor."""
+        return [
+            lift
+            for lift in self.site.lifts
+            if any(self.site.level(sill.track) == level for sill in self.site.tracks[lift].joins)
+        ]
+
+
+def is_elevation(site: CarPark) -> bool:
+    """Whether all is seen from the side: each floor one alley, lifts at its ends, spurs of one segment."""
+    alleys = [track for track in site.tracks.values() if track.kind is TrackKind.ALLEY]
+    spurs = [track for track in site.tracks.values() if track.kind is TrackKind.SPUR]
+    return (
+        len({site.level(track.number) for track in alleys}) == len(alleys)
+        and not any(track.ends for track in alleys)
+        and all(track.length == 1 for track in spurs)
+    )
