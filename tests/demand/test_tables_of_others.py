@@ -209,7 +209,7 @@ def test_every_bad_row_is_named_and_none_is_passed_over_unasked(tmp_path: Path) 
 def test_bad_rows_beyond_a_bound_are_counted(tmp_path: Path) -> None:
     lines = refused(tmp_path, "arrival,departure\n" + "x,y\n" * (MOST_NAMED + 5))
     assert len(lines) == MOST_NAMED + 2
-    assert lines[-2:] == ["table.csv: and 5 more", f"table.csv: {MOST_NAMED + 5} bad rows; --skip-bad passes them over"]
+    assert lines[-2:] == ["and 5 more", f"table.csv: {MOST_NAMED + 5} bad rows; --skip-bad passes them over"]
 
 
 def test_bad_rows_end_a_command_with_status_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -237,7 +237,7 @@ def test_bad_rows_end_a_command_with_status_2(tmp_path: Path, capsys: pytest.Cap
         ([], "table.csv:2: arrival '2019-07-24T05:00' has no UTC offset; write it as"),
         (["--inside", "some"], "--inside some: must be a number of cars from 0 to"),
         (["--inside", "recorded"], "--inside recorded: who came before the day; add --day D"),
-        (["--counts", "x.csv"], "--sessions: does not go with --counts; leave one of them out"),
+        (["--counts", "x.csv"], "--sessions: does not go with --counts; leave one out"),
         (["--inside", "3", "--one-car", "5"], "--inside 3: does not go with --one-car; leave one of them out"),
     ],
 )
@@ -358,6 +358,10 @@ def test_bad_rows_of_counts_are_named(tmp_path: Path) -> None:
 def test_more_inside_than_there_are_places_is_a_mistake(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "small", "--inside", "99", "--day", "2019-07-24"]) == 2
     assert "99 cars inside at the start: small has " in capsys.readouterr().err
+    assert main(["compare", "small", "--parts", "day", "--inside", "99", "--day", "2019-07-24"]) == 2
+    assert "99 cars inside at the start: small has " in capsys.readouterr().err
+    assert main(["compare", "small", "--parts", "day", "--counts", "x.csv", "--sessions", "y.csv"]) == 2
+    assert "--sessions: does not go with --counts" in capsys.readouterr().err
 
 
 def test_whole_real_tables_are_read() -> None:

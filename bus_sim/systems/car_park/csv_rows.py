@@ -119,9 +119,7 @@ class CsvTable:
         """What is told of bad rows that are passed over; none where there are none. ``DemandError`` unless asked so."""
         if not self.bad:
             return []
-        told, more = self.bad[:MOST_NAMED], len(self.bad) - MOST_NAMED
-        if more > 0:
-            told = [*told, f"{self.name}: and {more} more"]
+        told = at_most(self.bad)
         if self.form.skip_bad:
             return [f"{self.name}: {len(self.bad)} of {self.count} rows are bad and passed over", *told]
         if len(self.bad) == 1:
@@ -164,6 +162,12 @@ class CsvTable:
         named = ",".join(f"{column}=NAME" for column in needed)
         shown = ", ".join(head[:12]) + (", ..." if len(head) > 12 else "")
         return f"it has {shown}; say which is which: --columns {named}"
+
+
+def at_most(lines: Sequence[str]) -> list[str]:
+    """The first ``MOST_NAMED``, and how many more there are."""
+    more = len(lines) - MOST_NAMED
+    return [*lines[:MOST_NAMED], *([f"and {more} more"] if more > 0 else [])]
 
 
 def _known(cells: Sequence[str], at: Mapping[str, Sequence[int]]) -> dict[str, str]:

@@ -1,15 +1,19 @@
 """Who comes to a car park in ``bus-sim run``: the day, the hour or the cars that a person asked for."""
 
 from argparse import Namespace
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
 
 from bus_sim.demand import DemandError
-from bus_sim.systems.car_park.csv_rows import CsvForm
+from bus_sim.systems.car_park.csv_rows import CsvForm, at_most
 from bus_sim.systems.car_park.demand import LEVEL1_DAY, WHOLE_DAY, Demand, with_more_inside
 from bus_sim.systems.car_park.mapping import table_form
+from bus_sim.systems.car_park.sizes import misfits
+from bus_sim.systems.car_park.window import with_eve
 from onboard.core.site import Site
+from onboard.systems.car_park.site import CarPark
 from onboard.ways.site import way_site
 
 #: Word of ``--inside`` for the cars that the table itself says were there.
@@ -66,8 +70,22 @@ def choose_demand(day: ParkingDay, site: Site | None = None, seed: int = 1) -> D
         seed=seed,
         form=day.form,
         overnight=day.overnight,
+        park=site if isinstance(site, CarPark) else None,
     )
     return with_more_inside(demand, day.inside, seed)
+
+
+def brought_in(demand: Demand, site: CarPark) -> Demand:
+    """The demand as it is played: the cars inside at the start come before it, and who fits nowhere is told.
+
+    Raises ``DemandError`` for more cars inside than there are places.
+    """
+    if len(demand.inside) > len(site.places):
+        cars = f"{len(demand.inside)} cars inside at the start"
+        raise DemandError(f"{cars}: {site.name} has {len(site.places)} places; name a larger site, or fewer cars")
+    refused = misfits([stay.car for stay in (*demand.inside, *demand.stays)], site)
+    played = with_eve(demand, len(site.compartments))
+    return replace(played, remarks=(*played.remarks, *at_most(refused)))
 
 
 def _days(text: str | None) -> tuple[date | None, date | None]:
@@ -98,7 +116,9 @@ def asked_day(args: Namespace, *, live: bool) -> ParkingDay:
             f"--without {args.without[0]}: a window's warm-up is hurried, and a controller in another process lives at "
             "the clock's pace; leave out --hour and --window"
         )
-    _check_together(args)
+    check_together(args, ("one_car", "random", "by_hand"))
+    if args.counts is not None and args.stalls:
+        raise DemandError(f"--stalls {args.stalls}: does not go with --counts, which knows no stalls; leave it out")
     inside, overnight = asked_inside(args)
     return ParkingDay(
         sessions=args.sessions,
@@ -131,13 +151,11 @@ def asked_inside(args: Namespace) -> tuple[int, bool]:
     return int(text), False
 
 
-def _check_together(args: Namespace) -> None:
-    """Raise ``DemandError`` for two options that say differently who comes."""
-    others = ("sessions", "one_car", "random", "by_hand")
-    given = [f"--{name.replace('_', '-')}" for name in others if getattr(args, name) not in (None, False)]
-    if args.counts is not None and (given or args.stalls):
-        raise DemandError(f"{(given or ['--stalls'])[0]}: does not go with --counts; leave one of them out")
-    drawn = [option for option in given if option != "--sessions"]
+def check_together(args: Namespace, others: Sequence[str] = ()) -> None:
+    """Raise ``DemandError`` for two options that say differently who comes; ``others`` besides the tables by name."""
+    drawn = [f"--{name.replace('_', '-')}" for name in others if getattr(args, name) not in (None, False)]
+    if args.counts is not None and (args.sessions is not None or drawn):
+        raise DemandError(f"{['--sessions', *drawn][args.sessions is None]}: does not go with --counts; leave one out")
     if args.inside is not None and drawn:
         raise DemandError(f"--inside {args.inside}: does not go with {drawn[0]}; leave one of them out")
 

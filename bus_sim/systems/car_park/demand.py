@@ -16,6 +16,7 @@ from bus_sim.systems.car_park.counts import chosen_counts, day_zero, drawn_stays
 from bus_sim.systems.car_park.csv_rows import CsvForm, CsvTable, Readable
 from bus_sim.systems.car_park.plant.bodies import CarBody, random_car
 from bus_sim.systems.car_park.sessions import ParkingSession, nothing_chosen, read_sessions
+from onboard.systems.car_park.site import CarPark
 
 #: What ships with the simulator, both 2019-07-24 (bus_sim/data/README.md): stalls AG-1F01 to AG-1F14, and all 52.
 LEVEL1_DAY = "acn_jpl_2019-07-24_level1.csv"
@@ -60,6 +61,7 @@ class Demand:
         seed: int = 0,
         form: CsvForm | None = None,
         overnight: bool = False,
+        park: CarPark | None = None,
     ) -> "Demand":
         """The sessions of a CSV file that begin on one local day at stations named, or beginning as named.
 
@@ -67,13 +69,13 @@ class Demand:
         midnight before the first arrival. With ``until`` the days from ``day`` to it, both included. A session still
         there at midnight keeps its later departure. One without an arrival is inside at the start if it is fetched on
         one of the days, with ``overnight`` also who came before the first day and was there when it began. ``skipped``
-        counts rows of other days and stations. Raises ``DemandError`` for what cannot be read, and for bad rows unless
-        the form passes them over.
+        counts rows of other days and stations. ``park``: whose classes the table may name.
+        Raises ``DemandError`` for what cannot be read, and for bad rows unless the form passes them over.
         """
         source: Readable = Path(path) if path is not None else _shipped(shipped)
         wanted, last = tuple(stations), until or day
         table = CsvTable(source.name, form or CsvForm())
-        sessions = list(read_sessions(source, table))
+        sessions = list(read_sessions(source, table, seed, park))
         remarks = table.checked()
         here = [one for one in sessions if one.is_at(wanted)]
         held = [one for one in here if overnight and one.is_inside(day)]
@@ -83,9 +85,9 @@ class Demand:
         chosen.sort(key=lambda session: (session.first, session.name))
         first = chosen[0].first
         zero = datetime.combine(first.date(), time(), first.tzinfo)
-        stays = tuple(_session_stay(one, zero, seed) for one in chosen if one.arrival is not None)
+        stays = tuple(_session_stay(one, zero) for one in chosen if one.arrival is not None)
         unknown = [one for one in chosen if one.arrival is None]
-        before = tuple(_session_stay(one._replace(arrival=None), zero, seed) for one in (*held, *unknown))
+        before = tuple(_session_stay(one._replace(arrival=None), zero) for one in (*held, *unknown))
         return cls(stays, zero, len(sessions) - len(chosen) - len(held), before, tuple(remarks))
 
     @classmethod
@@ -199,11 +201,11 @@ class Arrivals:
         ]
 
 
-def _session_stay(session: ParkingSession, zero: datetime, seed: int) -> Stay:
-    """The visit in us after ``zero``, with a car drawn for this session; at 0 where the arrival is not known."""
+def _session_stay(session: ParkingSession, zero: datetime) -> Stay:
+    """The visit in us after ``zero``; at 0 where the arrival is not known."""
     arrival_us = 0 if session.arrival is None else _us(session.arrival, zero)
     departure_us = None if session.departure is None else _us(session.departure, zero)
-    return Stay(arrival_us, departure_us, random_car(session.name, seed))
+    return Stay(arrival_us, departure_us, session.car)
 
 
 def _is_within(day: date, first: date | None, last: date | None) -> bool:

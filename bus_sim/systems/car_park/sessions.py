@@ -5,13 +5,17 @@ from datetime import date, datetime
 from typing import NamedTuple
 
 from bus_sim.demand import DemandError
+from bus_sim.systems.car_park import sizes
 from bus_sim.systems.car_park.csv_rows import CsvRow, CsvTable, Readable
 from bus_sim.systems.car_park.moments import CellError, MomentForm
+from bus_sim.systems.car_park.plant.bodies import CarBody
+from bus_sim.systems.car_park.sizes import car_of
+from onboard.systems.car_park.site import CarPark
 
 #: Columns that every table of sessions has; a cell of one of them may be empty.
 NEEDED = ("arrival", "departure")
 #: Columns that are read where they are there.
-OPTIONAL = ("station_id", "session_id")
+OPTIONAL = ("station_id", "session_id", *sizes.COLUMNS)
 
 
 class ParkingSession(NamedTuple):
@@ -24,6 +28,7 @@ class ParkingSession(NamedTuple):
     departure: datetime | None
     station: str
     name: str
+    car: CarBody
 
     @property
     def first(self) -> datetime:
@@ -43,15 +48,17 @@ class ParkingSession(NamedTuple):
         return self.departure is None or self.departure.date() >= day
 
 
-def read_sessions(source: Readable, table: CsvTable) -> Iterator[ParkingSession]:
-    """All good sessions of a table in its order; bad rows are noted there.
+def read_sessions(
+    source: Readable, table: CsvTable, seed: int = 0, park: CarPark | None = None
+) -> Iterator[ParkingSession]:
+    """All good sessions of a table in its order; bad rows are noted there. ``park``: where the cars are to stand.
 
     Raises ``DemandError`` where the file cannot be read, or has no such columns.
     """
     names: dict[str, int] = {}
     for row in table.rows(source, NEEDED, OPTIONAL):
         try:
-            session = _session(row, table.form.moments)
+            session = _session(row, table.form.moments, seed, park)
             if session.name in names:
                 earlier = f"is that of line {names[session.name]} too"
                 raise CellError(f"session_id {session.name!r} {earlier}; make it unique")
@@ -62,7 +69,7 @@ def read_sessions(source: Readable, table: CsvTable) -> Iterator[ParkingSession]
         yield session
 
 
-def _session(row: CsvRow, form: MomentForm) -> ParkingSession:
+def _session(row: CsvRow, form: MomentForm, seed: int, park: CarPark | None) -> ParkingSession:
     arrivals, departures = _moments(row, "arrival", form), _moments(row, "departure", form)
     if not arrivals and not departures:
         raise CellError("arrival and departure are empty; every row needs one of them")
@@ -72,9 +79,8 @@ def _session(row: CsvRow, form: MomentForm) -> ParkingSession:
     if departures and departure is None:
         times = f"departure {row.text('departure')!r} is not after arrival {row.text('arrival')!r}"
         raise CellError(f"{times}; correct or leave out the row")
-    return ParkingSession(
-        arrival, departure, row.cells.get("station_id", ""), row.cells.get("session_id", f"row {row.line}")
-    )
+    name = row.cells.get("session_id", f"row {row.line}")
+    return ParkingSession(arrival, departure, row.cells.get("station_id", ""), name, car_of(name, row, seed, park))
 
 
 def _moments(row: CsvRow, column: str, form: MomentForm) -> tuple[datetime, ...]:

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from bus_sim.systems.car_park.car_labels import bay_letters, car_labels
 from bus_sim.systems.car_park.show_plan import draw_plans
-from bus_sim.systems.car_park.slots import boxed, named, style
+from bus_sim.systems.car_park.slots import boxed, named, style, text_columns
 from onboard.contract.codes import KindCode, MachineState, Side
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.outlines import is_elevation
@@ -78,7 +78,7 @@ def draw_floor(site: WaySite, view: SiteView, track: int, cell: int = CELLS[0]) 
     (``car_labels``), the same on every floor.
     """
     taken = view.history.loads.standing()
-    labels = car_labels(taken.values(), bay_letters(site.compartments), 3 if cell >= CELLS[0] else cell)
+    labels = car_labels(taken.values(), bay_letters(site.compartments), text_columns(cell))
     compartments = set(site.compartments.values())
     places = set(site.places)
     rows = []

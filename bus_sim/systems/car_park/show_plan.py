@@ -2,7 +2,8 @@
 
 from rich.text import Text
 
-from bus_sim.systems.car_park.slots import boxed, named, style
+from bus_sim.systems.car_park.car_labels import bay_letters, car_labels
+from bus_sim.systems.car_park.slots import boxed, named, style, text_columns
 from onboard.contract.codes import KindCode, Side
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.outlines import Outlines
@@ -78,13 +79,14 @@ class _FloorPicture:
     def _places(self, cell: int) -> dict[Spot, tuple[str, str]]:
         """Places and compartments, each in the spot next to its slot."""
         taken = self.view.history.loads.standing()
+        labels = car_labels(taken.values(), bay_letters(self.site.compartments), text_columns(cell))
         found = {}
         bays = set(self.site.compartments.values())
         for station in (*self.site.places, *bays):
             if self.site.level(station.track) == self.level:
                 car = taken.get(station.number)
                 empty = "I/O" if station in bays else ""
-                words = boxed(str(car.number) if car else empty, "[]" if station in bays else "||", cell)
+                words = boxed(labels[car] if car else empty, "[]" if station in bays else "||", cell)
                 how = "bold magenta" if station in bays else "cyan" if car else "dim"
                 found[self._beside(station)] = words, how
         return found

@@ -10,7 +10,7 @@ from bus_sim.demand import DemandError
 from bus_sim.faults import operators
 from bus_sim.options import RunOptions
 from bus_sim.systems.car_park import drives, people
-from bus_sim.systems.car_park.day import ParkingDay, asked_day, choose_demand
+from bus_sim.systems.car_park.day import ParkingDay, asked_day, brought_in, choose_demand
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.car_park.forged import ForgedRetrievals
 from bus_sim.systems.car_park.plant.plant import Plant
@@ -18,7 +18,7 @@ from bus_sim.systems.car_park.planted.registry import find_bug
 from bus_sim.systems.car_park.simulation import build
 from bus_sim.systems.car_park.stage import ORIGIN_US, CarParkStage, ComingCustomers
 from bus_sim.systems.car_park.stranger import factories_with
-from bus_sim.systems.car_park.window import choose_window, with_eve, with_short_eve
+from bus_sim.systems.car_park.window import choose_window, with_short_eve
 from bus_sim.systems.stranger import Stranger
 from bus_sim.systems.system import HAND_SPEED, Action, Faulted, Occasion, SimulatedSystem
 from bus_sim.virtual_time import VirtualTimeLoop
@@ -144,10 +144,7 @@ def _coming(site: CarPark, options: RunOptions) -> ComingCustomers:
         return ComingCustomers((wanted or Arrivals()).demand(options.seed))
     demand = choose_demand(wanted, site, options.seed)
     window = choose_window(demand, wanted.window) if wanted.window is not None else None
-    if len(demand.inside) > len(site.places):
-        cars = f"{len(demand.inside)} cars inside at the start"
-        raise DemandError(f"{cars}: {site.name} has {len(site.places)} places; name a larger site, or fewer cars")
-    demand = with_eve(demand, len(site.compartments))
+    demand = brought_in(demand, site)
     if window is not None and wanted.short_eve:
         demand = with_short_eve(demand, window, len(site.compartments))
     # The first to come, or what is shown, is so long after power-up.

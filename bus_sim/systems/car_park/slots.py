@@ -12,10 +12,15 @@ def style(view: SiteView, nodes: list[int]) -> str:
     return _LOADED if any(node in view.history.loads.aboard for node in nodes) else "bold green"
 
 
+def text_columns(cell: int) -> int:
+    """Columns for a car's name in a place of ``cell`` columns."""
+    return cell - 2 if cell >= _WALLED else cell
+
+
 def boxed(text: str, box: str, cell: int) -> str:
     """Text of one position; a narrow one has no walls, and an empty place is a dash."""
     if cell >= _WALLED:
-        return f"{box[0]}{text[-3:]:^3}{box[1]}"
+        return f"{box[0]}{text[-text_columns(cell) :]:^{text_columns(cell)}}{box[1]}"
     return f"{text[-cell:] or '-':^{cell}}"
 
 

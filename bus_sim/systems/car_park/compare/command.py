@@ -13,10 +13,10 @@ from bus_sim.systems.car_park.compare.optimum import OptimumError, is_available
 from bus_sim.systems.car_park.compare.plays import POLICIES, Play, play
 from bus_sim.systems.car_park.compare.small_table import SmallTable, solve_case
 from bus_sim.systems.car_park.compare.table import ComparisonTable, tabulate
-from bus_sim.systems.car_park.day import ParkingDay, asked_inside, choose_demand
+from bus_sim.systems.car_park.day import ParkingDay, asked_inside, brought_in, check_together, choose_demand
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.mapping import table_form
-from bus_sim.systems.car_park.window import DayWindow, choose_window, with_eve
+from bus_sim.systems.car_park.window import DayWindow, choose_window
 from onboard.core.site import Site
 from onboard.systems.car_park.site import CarPark
 
@@ -113,11 +113,12 @@ def compare_random(site: Site, seeds: range, cars: int, interval_s: tuple[float,
 
 def compare_day(site: CarPark, args: argparse.Namespace) -> ComparisonTable:
     """All policies on a window of a real day: what comes before is played too, and not counted."""
+    check_together(args)
     inside, overnight = asked_inside(args)
     day = ParkingDay(args.sessions, args.counts, table_form(args), inside, overnight, args.day)
     demand = choose_demand(day, site)
     window = choose_window(demand, args.window)
-    demand = with_eve(demand, len(site.compartments))
+    demand = brought_in(demand, site)
     for remark in demand.remarks:
         print(remark, file=sys.stderr, flush=True)
     seed = 1

@@ -13,6 +13,7 @@ WHEELBASE_MM = (2300, 3100, 2650)
 OVERHANGS_MM = (1400, 1800)
 HEIGHT_MM = (1400, 1900, 1500)
 KG_PER_MM_OF_LENGTH = (0.28, 0.42)
+WIDTH_MM = (1600, 2000, 1800)
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,8 @@ class CarBody:
     length_mm: int
     height_mm: int
     mass_kg: int
+    #: Without mirrors. No sensor of a compartment measures it.
+    width_mm: int = WIDTH_MM[2]
 
 
 class Aboard(NamedTuple):
@@ -43,4 +46,4 @@ def random_car(name: str, seed: int) -> CarBody:
     length_mm = wheelbase_mm + chance.randint(*OVERHANGS_MM)
     height_mm = round(chance.triangular(*HEIGHT_MM))
     mass_kg = round(length_mm * chance.uniform(*KG_PER_MM_OF_LENGTH))
-    return CarBody(name, wheelbase_mm, length_mm, height_mm, mass_kg)
+    return CarBody(name, wheelbase_mm, length_mm, height_mm, mass_kg, round(chance.triangular(*WIDTH_MM)))

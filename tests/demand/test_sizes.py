@@ -1,0 +1,99 @@
+"""Sizes of cars in a table of sessions: what is given, what is drawn, and who fits nowhere."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from bus_sim.demand import DemandError
+from bus_sim.options import RunOptions
+from bus_sim.session import run_site
+from bus_sim.sites import find_site
+from bus_sim.systems.car_park.day import ParkingDay
+from bus_sim.systems.car_park.demand import Demand
+from bus_sim.systems.car_park.plant.bodies import CarBody, random_car
+from bus_sim.systems.car_park.sizes import broken_limits, misfits
+from onboard.systems.car_park.site import CarPark, SizeClass
+
+HEAD = "arrival,departure,session_id,length_mm,height_mm,width_mm,weight_kg,wheelbase_mm,class\n"
+
+
+def park(*classes: SizeClass, of_places: int = 0) -> CarPark:
+    """The small site, all of whose places are of one class."""
+    site = find_site("small")
+    assert isinstance(site, CarPark)
+    number = {place.number: of_places for place in site.places} if of_places else {}
+    return replace(site, classes=classes, place_class=number)
+
+
+def cars(tmp_path: Path, *rows: str, site: CarPark | None = None, minutes: int = 20) -> list[CarBody]:
+    path = table(tmp_path, *rows, minutes=minutes)
+    return [stay.car for stay in Demand.from_sessions(path, park=site).stays]
+
+
+def table(tmp_path: Path, *rows: str, minutes: int = 20) -> Path:
+    path = tmp_path / "table.csv"
+    stays = [f"2019-07-24T05:0{at}Z,2019-07-24T05:{minutes + at}Z,car {at},{row}\n" for at, row in enumerate(rows)]
+    path.write_text(HEAD + "".join(stays))
+    return path
+
+
+def test_a_car_is_as_the_table_says_and_drawn_where_it_is_silent(tmp_path: Path) -> None:
+    whole, silent, long = cars(tmp_path, "4500,1600,1850,1700,2800,", ",,,,,", "4800,,,,,")
+    assert whole == CarBody("car 0", 2800, 4500, 1600, 1700, 1850)
+    assert silent == random_car("car 1", 0)
+    drawn = random_car("car 2", 0)
+    assert long.length_mm == 4800
+    assert long.wheelbase_mm / 4800 == pytest.approx(drawn.wheelbase_mm / drawn.length_mm, abs=1e-3)
+    assert long.mass_kg / 4800 == pytest.approx(drawn.mass_kg / drawn.length_mm, abs=1e-3)
+    assert (long.height_mm, long.width_mm) == (drawn.height_mm, drawn.width_mm)
+
+
+SMALL, TALL = SizeClass("small", 4200, 1500, 1500), SizeClass("tall", 5000, 2050, 2500)
+
+
+def test_a_car_of_a_class_is_as_large_as_the_class_allows(tmp_path: Path) -> None:
+    site = park(SMALL, TALL)
+    one, other, given = cars(tmp_path, ",,,,,small", ",,,,,Tall", "4100,,,,,tall", site=site)
+    assert [site.car_class(car.length_mm, car.height_mm, car.mass_kg) for car in (one, other, given)] == [1, 2, 2]
+    assert (one.length_mm, one.height_mm, one.mass_kg) == (4200, 1500, 1500)
+    assert (given.length_mm, given.height_mm) == (4100, 2050)
+    with pytest.raises(DemandError, match=r"table\.csv:2: class 'van': the site has small, tall; write one of them"):
+        cars(tmp_path, ",,,,,van", site=site)
+    assert cars(tmp_path, ",,,,,van", site=park()) == [random_car("car 0", 0)], "a column of somebody else's"
+
+
+@pytest.mark.parametrize(
+    ("row", "line"),
+    [
+        ("long,,,,,", "length_mm 'long' is no number; write one from 1000 to 8191"),
+        ("900,,,,,", "length_mm '900' is out of range; write a whole number from 1000 to 8191"),
+        (",,,1.5,,", "weight_kg '1.5' is out of range; write a whole number from 50 to 4095"),
+        (",,2900,,,", "width_mm '2900' is wider than every place of small, 2400 mm, and no gate measures it; correct"),
+    ],
+)
+def test_a_size_that_cannot_be_is_a_bad_row(row: str, line: str, tmp_path: Path) -> None:
+    with pytest.raises(DemandError) as caught:
+        cars(tmp_path, row, site=park())
+    assert f"table.csv:2: {line}" in str(caught.value)
+
+
+def test_who_fits_nowhere_is_told_with_the_limits_that_it_breaks() -> None:
+    site = park()
+    assert broken_limits(CarBody("fits", 2700, 4300, 1500, 1400), site) == []
+    assert misfits([CarBody("bus", 4000, 6200, 2100, 3100)], site) == [
+        "bus fits nowhere: length 6200 mm, at most 5300; wheelbase 4000 mm, at most 3400; weight 3100 kg, at most 3000"
+    ]
+    assert broken_limits(CarBody("toy", 1600, 2500, 1500, 800), site) == ["wheelbase 1600 mm, at least 1800"]
+    only_small = park(SMALL, TALL, of_places=1)
+    assert broken_limits(CarBody("van", 2700, 4300, 1900, 1400), only_small) == [
+        "length 4300 mm, height 1900 mm, weight 1400 kg is of class tall, and no place takes it"
+    ]
+    assert broken_limits(CarBody("mini", 2300, 3700, 1450, 1000), only_small) == []
+
+
+def test_a_car_that_fits_nowhere_is_refused_at_the_gate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = table(tmp_path, "6200,,,,2700,", "4300,1500,,1400,2700,", minutes=10)
+    summary = run_site(park(), RunOptions(demand=ParkingDay(sessions=path))).to_json()
+    assert "car 0 fits nowhere: length 6200 mm, at most 5300\n" in capsys.readouterr().out
+    assert (summary["refused_too_large"], summary["cars_in"], summary["cars_out"]) == (1, 1, 1)
