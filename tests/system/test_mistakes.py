@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bus_sim.cli import main as bus_sim
-from deploy.__main__ import main as deploy
+from deploy.cli import main as deploy
 from onboard.cli import main as onboard
 
 #: Program, what was typed, and what the line says.
