@@ -19,7 +19,9 @@ def is_long() -> bool:
 
 
 def some(cases: Sequence[T], count: int) -> Sequence[T]:
-    """``count`` of the cases in their order, 2 at least: the first, the last and what is evenly between them."""
+    """``count`` of the cases in their order: the first, the last and what is evenly between them; of one the first."""
     if is_long() or count >= len(cases):
         return cases
+    if count == 1:
+        return cases[:1]
     return [cases[number * (len(cases) - 1) // (count - 1)] for number in range(count)]

@@ -226,7 +226,7 @@ def test_a_lift_whose_drive_may_still_go_gives_nothing_away() -> None:
     holon.mirror.on_itinerary(itinerary(3, *DOWN_AND_UP.legs[4:]), 100)
     wanted = TokenRequest(ROBOT, TokenKind.SEGMENT, platform(SHAFT).number, 0, 3, 0)
     assert lift.may_grant(segment_token(platform(SHAFT)), wanted.sender, 100) is not Reason.NONE
-    lift.sense(DriveState(LIFT, lift._sequence, pitch_mm // 3, 200, DriveMode.MOVING, False), 200)
+    lift.sense(DriveState(LIFT, lift.link.sequence, pitch_mm // 3, 200, DriveMode.MOVING, False), 200)
     assert lift.may_grant(segment_token(platform(SHAFT)), wanted.sender, 200) is not Reason.NONE
-    lift.sense(DriveState(LIFT, lift._sequence, 0, 0, DriveMode.STANDING, True), 300)
+    lift.sense(DriveState(LIFT, lift.link.sequence, 0, 0, DriveMode.STANDING, True), 300)
     assert lift.may_grant(segment_token(platform(SHAFT)), wanted.sender, 300) is Reason.NONE

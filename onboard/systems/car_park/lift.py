@@ -5,9 +5,7 @@ the next ride, grants platform and gate there, moves when the gate is back and i
 aboard, and grants the gate again on the floor of arrival. It moves only while it holds the gate itself.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum
 
 from onboard.contract.codes import CallResult, DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
 from onboard.contract.messages import (
@@ -26,27 +24,19 @@ from onboard.core.effects import Effect, Record, Send
 from onboard.core.journal_records import records_in
 from onboard.core.motion_authority import authorised
 from onboard.core.negotiation import Awarded, AwardedAgain, NegotiationEvent, PreAssigned, Released
-from onboard.core.serial import from_bus_ms, successor
+from onboard.core.serial import from_bus_ms
 from onboard.systems.car_park.bay_memory import BayMemory
 from onboard.systems.car_park.lift_generation import LiftGeneration
+from onboard.systems.car_park.lift_steps import LIFT_TABLE, LiftDeed, LiftFinding, LiftPhase
 from onboard.systems.car_park.records import RideOverRecord, RideRecord
 from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.ways.lifts import MARK_TOLERANCE_MM, gate, nearest_stop, platform, stop_mm, under_gate
 from onboard.ways.mirror import WayFleet
+from onboard.work.device_link import DeviceLink
 
 #: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps.
 OFF_LIMIT_MM = 20_000
-
-
-class LiftPhase(Enum):
-    """What the lift is doing for its present ride."""
-
-    STARTING = "starting"
-    FREE = "free"
-    BOARDING = "boarding"
-    RIDING = "riding"
-    LEAVING = "leaving"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,25 +63,22 @@ class Lift:
     stewardship: Stewardship = field(init=False)
     stall: Stall = field(default_factory=Stall)
     _is_stuck: bool = False
-    _sequence: int = 0
-    _target: int | None = None
-    _refresh_at_us: int | None = None
+    #: The drive's orders: a position in the shaft, mm.
+    link: DeviceLink[int] = field(init=False)
     _told: tuple[int, DriveMode, int] | None = None
     _gate_was_out: bool = False
     _made: dict[int, int] = field(default_factory=dict)
     _rides_with_me: dict[int, tuple[Itinerary, bool]] = field(default_factory=dict)
-    _table: dict[LiftPhase, Callable[[int], list[Effect]]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        me, site = self.fleet.node_id, self.fleet.site
+        speed_mm_s = site.lift.speed_mm_s
+        self.link = DeviceLink(
+            lambda sequence, position_mm: DriveOrder(me, sequence, position_mm, speed_mm_s),
+            site.timing.drive_refresh_us,
+        )
         self.stewardship = Stewardship(self.fleet)
         self.stewardship.replay(BayMemory(self.fleet.node_id).read(self.fleet.entries))
-        self._table = {
-            LiftPhase.STARTING: self._when_starting,
-            LiftPhase.FREE: self._when_free,
-            LiftPhase.BOARDING: self._when_boarding,
-            LiftPhase.RIDING: self._when_riding,
-            LiftPhase.LEAVING: self._when_leaving,
-        }
 
     # --- the Behaviour -----------------------------------------------------------------------------------------
 
@@ -131,7 +118,7 @@ class Lift:
             self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
         if self.drive is None:
-            self._sequence = message.sequence
+            self.link.go_on_from(message.sequence)
         self.drive = message
         self.stall.sensed(message.position_mm, now_us)
         self.generation.index = self._index()
@@ -204,7 +191,7 @@ class Lift:
         self._is_stuck = self.stall.is_stuck(now_us)
         if self.drive is None or self.platform is None:
             return effects
-        effects += self._table[self.phase](now_us)
+        effects += self._step(now_us)
         if not self._holds_gate():
             # Who has it goes by no word but one that was said since.
             effects += self._tell()
@@ -212,7 +199,7 @@ class Lift:
 
     def next_wake(self) -> int | None:
         """When the drive's order is to be repeated, or a winner counts as lost."""
-        due = [time for time in (self._refresh_at_us, self.stewardship.next_wake()) if time is not None]
+        due = [time for time in (self.link.due_us, self.stewardship.next_wake()) if time is not None]
         return min(due, default=None)
 
     def watches(self, now_us: int) -> bool:
@@ -236,9 +223,7 @@ class Lift:
             return Reason.TOKEN_NOT_GRANTABLE_YET
         if not self._stands_at(following.board):
             return Reason.DOOR_NOT_READY
-        self.ride = following
-        self.phase = LiftPhase.BOARDING
-        self._gate_was_out = False
+        self._do(LiftFinding.GRANTED, following, now_us)
         return Reason.NONE
 
     def _may_have_gate(self, requester: int, now_us: int) -> Reason:
@@ -291,37 +276,88 @@ class Lift:
 
     # --- the phases --------------------------------------------------------------------------------------------
 
-    def _when_starting(self, now_us: int) -> list[Effect]:
+    def _step(self, now_us: int) -> list[Effect]:
+        """One line of ``LIFT_TABLE``, by what is found now."""
+        return self._do(*self._found(now_us), now_us)
+
+    def _found(self, now_us: int) -> tuple[LiftFinding, Ride | None]:
+        """What counts in this phase, and the ride that it is about."""
+        match self.phase:
+            case LiftPhase.STARTING:
+                return self._found_starting(now_us)
+            case LiftPhase.FREE:
+                following = self.next_ride(now_us)
+                return LiftFinding.NOTHING if following is None else LiftFinding.WANTED, following
+            case LiftPhase.BOARDING:
+                return self._found_boarding(now_us)
+            case LiftPhase.RIDING:
+                there = self.ride is not None and self._stands_at(self.ride.leave)
+                return LiftFinding.THERE if there else LiftFinding.ON_THE_WAY, self.ride
+            case LiftPhase.LEAVING:
+                return self._found_leaving(now_us)
+
+    def _do(self, finding: LiftFinding, ride: Ride | None, now_us: int) -> list[Effect]:
+        """What the table says, for the ride that the finding is about."""
+        self.phase, deed = LIFT_TABLE[self.phase, finding]
+        match deed:
+            case LiftDeed.STATE:
+                self.ride = ride
+                return self.statements(now_us)
+            case LiftDeed.LET_IN:
+                self.ride, self._gate_was_out = ride, False
+            case LiftDeed.ARRIVE:
+                self._gate_was_out = False
+                return self._stand()
+            case LiftDeed.STAND:
+                return self._stand()
+            case LiftDeed.TO_BOARD | LiftDeed.TO_END if ride is not None:
+                return self._go(ride.board if deed is LiftDeed.TO_BOARD else ride.leave, now_us)
+            case LiftDeed.SET_OFF if ride is not None:
+                self.ride = ride
+                return [Record(RideRecord(ride.robot, ride.board, ride.leave)), *self._go(ride.leave, now_us)]
+            case LiftDeed.END:
+                return self._end_ride(now_us)
+        return []
+
+    def _found_starting(self, now_us: int) -> tuple[LiftFinding, Ride | None]:
         """Free where nobody has the platform; after a restart in the middle of a ride, back into its phase."""
         assert self.platform is not None and self.drive is not None
         if self.drive.mode is not DriveMode.STANDING:
-            return []
+            return LiftFinding.NOTHING, None
         holder = self.fleet.tokens.holder_of(segment_token(platform(self.track)))
         if holder != self.fleet.node_id:
-            return self._take_up_ride(holder, now_us)
-        if self.platform.crossing or self.platform.carrier_aboard:
-            return []
-        self.phase = LiftPhase.FREE
-        return self.statements(now_us)
+            return self._found_of_ride(holder, now_us)
+        is_clear = not self.platform.crossing and not self.platform.carrier_aboard
+        return LiftFinding.CLEAR if is_clear else LiftFinding.NOTHING, None
 
-    def _take_up_ride(self, robot: int, now_us: int) -> list[Effect]:
+    def _found_of_ride(self, robot: int, now_us: int) -> tuple[LiftFinding, Ride | None]:
         """Who holds the platform is boarding, riding or leaving: tokens, sensors and the journal tell which."""
         assert self.platform is not None
         ride = self._ride_in_journal()
         if ride is not None:
-            self.ride = ride
-            there = self._stands_at(ride.leave)
-            self.phase = LiftPhase.LEAVING if there else LiftPhase.RIDING
-        else:
-            itinerary = self.fleet.mirror.itineraries.get(robot)
-            planned = self._rides(robot, itinerary, now_us)
-            here = next((one for one in planned if self._stands_at(one.board)), None)
-            if here is None:
-                return []
-            self.ride = here
-            self.phase = LiftPhase.BOARDING
-            self._gate_was_out = self.platform.carrier_aboard or not self._holds_gate()
-        return self.statements(now_us)
+            return LiftFinding.RIDE_AT_END if self._stands_at(ride.leave) else LiftFinding.RIDE_BEGUN, ride
+        planned = self._rides(robot, self.fleet.mirror.itineraries.get(robot), now_us)
+        here = next((one for one in planned if self._stands_at(one.board)), None)
+        if here is None:
+            return LiftFinding.NOTHING, None
+        self._gate_was_out = self.platform.carrier_aboard or not self._holds_gate()
+        return LiftFinding.RIDE_PLANNED, here
+
+    def _found_boarding(self, now_us: int) -> tuple[LiftFinding, Ride | None]:
+        assert self.platform is not None and self.ride is not None
+        aboard = self.platform.carrier_aboard and not self.platform.crossing
+        if self._gate_was_out and self._holds_gate() and aboard:
+            return LiftFinding.ABOARD, self._as_planned_now(self.ride, now_us)
+        return LiftFinding.GIVEN_UP if self._holds_platform() else LiftFinding.NOTHING, self.ride
+
+    def _found_leaving(self, now_us: int) -> tuple[LiftFinding, Ride | None]:
+        """Whether who is aboard has left, or says that it rides on: its plan begins with that ride then."""
+        assert self.platform is not None
+        if self._holds_platform() and self._holds_gate():
+            return LiftFinding.OUT, self.ride
+        aboard = self.platform.carrier_aboard and not self.platform.crossing
+        onward = self._onward(now_us) if aboard and self._holds_gate() else None
+        return LiftFinding.NOTHING if onward is None else LiftFinding.ONWARD, onward
 
     def _ride_in_journal(self) -> Ride | None:
         """The ride that was begun and not ended when the controller stopped."""
@@ -331,51 +367,6 @@ class Lift:
             if isinstance(record, RideRecord):
                 found = Ride(record.robot, record.board, record.leave, 0)
         return found
-
-    def _when_free(self, now_us: int) -> list[Effect]:
-        following = self.next_ride(now_us)
-        if following is None:
-            return self._stand()
-        return self._go(following.board, now_us)
-
-    def _when_boarding(self, now_us: int) -> list[Effect]:
-        assert self.platform is not None and self.ride is not None
-        aboard = self.platform.carrier_aboard and not self.platform.crossing
-        if self._gate_was_out and self._holds_gate() and aboard:
-            return self._set_off(self._as_planned_now(self.ride, now_us), now_us)
-        if self._holds_platform():
-            # The robot gave the platform back without boarding: its plan has changed.
-            return self._end_ride(now_us)
-        return self._stand()
-
-    def _when_riding(self, now_us: int) -> list[Effect]:
-        assert self.ride is not None
-        if not self._stands_at(self.ride.leave):
-            return self._go(self.ride.leave, now_us)
-        self.phase = LiftPhase.LEAVING
-        self._gate_was_out = False
-        return self._stand()
-
-    def _when_leaving(self, now_us: int) -> list[Effect]:
-        if self._holds_platform() and self._holds_gate():
-            return self._end_ride(now_us)
-        onward = self._rides_onward(now_us)
-        return self._stand() if onward is None else self._set_off(onward, now_us)
-
-    def _set_off(self, ride: Ride, now_us: int) -> list[Effect]:
-        self.ride, self.phase = ride, LiftPhase.RIDING
-        begun: list[Effect] = [Record(RideRecord(ride.robot, ride.board, ride.leave))]
-        # From one door to the other of the same stop nothing moves.
-        return begun + (self._when_riding(now_us) if self._stands_at(ride.leave) else self._go(ride.leave, now_us))
-
-    def _rides_onward(self, now_us: int) -> Ride | None:
-        """Where whoever is aboard says that it rides on from this floor, without having given the platform back.
-
-        Its plan begins with that ride: it has come back before it could give the platform back, or has turned.
-        """
-        assert self.platform is not None
-        aboard = self.platform.carrier_aboard and not self.platform.crossing
-        return self._onward(now_us) if aboard and self._holds_gate() else None
 
     def _onward(self, now_us: int) -> Ride | None:
         """The ride from this floor that the robot of the ride in hand says it is in, by its plan and ``Progress``."""
@@ -396,8 +387,7 @@ class Lift:
         self._made[self.ride.robot] = self._begin_as_told(self.ride, now_us)
         over = Record(RideOverRecord(self.ride.robot))
         self.ride = None
-        self.phase = LiftPhase.FREE
-        return [over, *self._when_free(now_us)]
+        return [over, *self._step(now_us)]
 
     def _begin_as_told(self, ride: Ride, now_us: int) -> int:
         """When a ride began by its robot's newest plan: who wins a task while aboard tells the same ride anew."""
@@ -428,15 +418,14 @@ class Lift:
 
     def _stands_at(self, index: int) -> bool:
         drive = self.drive
-        if drive is None or drive.mode is not DriveMode.STANDING or drive.sequence != self._sequence:
+        if drive is None or drive.mode is not DriveMode.STANDING or drive.sequence != self.link.sequence:
             # One that has not taken up the last order yet may still go by it.
             return False
         return abs(drive.position_mm - self._position_mm(index)) <= MARK_TOLERANCE_MM
 
     def _stand(self) -> list[Effect]:
         self.stall.rests()
-        self._refresh_at_us = None
-        self._target = None
+        self.link.rest()
         return []
 
     def _go(self, index: int, now_us: int) -> list[Effect]:
@@ -446,16 +435,10 @@ class Lift:
         permit = authorised(self.fleet.motion, [segment_token(gate(self.track))])
         if not permit or self.platform is None or self.platform.crossing:
             return self._stand()
-        if index != self._target:
-            self._target = index
-            self._sequence = successor(self._sequence, 8)
-        elif self._refresh_at_us is not None and self._refresh_at_us > now_us:
-            return []
-        site = self.fleet.site
-        self.stall.ordered(now_us)
-        self._refresh_at_us = now_us + site.timing.drive_refresh_us
-        order = DriveOrder(self.fleet.node_id, self._sequence, self._position_mm(index), site.lift.speed_mm_s)
-        return permit.order(order)
+        said = self.link.order(self._position_mm(index), permit, now_us)
+        if said:
+            self.stall.ordered(now_us)
+        return said
 
 
 def rides_of(track: int, robot: int, itinerary: Itinerary, seen: Progress | None, now_us: int) -> list[Ride]:

@@ -5,9 +5,7 @@ and no plan is ever late. What it may enter is a matter of tokens all the same: 
 robots up and brings no two into one cell.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum
 
 from onboard.contract.codes import KindCode, MachineState, Reason, TaskPhase
 from onboard.contract.mapd import PathHead, PathMoves, StepRound, StepState, StepTurn, TurnRequest
@@ -37,6 +35,7 @@ from onboard.systems.mapd.moves import path_frames
 from onboard.systems.mapd.paths import Path
 from onboard.systems.mapd.search import find_path
 from onboard.systems.mapd.site import Mapd
+from onboard.systems.mapd.steps import LAST, STEP_TABLE, GridStepPhase, StepDeed, StepFinding
 from onboard.systems.mapd.turns import Turns
 from onboard.work.plain import Plain
 
@@ -57,15 +56,6 @@ _OF_INTEREST = (Bid, StepState, PathMoves, PathHead, StepTurn, Award, CallForPro
 
 #: What only the desk says.
 _OF_DESK = (StepTurn, Award, CallForProposals, StepRound)
-
-
-class GridStepPhase(Enum):
-    """Where a robot stands within a step."""
-
-    GATHER = "waits for all robots to come to this step, and for its round"
-    BID = "the round is open"
-    TURNS = "those who have won or lost plan, one after the other"
-    MOVE = "goes to where its path is in the next step"
 
 
 @dataclass
@@ -94,6 +84,8 @@ class UnitRobot(Plain):
     #: The task that was delivered last, and the step from which it was on its way then.
     _served: tuple[int, int] = (NO_TASK, -1)
     _is_new: bool = True
+    #: The cart is in the cell of the next step, which is not begun.
+    _has_arrived: bool = False
 
     def __post_init__(self) -> None:
         site = self.fleet.site
@@ -183,10 +175,14 @@ class UnitRobot(Plain):
         self._is_new = False
         self.state = MachineState.IDLE if self.task == NO_TASK else MachineState.WORKING
         effects: list[Effect] = []
-        before = None
-        while before != (self.phase, self.step):
-            before = self.phase, self.step
-            effects += _STEPS[self.phase](self, now_us)
+        goes_on = True
+        while goes_on:
+            finding, missing = self._found(now_us)
+            phase, deed = STEP_TABLE[self.phase, finding]
+            effects += self._do(deed, missing, now_us)
+            if phase is not self.phase:
+                self.phase, self._ask_us = phase, now_us + ASK_US if phase is GridStepPhase.TURNS else None
+            goes_on = deed not in LAST and (deed is not StepDeed.DRIVE or self._has_arrived)
         return effects
 
     def next_wake(self) -> int | None:
@@ -240,55 +236,114 @@ class UnitRobot(Plain):
 
     # --- phases ------------------------------------------------------------------------------------------------
 
-    def gather(self, now_us: int) -> list[Effect]:
-        """Tell that it has come, and wait for the others and for the round."""
-        effects: list[Effect] = []
+    def _found(self, now_us: int) -> tuple[StepFinding, list[int]]:
+        """What counts in this phase, and whom it misses."""
+        match self.phase:
+            case GridStepPhase.GATHER:
+                return self._found_gathering(now_us)
+            case GridStepPhase.BID if self.turns.is_complete:
+                return StepFinding.CLOSED, []
+            case GridStepPhase.BID:
+                return StepFinding.NOT_BEGUN if self._bids is None else StepFinding.OPEN, [self.site.desk]
+            case GridStepPhase.TURNS:
+                return self._found_in_turns()
+        if self._has_arrived:
+            return StepFinding.ARRIVED, []
+        if self.fleet.node_id not in self.knowledge.paths.by_robot:
+            return StepFinding.MISSING, self.knowledge.pathless()
+        return StepFinding.ON_PATH, []
+
+    def _found_gathering(self, now_us: int) -> tuple[StepFinding, list[int]]:
+        """All robots, their paths and the round are to be there."""
         if self._said is None or self._said.step != self.step:
-            body = self.driving.cart.state
-            assert body is not None
-            served = self._served[1] == self.step - 1 and self._served[0] != NO_TASK
-            task = self._served[0] if served else self.task
-            self._said = StepState(self.fleet.node_id, self.step, body.cell, task, body.task != NO_TASK, served)
-            self.knowledge.on_state(self._said)
-            # The others may still be on their way, and the desk keeps to its pace.
-            self._ask_us = now_us + self.site.step_us + ASK_US
-            effects.append(Send(self._said))
-        has_round = self.round is not None and self.round.step == self.step
-        if not has_round and self._ask_us is not None and now_us < self._ask_us:
-            return effects
+            return StepFinding.UNTOLD, []
+        told = self.round if self.round is not None and self.round.step == self.step else None
+        if told is None and self._ask_us is not None and now_us < self._ask_us:
+            return StepFinding.EARLY, []
         missing = [*self.knowledge.behind(self.step), *self.knowledge.pathless()]
-        if not missing and self.round is not None and has_round:
-            same = len(self.knowledge.open_tasks) == self.round.open_tasks
-            # Once the round is closed others may have gone on and picked up: the number is of no use any more.
-            if same or self.turns.is_complete or not self.round.bidding:
-                return effects + self._enter(GridStepPhase.BID if self.round.bidding else GridStepPhase.MOVE)
-            asked = self._ask([self.site.desk], now_us)
-            if asked:
-                self.knowledge.forget_open()
-            return effects + asked
-        return effects + self._ask(missing or [self.site.desk], now_us)
+        if missing or told is None:
+            return StepFinding.MISSING, missing or [self.site.desk]
+        if not told.bidding:
+            return StepFinding.ROUND_TO_GO, []
+        # Once the round is closed others may have gone on and picked up: the number is of no use any more.
+        if len(self.knowledge.open_tasks) == told.open_tasks or self.turns.is_complete:
+            return StepFinding.ROUND_TO_BID, []
+        return StepFinding.OTHER_TASKS, [self.site.desk]
 
-    def bid(self, now_us: int) -> list[Effect]:
-        """Bid until the desk closes the round."""
-        if self.turns.is_complete:
-            return self._enter(GridStepPhase.TURNS)
+    def _found_in_turns(self) -> tuple[StepFinding, list[int]]:
+        """Wait for the paths of those before me, plan if it is my turn, wait for those after me."""
+        me = self.fleet.node_id
+        for robot in self.turns.order:
+            head = self.knowledge.heads.get(robot)
+            if head is not None and head.step == self.step and head.version:
+                continue
+            if robot != me:
+                return StepFinding.MISSING, [robot]
+            missing = self.knowledge.pathless()
+            if self.turns.takes(me) not in (NO_TASK, *self.knowledge.tasks):
+                missing.append(self.site.desk)
+            return StepFinding.MISSING if missing else StepFinding.MY_TURN, missing
+        return StepFinding.ALL_PLANNED, []
+
+    def _do(self, deed: StepDeed, missing: list[int], now_us: int) -> list[Effect]:
+        match deed:
+            case StepDeed.TELL:
+                return self._tell(now_us)
+            case StepDeed.ASK | StepDeed.ASK_TASKS:
+                asked = self._ask(missing, now_us)
+                if asked and deed is StepDeed.ASK_TASKS:
+                    self.knowledge.forget_open()
+                return asked
+            case StepDeed.BEGIN_BIDS:
+                return self._begin_bids(now_us)
+            case StepDeed.LOOK:
+                self._look(now_us)
+                return self._ask(missing, now_us)
+            case StepDeed.PLAN:
+                return self._plan(self.turns.takes(self.fleet.node_id))
+            case StepDeed.DRIVE:
+                return self._drive(now_us)
+            case StepDeed.NEXT_STEP:
+                self._has_arrived, self.step = False, self.step + 1
+                self.turns, self.round, self._bids, self._heard_bids = Turns(self.step), None, None, []
+        return []
+
+    def _tell(self, now_us: int) -> list[Effect]:
+        """It has come to this step: where it is, and what it carries or has delivered on the way."""
+        body = self.driving.cart.state
+        assert body is not None
+        served = self._served[1] == self.step - 1 and self._served[0] != NO_TASK
+        task = self._served[0] if served else self.task
+        self._said = StepState(self.fleet.node_id, self.step, body.cell, task, body.task != NO_TASK, served)
+        self.knowledge.on_state(self._said)
+        # The others may still be on their way, and the desk keeps to its pace.
+        self._ask_us = now_us + self.site.step_us + ASK_US
+        return [Send(self._said)]
+
+    def _begin_bids(self, now_us: int) -> list[Effect]:
+        """What each open task would cost; whoever must make room for others' ends says so."""
         assert self.round is not None
-        effects: list[Effect] = []
-        if self._bids is None:
-            preferences = self._preferences()
-            self.generation.costs, self.generation.mark = {task: bid for bid, task in preferences}, mark_of(self.round)
-            self.fleet.negotiation.leave_round(self.site.desk)
-            self._bids = Round(self.fleet.node_id, now_us, preferences)
-            for heard in self._heard_bids:
-                self._bids.hear(heard)
-            if self._must_yield():
-                effects.append(Send(TurnRequest(self.fleet.node_id, self.step, self.round.attempt)))
-            self._ask_us = now_us + self.site.bid_window_us + ASK_US
-        self._look(self._bids, now_us)
-        return effects + self._ask([self.site.desk], now_us)
+        preferences = self._preferences()
+        self.generation.costs, self.generation.mark = {task: bid for bid, task in preferences}, mark_of(self.round)
+        self.fleet.negotiation.leave_round(self.site.desk)
+        self._bids = Round(self.fleet.node_id, now_us, preferences)
+        for heard in self._heard_bids:
+            self._bids.hear(heard)
+        self._ask_us = now_us + self.site.bid_window_us + ASK_US
+        return [Send(TurnRequest(self.fleet.node_id, self.step, self.round.attempt))] if self._must_yield() else []
 
-    def _look(self, bids: Round, now_us: int) -> None:
+    def _drive(self, now_us: int) -> list[Effect]:
+        """Go on by the path; a task may be delivered on the way."""
+        path = self.knowledge.paths.by_robot[self.fleet.node_id]
+        effects, served, self._has_arrived = self.driving.go(path, self.step, self.task, now_us)
+        if served:
+            self._served, self.task = (self.task, self.step), NO_TASK
+        return effects
+
+    def _look(self, now_us: int) -> None:
         """Take part in the call for the task that is cheapest among those for which nobody is better."""
+        bids = self._bids
+        assert bids is not None
         preferred = bids.preferred
         call = None if preferred is None else self.knowledge.calls.get(preferred)
         if call is None or preferred is None or preferred == bids.looked_at:
@@ -296,44 +351,6 @@ class UnitRobot(Plain):
         bids.looked_at = preferred
         until_us = bids.begun_us + self.site.bid_window_us
         self.fleet.negotiation.look(call, (bids.begun_us, until_us), bids.bids.get(preferred, ()), now_us)
-
-    def take_turns(self, now_us: int) -> list[Effect]:
-        """Wait for the paths of those before me, plan if it is my turn, wait for those after me."""
-        me, effects = self.fleet.node_id, list[Effect]()
-        if self._ask_us is None:
-            self._ask_us = now_us + ASK_US
-        for robot in self.turns.order:
-            head = self.knowledge.heads.get(robot)
-            if head is not None and head.step == self.step and head.version:
-                continue
-            if robot != me:
-                return effects + self._ask([robot], now_us)
-            won = self.turns.takes(me)
-            missing = self.knowledge.pathless()
-            if won not in (NO_TASK, *self.knowledge.tasks):
-                missing.append(self.site.desk)
-            if missing:
-                return effects + self._ask(missing, now_us)
-            effects += self._plan(won)
-        return effects + self._enter(GridStepPhase.MOVE)
-
-    def move(self, now_us: int) -> list[Effect]:
-        """Go on by the path, and begin the next step."""
-        path = self.knowledge.paths.by_robot.get(self.fleet.node_id)
-        if path is None:
-            return self._ask(self.knowledge.pathless(), now_us)
-        effects, served, is_there = self.driving.go(path, self.step, self.task, now_us)
-        if served:
-            self._served, self.task = (self.task, self.step), NO_TASK
-        if not is_there:
-            return effects
-        self.step += 1
-        self.turns, self.round, self._bids, self._heard_bids = Turns(self.step), None, None, []
-        return effects + self._enter(GridStepPhase.GATHER)
-
-    def _enter(self, phase: GridStepPhase) -> list[Effect]:
-        self.phase, self._ask_us = phase, None
-        return []
 
     def _ask(self, nodes: list[int], now_us: int) -> list[Effect]:
         """Ask those who are missed, once everything else has been there for a while."""
@@ -398,11 +415,3 @@ class UnitRobot(Plain):
         task = self.knowledge.tasks.get(self.turns.takes(robot))
         if head.step == self.step and not head.kept and task is not None and task.pickup == head.cell:
             self.knowledge.taken[robot] = task.number
-
-
-_STEPS: dict[GridStepPhase, Callable[[UnitRobot, int], list[Effect]]] = {
-    GridStepPhase.GATHER: UnitRobot.gather,
-    GridStepPhase.BID: UnitRobot.bid,
-    GridStepPhase.TURNS: UnitRobot.take_turns,
-    GridStepPhase.MOVE: UnitRobot.move,
-}
