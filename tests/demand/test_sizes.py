@@ -7,12 +7,14 @@ import pytest
 
 from bus_sim.demand import DemandError
 from bus_sim.options import RunOptions
-from bus_sim.session import run_site
+from bus_sim.session import play, run_site
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.day import ParkingDay
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.plant.bodies import CarBody, random_car
+from bus_sim.systems.car_park.plant.customer import VisitOutcome
 from bus_sim.systems.car_park.sizes import broken_limits, misfits
+from bus_sim.systems.car_park.stage import CarParkStage
 from onboard.systems.car_park.site import CarPark, SizeClass
 
 HEAD = "arrival,departure,session_id,length_mm,height_mm,width_mm,weight_kg,wheelbase_mm,class\n"
@@ -97,3 +99,25 @@ def test_a_car_that_fits_nowhere_is_refused_at_the_gate(tmp_path: Path, capsys: 
     summary = run_site(park(), RunOptions(demand=ParkingDay(sessions=path))).to_json()
     assert "car 0 fits nowhere: length 6200 mm, at most 5300\n" in capsys.readouterr().out
     assert (summary["refused_too_large"], summary["cars_in"], summary["cars_out"]) == (1, 1, 1)
+
+
+def test_each_car_stands_only_where_it_fits_and_full_is_full_for_its_class(tmp_path: Path) -> None:
+    site = park(SMALL, TALL)
+    small, tall = 1, 2
+    tall_places = {place.number for place in site.places[-2:]}
+    site = replace(
+        site, place_class={place.number: tall if place.number in tall_places else small for place in site.places}
+    )
+    path = table(tmp_path, ",,,,,tall", ",,,,,small", ",,,,,tall", ",,,,,tall", ",,,,,small", minutes=40)
+    stage = play(site, RunOptions(demand=ParkingDay(sessions=path), limit_s=1_500.0))
+    assert isinstance(stage, CarParkStage)
+    outcomes = [customer.visit.outcome for customer in stage.customers]
+    assert [outcome is VisitOutcome.FULL for outcome in outcomes] == [False, False, False, True, False]
+    where = {body.name: at for at in site.places for body in stage.plant.world.cars_at(at)}
+    assert {name: at.number in tall_places for name, at in where.items()} == {
+        "car 0": True,
+        "car 1": False,
+        "car 2": True,
+        "car 4": False,
+    }
+    assert not stage.violations()

@@ -376,3 +376,13 @@ def test_whole_real_tables_are_read() -> None:
         assert len(day.stays) == sum(row.startswith("2019-07-24") for row in rows)
         # Two came on the evening before; the shipped selections leave them out (bus_sim/data/README.md).
         assert len(day.inside) == (2 if len(whole.stays) > 82 else 0)
+
+
+def test_nobody_is_fetched_within_five_minutes_of_coming(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text("hour,arrivals,departures\n7,40,40\n")
+    for seed in range(5):
+        demand = Demand.from_counts(path, seed=seed)
+        assert demand.inside == ()
+        gone = [stay.departure_us - stay.arrival_us for stay in demand.stays if stay.departure_us is not None]
+        assert len(gone) == 40 and min(gone) >= 5 * MINUTE_US
