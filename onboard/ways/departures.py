@@ -70,17 +70,18 @@ class Departures:
         """
         begun: dict[int, list[list[Interval]]] = {1: [[within]], -1: [[within]]}
         longest, held = self._roads.longest(here.track), self._held_on(here.track)
+        track, index = here.track, here.index
         for move in moves:
             there = move.destination
-            if here.track != there.track:
+            if track != there.track:
                 yield move, [within]
                 continue
-            step = 1 if there.index > here.index else -1
-            alike = self._roads.alike(here.track, abs(there.index - here.index))
+            step = 1 if there.index > index else -1
+            alike = self._roads.alike(track, abs(there.index - index))
             left = begun[step]
             while len(left) <= alike and left[-1]:
                 offset, enter_us, leave_us = longest[len(left) - 1]
-                windows = held.get(here.index + step * offset)
+                windows = held.get(index + step * offset)
                 left.append(_without(left[-1], windows, enter_us, leave_us) if windows else left[-1])
             safe = left[alike] if alike < len(left) else left[-1]
             if safe:

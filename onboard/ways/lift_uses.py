@@ -35,9 +35,10 @@ class Gap(NamedTuple):
 def run_up_us(site: WaySite, lift_track: int, from_index: int, to_index: int) -> int:
     """Duration of the platform's run between two stops, in whole milliseconds; 0 between doors of one."""
     track = site.tracks[lift_track]
-    heights_mm = track.heights_mm
-    away = heights_mm[to_index - 1] - heights_mm[from_index - 1] if heights_mm else to_index - from_index
-    return run_duration_us(abs(away) if heights_mm else abs(away) * track.pitch_mm, site.lift)
+    if track.heights_mm:
+        away_mm = track.heights_mm[to_index - 1] - track.heights_mm[from_index - 1]
+        return run_duration_us(abs(away_mm), site.lift)
+    return run_duration_us(abs(to_index - from_index) * track.pitch_mm, site.lift)
 
 
 def ride_us(site: WaySite, lift_track: int, from_index: int, to_index: int) -> int:

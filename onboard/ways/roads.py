@@ -42,7 +42,6 @@ class Roads:
         self._run_us: dict[int, tuple[int, ...]] = {}
         self._hops: dict[Segment, list[Move]] = {}
         self._hops_in: dict[Segment, list[tuple[Segment, int]]] = {}
-        self._one_way = {number: track for number, track in site.tracks.items() if track.one_way}
         self._junctions: dict[int, list[Segment]] = {}
         self._platforms: dict[Segment, tuple[int, int]] = {}
         self._moves: dict[Segment, tuple[Move, ...]] = {}
@@ -121,11 +120,10 @@ class Roads:
         return found
 
     def _runs(self, here: Segment) -> Iterator[Move]:
-        durations, track = self._run_us[here.track], self.site.tracks[here.track]
-        pitch_mm = track.pitch_mm
+        durations, pitch_mm = self._run_us[here.track], self.site.tracks[here.track].pitch_mm
         for _, there in sorted(self._positions[here.track].items()):
             count = abs(there.index - here.index)
-            if count and track.goes(here.index, there.index):
+            if count:
                 yield Move(there, durations[count], count * pitch_mm)
 
     def run_us(self, track: int, count: int) -> int:
@@ -165,11 +163,9 @@ class Roads:
     def nearest_us(self, origin: Segment, goals: frozenset[Segment]) -> int:
         """Least time to any of ``goals`` as in ``shortest_us``."""
         ways = self._ways_to(goals)
-        durations, one_way = self._run_us[origin.track], self._one_way.get(origin.track)
+        durations = self._run_us[origin.track]
         least_us = FOREVER
         for index, rest_us in ways.get(origin.track, ()):
-            if one_way is not None and not one_way.goes(origin.index, index):
-                continue
             least_us = min(least_us, durations[abs(origin.index - index)] + rest_us)
         return least_us
 
@@ -191,19 +187,44 @@ class Roads:
             found.setdefault(here.track, []).append((here.index, time_us))
             for origin, duration_us in self._hops_in.get(here, ()):
                 heappush(queue, (time_us + duration_us, origin))
-            durations, one_way = self._run_us[here.track], self._one_way.get(here.track)
-            for junction in self._junctions.get(here.track, ()):
-                if one_way is not None and not one_way.goes(junction.index, here.index):
-                    continue
+            durations = self._run_us[here.track]
+            for junction in self._junctions_before(here):
                 heappush(queue, (time_us + durations[abs(here.index - junction.index)], junction))
         return found
+
+    def _junctions_before(self, here: Segment) -> Collection[Segment]:
+        """Junctions of a position's track from which a run leads to it."""
+        return self._junctions.get(here.track, ())
+
+
+class DirectedRoads(Roads):
+    """Roads of a site with one-way tracks: other sites need not ask for the direction of each run."""
+
+    def nearest_us(self, origin: Segment, goals: frozenset[Segment]) -> int:
+        """Least time to any of ``goals`` as in ``shortest_us``."""
+        durations, track = self._run_us[origin.track], self.site.tracks[origin.track]
+        ways = self._ways_to(goals).get(origin.track, ())
+        ahead = [(index, rest_us) for index, rest_us in ways if track.goes(origin.index, index)]
+        return min((durations[abs(origin.index - index)] + rest_us for index, rest_us in ahead), default=FOREVER)
+
+    def _runs(self, here: Segment) -> Iterator[Move]:
+        track = self.site.tracks[here.track]
+        return (run for run in super()._runs(here) if track.goes(here.index, run.destination.index))
+
+    def _junctions_before(self, here: Segment) -> Collection[Segment]:
+        track = self.site.tracks[here.track]
+        return [one for one in super()._junctions_before(here) if track.goes(one.index, here.index)]
+
+
+def _build(site: WaySite) -> Roads:
+    return DirectedRoads(site) if any(track.one_way for track in site.tracks.values()) else Roads(site)
 
 
 #: By track: index and time from there to a goal.
 _Ways = dict[int, list[tuple[int, int]]]
 
 
-_roads: Kept[WaySite, Roads] = Kept(Roads)
+_roads: Kept[WaySite, Roads] = Kept(_build)
 
 
 def roads_of(site: WaySite) -> Roads:
