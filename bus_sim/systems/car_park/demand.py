@@ -31,7 +31,7 @@ class Readable(Protocol):
         """Its name, for error lines."""
 
     def read_text(self, encoding: str) -> str:
-        """Its whole text."""
+        """The whole text of the file. Raises ``OSError``, and ``UnicodeDecodeError`` for other text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +141,7 @@ class Arrivals:
 
     @property
     def apart_s(self) -> float:
-        """Mean time between two."""
+        """Mean time between two cars, s."""
         return self.mean_s
 
     def demand(self, seed: int) -> Demand:
@@ -149,7 +149,7 @@ class Arrivals:
         return Demand.by_mean(self.mean_s, self.sigma_s, seed, count=self.cars, min_stay_s=self.min_stay_s)
 
     def to_toml(self) -> list[str]:
-        """A scenario's section."""
+        """The lines of a scenario file's section ``[demand]``, times in s."""
         return [
             "[demand]",
             f"cars = {self.cars}",
