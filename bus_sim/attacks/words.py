@@ -24,10 +24,10 @@ class Repeated(Attack, ABC):
 
     @abstractmethod
     def words(self, now_us: int) -> Iterator[Message]:
-        """What is said."""
+        """The messages that are said at each turn; ``now_us`` is loop time."""
 
     def tick(self, now_us: int) -> None:
-        """See ``Attack``."""
+        """Says its words once in ``every_us``, from the first call on."""
         if now_us >= self._due_us:
             self._due_us = now_us + self.every_us
             for word in self.words(now_us):

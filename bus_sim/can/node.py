@@ -46,7 +46,7 @@ class Wire(Protocol):
         """A node puts a frame into one of its mailboxes."""
 
     def detach(self, node: "SimulatedBus", *, in_good_order: bool) -> None:
-        """A node leaves."""
+        """A node leaves the bus; unless ``in_good_order`` a frame that it is sending breaks off."""
 
 
 class AcceptanceFilter(NamedTuple):

@@ -22,7 +22,7 @@ class Idle(Protocol):
         """Whether no frame is on the wire."""
 
     def come_back(self, node: SimulatedBus) -> None:
-        """A node has recovered."""
+        """A node has counted its 128 idle sequences, and takes part again (ISO 11898-1)."""
 
 
 class BusOffRecovery:

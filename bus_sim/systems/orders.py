@@ -51,7 +51,7 @@ class OrderArrivals:
         return random.Random(f"orders:{site}:{seed}")
 
     def to_toml(self) -> list[str]:
-        """A scenario's section."""
+        """The lines of a scenario file's section ``[orders]``: their number, and s between two."""
         return ["[orders]", f"count = {self.count}", f"apart_s = {self.apart_s:.15g}"]
 
 
@@ -87,7 +87,7 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
     needed: ClassVar[Mapping[str, str]] = {"count": "12, or 0"}
 
     def stage(self, site: SiteT, options: RunOptions, loop: VirtualTimeLoop) -> SystemStage[PlantT]:
-        """See ``SimulatedSystem``."""
+        """One run: plant and buses for the site with its drawn orders. Raises ``DemandError``."""
         drawn = self.with_orders(site, options.demand, options.seed)
         fleet, devices = buses_of(drawn, frame_faults(options.faults, drawn), loop)
         links = links_of(drawn, devices)
@@ -105,7 +105,7 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
         return None
 
     def speed(self, demand: Any, *, web: bool, terminal: bool) -> float | None:
-        """See ``SimulatedSystem``."""
+        """``HAND_SPEED`` where a page is served, the system's own where a person looks on, else unbounded."""
         return HAND_SPEED if web else self.look_speed if terminal else None
 
     def with_orders(self, site: SiteT, orders: OrderArrivals | None, seed: int) -> SiteT:
@@ -113,7 +113,7 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
         return site if orders is None or not orders.count else self.draw(site, orders, seed)
 
     def read(self, given: Mapping[str, object]) -> OrderArrivals:
-        """See ``SimulatedSystem``."""
+        """Orders by chance, as the section ``[orders]`` says it; 1 s apart unless told."""
         return OrderArrivals(**{"apart_s": 1.0, **given})  # type: ignore[arg-type]  # the reader checked each value's type
 
     def usual(self, site: SiteT, args: Mapping[str, float | None]) -> OrderArrivals:
@@ -134,11 +134,11 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
         return OrderArrivals(3, self.order_s(site) / 4) if occasion is Occasion.OVERLAP else self.most(site)
 
     def count(self, demand: OrderArrivals | None) -> str:
-        """See ``SimulatedSystem``."""
+        """The number of orders in words; without a demand those of the site file."""
         return f"{demand.count} orders" if demand is not None and demand.count else "the site's own orders"
 
     def check(self, site: SiteT, demand: OrderArrivals | None, seed: int) -> None:
-        """They are drawn once."""
+        """Draws the orders once. Raises ``DemandError`` for more than the site can be brought."""
         self.with_orders(site, demand, seed)
 
     def span_s(self, site: SiteT) -> tuple[float, float]:
@@ -155,7 +155,7 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
         return self.span_s(self.with_orders(site, demand, seed))
 
     def patience_s(self, site: SiteT, demand: OrderArrivals | None, seed: int) -> float:
-        """See ``SimulatedSystem``."""
+        """The end of the last order, and time for ``PATIENCE`` and as many again as come usually, s."""
         drawn = self.with_orders(site, demand, seed)
         return self.span_s(drawn)[1] + (PATIENCE + self.most(drawn).count) * self.order_s(drawn)
 

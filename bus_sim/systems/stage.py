@@ -64,7 +64,7 @@ class RunFigures(Protocol):
         """For people; for a terminal of so many columns, None where it is none."""
 
     def to_json(self) -> dict[str, object]:
-        """Plain values for ``json.dump``."""
+        """Values that ``json.dump`` takes as they are; the units are in the keys."""
 
 
 class Show(Protocol):
@@ -123,12 +123,12 @@ class Figures:
     remarks: tuple[str, ...] = ()
 
     def lines(self, width: int | None = None) -> list[str]:
-        """See ``RunFigures``."""
+        """Remarks, a figure a line, and wall time in s; ``width`` in characters is not needed."""
         figures = (f"{name.replace('_', ' ')}: {_shown(value)}" for name, value in self.figures.items())
         return [*self.remarks, *figures, f"wall time: {self.wall_s:.1f} s"]
 
     def to_json(self) -> dict[str, object]:
-        """See ``RunFigures``."""
+        """The figures alone, without remarks and wall time."""
         return self.figures
 
 
@@ -234,7 +234,7 @@ class SystemStage(ABC, Generic[PlantT]):
         return None
 
     def head(self) -> list[str]:
-        """Lines before it begins."""
+        """Lines for a person before the run begins: the site and its seed."""
         return [f"site {self.run.site.name}, seed {self.run.options.seed}"]
 
     def warming_up(self, wall_s: float | None) -> str:

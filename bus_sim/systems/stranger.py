@@ -20,7 +20,7 @@ from onboard.work.plain import Plain
 
 
 class Stranger(Enum):
-    """How it fails."""
+    """In which way a machine bids and does not do what it wins."""
 
     STANDS = "stands"
     SILENT = "silent"

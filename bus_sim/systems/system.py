@@ -33,7 +33,7 @@ class Coming(Protocol):
         """Mean time between two, s."""
 
     def to_toml(self) -> list[str]:
-        """The file's section."""
+        """The lines of a scenario file's section that ``read`` takes up again."""
 
 
 class Occasion(StrEnum):

@@ -27,7 +27,7 @@ class ArmMode(IntEnum):
 
 
 class GripAction(IntEnum):
-    """Orders to a gripper."""
+    """What a gripper is ordered to do with a part."""
 
     TAKE = 0
     PUT = 1

@@ -228,7 +228,7 @@ class LightColour(IntEnum):
 
 
 class DeskText(IntEnum):
-    """What the desk shows."""
+    """Texts of the display at a desk, one at a time."""
 
     WELCOME = 0
     TAKE_TICKET = 1

@@ -33,7 +33,7 @@ class RobotMode(IntEnum):
 
 
 class RouteAction(IntEnum):
-    """Orders to a drive."""
+    """What a drive is ordered to do about the end of its edge."""
 
     GO = 0
     ENTER = 1

@@ -9,7 +9,7 @@ from onboard.contract.base import Message, Reference, message
 
 
 class Action(IntEnum):
-    """Elementary actions (row M09)."""
+    """Elementary actions of which a plan is made (row M09)."""
 
     GOTO = 0
     DOCK = 1
@@ -45,7 +45,7 @@ class HandlerMode(IntEnum):
 
 
 class Verb(IntEnum):
-    """What an operator orders."""
+    """What an operator orders with a mission."""
 
     LOAD = 0
     TRANSHIP = 1

@@ -11,7 +11,7 @@ class LoggedBusTime:
         self.offset_us: int | None = None
 
     def feed(self, message: BusTime, time_us: int) -> None:
-        """Take up one."""
+        """Takes up a time message that was logged at ``time_us``: the offset from then on."""
         self.offset_us = time_us - message.bus_time_us
 
     def log_us(self, bus_ms: int, now_us: int) -> int | None:

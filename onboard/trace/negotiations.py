@@ -64,7 +64,7 @@ class NegotiationFold:
         self.counts = NegotiationCounts()
 
     def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
-        """Take up one message."""
+        """Takes up a message of the fleet bus and what the history made of it, at ``time_us``."""
         self.counts.messages[type(message).__name__] += 1
         match fact:
             case WaitTold(word=word) if word.sender in self._plans.firm:

@@ -62,7 +62,7 @@ class SiteView:
 
     @property
     def tasks(self) -> dict[Reference, TaskHistory]:
-        """Tasks by their names."""
+        """Every task that was heard of, by its name on the bus."""
         return self.history.tasks.by_name
 
     def feed(self, message: Message, time_us: int) -> None:

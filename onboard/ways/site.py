@@ -18,7 +18,7 @@ from onboard.core.site import Segment, Site, Station
 
 
 class TrackKind(Enum):
-    """What a track is."""
+    """What a track is for: driving along, between floors, or aside."""
 
     ALLEY = "alley"
     LIFT = "lift"

@@ -40,7 +40,7 @@ class Plain:
         return []
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
-        """No devices."""
+        """Nothing, where a machine has no devices."""
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
@@ -56,13 +56,13 @@ class Plain:
         return Reason.NONE
 
     def advance(self, now_us: int) -> list[Effect]:
-        """Nothing is ever due."""
+        """Nothing, where a machine does only what it is told."""
         return []
 
     def next_wake(self) -> int | None:
-        """Never."""
+        """None: nothing of its own is ever due."""
         return None
 
     def statements(self, now_us: int) -> list[Effect]:
-        """Nothing to vouch for."""
+        """Nothing, where a machine holds no rights to vouch for."""
         return []

@@ -62,7 +62,7 @@ def test_what_moves_is_drawn_over_time_or_refused_with_the_reason(
     status = onboard(["trace", "diagram", str(log_of(case.system)), "--site", site, "--out", str(out)])
     if not case.drawn:
         assert (status, out.exists()) == (2, False)
-        assert "nobody has said what to draw of one over time" in capsys.readouterr().err
+        assert "has no diagram over time" in capsys.readouterr().err
         return
     assert status == 0
     root = ET.parse(out).getroot()

@@ -88,7 +88,7 @@ class CsvTable:
     count: int = 0
 
     def note(self, row: CsvRow, error: CellError) -> None:
-        """One row is bad."""
+        """Keep what is wrong with one row, and what to do about it, for the line that names it."""
         self.bad.append(f"{self.name}:{row.line}: {error}")
 
     def rows(self, source: Readable, needed: Sequence[str], optional: Sequence[str]) -> Iterator[CsvRow]:

@@ -183,7 +183,7 @@ class Arrivals:
 
     @property
     def apart_s(self) -> float:
-        """Mean time between two."""
+        """Mean time between two cars, s."""
         return self.mean_s
 
     def demand(self, seed: int) -> Demand:
@@ -191,7 +191,7 @@ class Arrivals:
         return Demand.by_mean(self.mean_s, self.sigma_s, seed, count=self.cars, min_stay_s=self.min_stay_s)
 
     def to_toml(self) -> list[str]:
-        """A scenario's section."""
+        """The lines of a scenario file's section ``[demand]``, times in s."""
         return [
             "[demand]",
             f"cars = {self.cars}",

@@ -17,12 +17,12 @@ class ForgedRetrievals(words.ForgedOrders):
         self._cars: set[Reference] = set()
 
     def hear(self, message: Message, now_us: int) -> None:
-        """See ``Attack``."""
+        """Remembers every car that anybody has told the place of."""
         if isinstance(message, CarAt):
             self._cars.add(message.car)
 
     def orders(self) -> Iterator[Message]:
-        """See ``words.ForgedOrders``."""
+        """An urgent ticket for each known car at every compartment."""
         for compartment in car_park(self.node.site).compartments:
             for car in sorted(self._cars):
                 yield OperatorOrder(self.node.node_id, compartment, OperatorAction.URGENT_TICKET, car)

@@ -50,7 +50,7 @@ _ON: Final[Mapping[Occasion, Arrivals]] = {
 
 
 class CarParkSystem(SimulatedSystem[CarPark, Plant]):
-    """See ``SimulatedSystem``."""
+    """The car park in the simulator: a day of sessions, cars by chance, or one car by hand."""
 
     name = CarPark.system
     who = "customers"
@@ -76,17 +76,17 @@ class CarParkSystem(SimulatedSystem[CarPark, Plant]):
     # --- a run -------------------------------------------------------------------------------------------------
 
     def stage(self, site: CarPark, options: RunOptions, loop: VirtualTimeLoop) -> CarParkStage:
-        """See ``SimulatedSystem``; ``options.demand`` is a ``ParkingDay``, or ``Arrivals`` by chance."""
+        """One run; ``options.demand`` is a ``ParkingDay`` or ``Arrivals``. Raises ``DemandError``."""
         coming = _coming(site, options)
         dated = replace(options, epoch_us=round(coming.zero.timestamp() * 1_000_000))
         return CarParkStage(build(site, dated if isinstance(options.demand, ParkingDay) else options, loop), coming)
 
     def asked(self, site: CarPark, args: Namespace, given: Mapping[str, object], *, live: bool) -> ParkingDay:
-        """See ``SimulatedSystem``."""
+        """The day that the options ask for. Raises ``DemandError`` for those that do not go together."""
         return asked_day(args, live=live)
 
     def speed(self, demand: ParkingDay, *, web: bool, terminal: bool) -> float | None:
-        """See ``SimulatedSystem``."""
+        """An hour in a minute for a window, slower for a page or a hand at the keys, else unbounded."""
         return WINDOW_SPEED if demand.window is not None else HAND_SPEED if web or demand.by_hand else None
 
     def stranger(self, site: CarPark, target: int, how: Stranger) -> Callable[[Site, KindCode], BehaviourFactory]:
@@ -94,32 +94,32 @@ class CarParkSystem(SimulatedSystem[CarPark, Plant]):
         return factories_with(target, how)
 
     def planted(self, name: str) -> Callable[[Any], None]:
-        """See ``SimulatedSystem``."""
+        """Puts the mistake so named into a run. Raises ``KeyError`` with the names that there are."""
         return find_bug(name).plant
 
     # --- who comes to a trial ----------------------------------------------------------------------------------
 
     def read(self, given: Mapping[str, object]) -> Arrivals:
-        """See ``SimulatedSystem``."""
+        """Cars by chance, as a scenario file's section ``[demand]`` says it."""
         return Arrivals(**given)  # type: ignore[arg-type]  # the reader checked each value's type
 
     def usual(self, site: CarPark, args: Mapping[str, float | None]) -> Arrivals:
-        """See ``SimulatedSystem``."""
+        """Cars in a campaign: ``CARS`` every ``APART_S`` s unless told otherwise. Raises ``DemandError``."""
         if args.get("orders") is not None:
             raise DemandError(f"--orders {args['orders']}: {site.name} is a car park; write --cars")
         cars, apart_s = args.get("cars"), args.get("apart") or APART_S
         return Arrivals(CARS if cars is None else int(cars), apart_s, apart_s / 2)
 
     def on(self, occasion: Occasion, site: CarPark) -> Arrivals:
-        """See ``SimulatedSystem``."""
+        """A fixed number of cars and interval for each occasion, the same on all sites."""
         return _ON[occasion]
 
     def count(self, demand: Arrivals | None) -> str:
-        """See ``SimulatedSystem``."""
+        """The number of cars in words; without a demand that of a campaign."""
         return f"{(demand or Arrivals()).cars} cars"
 
     def check(self, site: CarPark, demand: Arrivals | None, seed: int) -> None:
-        """See ``SimulatedSystem``."""
+        """Draws the cars once. Raises ``DemandError`` for numbers that nobody can draw from."""
         (demand or Arrivals()).demand(seed)
 
     def faulted(self, site: CarPark, demand: Arrivals | None, seed: int, limit_s: float) -> Faulted:
@@ -130,11 +130,11 @@ class CarParkSystem(SimulatedSystem[CarPark, Plant]):
         return Faulted(SPAN_S, until_s, [(ORIGIN_US + one.arrival_us) / 1e6 for one in stays])
 
     def attacked_s(self, site: CarPark, demand: Arrivals | None, seed: int) -> tuple[float, float]:
-        """See ``SimulatedSystem``."""
+        """The same span on every site, from first to last moment, s after power-up."""
         return ATTACKED_S
 
     def patience_s(self, site: CarPark, demand: Arrivals | None, seed: int) -> float:
-        """See ``SimulatedSystem``."""
+        """Two hours after power-up on every site, in s: cars of a campaign stay for minutes."""
         return PATIENCE_S
 
 

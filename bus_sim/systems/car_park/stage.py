@@ -52,7 +52,7 @@ class ComingCustomers:
 
 
 class CarParkStage(SystemStage[Plant]):
-    """See ``SystemStage``."""
+    """One run of a car park: its customers, its picture, and the figures of the specification."""
 
     who = "customers"
     step_us = 1_000_000
@@ -77,7 +77,7 @@ class CarParkStage(SystemStage[Plant]):
 
     @property
     def customers(self) -> list[Customer]:
-        """All who come."""
+        """All who have come or will come, in the order of their arrivals."""
         return self._street.customers
 
     def judge_end(self) -> None:
@@ -85,11 +85,11 @@ class CarParkStage(SystemStage[Plant]):
         self.plant.oracle.finish()
 
     def waits_since(self, time_us: int) -> int:
-        """See ``SystemStage``."""
+        """Customers who wait now and waited at ``time_us`` (loop time) already."""
         return sum(_waits_since(customer, time_us) for customer in self.customers)
 
     def waits_s(self) -> tuple[float | None, ...]:
-        """In and out together."""
+        """Each customer's waiting at both ends of the stay, s; None for who was not served."""
         return tuple(map(_wait_s, self.customers))
 
     def tally(self) -> Tally:
@@ -126,7 +126,7 @@ class CarParkStage(SystemStage[Plant]):
                 customer.on(CustomerEvent.TIMER)
 
     def power_up(self, node: int) -> None:
-        """See ``SystemStage``."""
+        """Drive, shuttle, lift and bay of machine ``node`` say how they stand, as at power-up."""
         plant = self.plant
         for devices in (plant.shuttles, plant.carriers, plant.lifts, plant.compartments):
             if node in devices:
@@ -136,18 +136,18 @@ class CarParkStage(SystemStage[Plant]):
 
     @property
     def limit_us(self) -> int:
-        """See ``SystemStage``."""
+        """``PATIENCE_US`` after the last arrival or departure of the demand, us of loop time."""
         last_us = max((stay.departure_us or stay.arrival_us for stay in self._coming.demand.stays), default=0)
         return last_us + self._coming.origin_us + PATIENCE_US
 
     @property
     def shown_us(self) -> tuple[int, int] | None:
-        """See ``SystemStage``."""
+        """The window that was asked for, us of loop time; None for a whole day."""
         window, origin_us = self._coming.window, self._coming.origin_us
         return None if window is None else (window.begin_us + origin_us, window.end_us + origin_us)
 
     def head(self) -> list[str]:
-        """See ``SystemStage``."""
+        """One line: site, number of cars, seed, speed and faults."""
         options, stays = self.run.options, self._coming.demand.stays
         told = (
             f"site {self.run.site.name}, {len(stays)} cars, seed {options.seed}, speed {options.speed or 'unlimited'}"
@@ -155,7 +155,7 @@ class CarParkStage(SystemStage[Plant]):
         return [told + "".join(f", fault {fault}" for fault in options.faults), *self._coming.demand.remarks]
 
     def warming_up(self, wall_s: float | None) -> str:
-        """See ``SystemStage``."""
+        """How many cars come before the window; afterwards how long they took, ``wall_s``."""
         window, demand = self._coming.window, self._coming.demand
         assert window is not None and self.shown_us is not None, "only what comes before a window is hurried"
         if wall_s is not None:
@@ -166,7 +166,7 @@ class CarParkStage(SystemStage[Plant]):
         return f"warm-up {span}, as fast as possible: {before} cars come before"
 
     def measure_from(self, now_us: int) -> None:
-        """See ``SystemStage``."""
+        """Indicators begin anew at ``now_us``, and the terminal gets a line more often."""
         super().measure_from(now_us)
         self._indicators.begin(now_us)
         self._show.every(WINDOW_LINE_US)
@@ -176,7 +176,7 @@ class CarParkStage(SystemStage[Plant]):
         self.run.observers.append(self._indicators.feed)
 
     def show(self, console: Console) -> Show:
-        """See ``SystemStage``."""
+        """Floors, machines and events in a terminal; else a line of figures each hour."""
         self._show = ConsoleShow(way_site(self.run.site), self.run.view, self._clock, self._line, console)
         return self._show
 
@@ -188,20 +188,20 @@ class CarParkStage(SystemStage[Plant]):
         )
 
     def hand(self, console: Console) -> PersonAtKeys | None:
-        """See ``SystemStage``."""
+        """Keys i and o bring and fetch a car, where ``--by-hand`` was given; else None."""
         if not self._coming.by_hand:
             return None
         options = self.run.options
         return ByHand(self._street, options.seed, console, ends_with_pipe=options.web is None)
 
     def source(self) -> "RunSource":
-        """See ``SystemStage``."""
+        """The run as the page shows it, with the local time of its day."""
         from bus_sim.systems.car_park.page import CarParkSource  # noqa: PLC0415  # its libraries are an extra
 
         return CarParkSource(self.run, self._coming.zero)
 
     def summary(self, ended: EndedRun) -> RunSummary:
-        """See ``SystemStage``."""
+        """Waiting, travel and bus load of the part that was measured, and why anybody was left."""
         run, now_us = self.run, self.run.loop.now_us()
         street, fleet = self._street.summary(ended.begin_us), self._indicators.figures(now_us)
         frames, errors, mean_load, worst_load = bus_figures(run.fleet.statistics())

@@ -22,7 +22,7 @@ if TYPE_CHECKING:  # the page's libraries are an extra
 
 
 class CellStage(SystemStage[CellPlant]):
-    """See ``SystemStage``."""
+    """One run of a cell: its arms in their workspaces, and the goals that are left."""
 
     who = "goals"
 
@@ -31,30 +31,30 @@ class CellStage(SystemStage[CellPlant]):
         self.view = CellView(run.plant.site)
 
     def head(self) -> list[str]:
-        """See ``SystemStage``."""
+        """The usual line, and the number of goals."""
         return [f"{super().head()[0]}, {len(self.plant.site.goals)} goals"]
 
     def listen(self) -> None:
-        """See ``SystemStage``."""
+        """Every message of the fleet bus also goes to the view that the picture is drawn of."""
         super().listen()
         self.run.observers.append(lambda message, _: self.view.feed(message))
 
     def tally(self) -> Tally:
-        """See ``SystemStage``."""
+        """What became of each goal: done, refused, or open still."""
         return count(self.plant)
 
     def bring(self, site: Cell, node: int) -> None:
-        """See ``SystemStage``."""
+        """A goal within the workspace of arm ``node``, drawn by the run's seed."""
         alone = replace(site, arms={node: site.arms[node]})
         next(iter(self.plant.counters.values())).add(draw(alone, OrderArrivals(1, 1.0), self.run.options.seed).goals[0])
 
     def power_up(self, node: int) -> None:
-        """See ``SystemStage``."""
+        """Drive and gripper of arm ``node`` say how they stand, as at power-up."""
         if node in self.plant.devices:
             self.plant.devices[node].start()
 
     def picture(self) -> str:
-        """See ``SystemStage``."""
+        """The plan of the cell with arms and parts, in characters."""
         return plan(self.plant, self.view)
 
     def remarks(self) -> list[str]:
@@ -67,7 +67,7 @@ class CellStage(SystemStage[CellPlant]):
         return [*lines, *super().remarks()]
 
     def source(self) -> "RunSource":
-        """See ``SystemStage``."""
+        """The run as the page shows it; a person may order any goal of the site once more."""
         from bus_sim.web.orders import let_order  # noqa: PLC0415  # its libraries are an extra
 
         return let_order(super().source(), self.plant.counters, self.plant.site.goals)

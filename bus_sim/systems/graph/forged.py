@@ -11,10 +11,10 @@ from onboard.systems.graph.site import FactoryGraph
 
 
 class ForgedVisits(words.ForgedOrders):
-    """Visits that nobody ordered."""
+    """Visits of two nodes by a robot, said by somebody who is no desk."""
 
     def orders(self) -> Iterator[Message]:
-        """See ``words.ForgedOrders``."""
+        """One list of two nodes drawn by chance, for a robot drawn by chance."""
         me, site, chance = self.node.node_id, self.node.site, self.node.chance
         assert isinstance(site, FactoryGraph)
         robots = [node for node, one in site.machines.items() if one.kind is KindCode.VEHICLE]
@@ -26,7 +26,7 @@ class ForgedGoAheads(words.WrongAnswers):
     """Every robot that comes near a node is told by the attacker that it may go on."""
 
     def hear(self, message: Message, now_us: int) -> None:
-        """See ``Attack``."""
+        """Answers each request for a node with GO in the agent's place, and no right behind it."""
         if isinstance(message, TurnSignal):
             go = NodeAnswer(self.node.node_id, message.sender, message.node, NodeVerdict.GO, message.after, 0)
             self.node.say(go)

@@ -21,7 +21,7 @@ CERTIFICATE_STATES = 100_000
 
 
 class GraphStage(SystemStage[GraphPlant]):
-    """See ``SystemStage``."""
+    """One run of a graph: its robots on nodes and edges, and the visits that are left."""
 
     def head(self) -> list[str]:
         """With the certificate of its graph under its rules."""
@@ -36,25 +36,25 @@ class GraphStage(SystemStage[GraphPlant]):
         ]
 
     def tally(self) -> Tally:
-        """See ``SystemStage``."""
+        """What became of each order of visits: done, refused, or open still."""
         return count(self.plant)
 
     def bring(self, site: FactoryGraph, node: int) -> None:
-        """See ``SystemStage``."""
+        """The first order of the site that names no robot, once more."""
         anybody = next(order for order in site.orders if not order.robot)
         next(iter(self.plant.counters.values())).add(anybody)
 
     def power_up(self, node: int) -> None:
-        """See ``SystemStage``."""
+        """The body of robot ``node`` says where it stands, as at power-up; agents have none."""
         if node in self.plant.bodies:
             self.plant.bodies[node].start()
 
     def picture(self) -> str:
-        """See ``SystemStage``."""
+        """Nodes with whoever stands there or is on the way, in characters."""
         return picture(self.plant)
 
     def source(self) -> "RunSource":
-        """See ``SystemStage``."""
+        """The run as the page shows it; a person may order any visits of the site once more."""
         from bus_sim.web.orders import let_order  # noqa: PLC0415  # its libraries are an extra
 
         return let_order(super().source(), self.plant.counters, self.plant.site.orders)

@@ -13,7 +13,7 @@ from onboard.contract.messages import CallForProposals
 
 
 class MapdStage(SystemStage[UnitPlant]):
-    """See ``SystemStage``."""
+    """One run of pick-up and delivery: its carts on the floor, and the tasks that are left."""
 
     who = "tasks"
 
@@ -22,16 +22,16 @@ class MapdStage(SystemStage[UnitPlant]):
         self.plant.check_steps()
 
     def head(self) -> list[str]:
-        """See ``SystemStage``."""
+        """The usual line, and the numbers of robots and tasks."""
         site = self.plant.site
         return [f"{super().head()[0]}, {len(site.homes)} robots, {len(site.tasks)} tasks"]
 
     def tally(self) -> Tally:
-        """See ``SystemStage``."""
+        """What became of each task: delivered, refused, or open still."""
         return count(self.plant)
 
     def picture(self) -> str:
-        """See ``SystemStage``."""
+        """The floor cell by cell with its carts, in characters."""
         return picture(self.plant)
 
     def figures(self) -> dict[str, object]:

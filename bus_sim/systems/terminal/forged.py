@@ -10,10 +10,10 @@ from onboard.systems.terminal.vehicle import terminal
 
 
 class ForgedTransports(words.ForgedOrders):
-    """Boxes that nobody ordered."""
+    """Urgent orders for boxes, said by somebody who is no desk."""
 
     def orders(self) -> Iterator[Message]:
-        """See ``words.ForgedOrders``."""
+        """One box to one station, both drawn by chance, in the desk's name."""
         site, chance = terminal(self.node.site), self.node.chance
         stations = [number for number, one in site.entities.items() if one.kind is EntityKind.STATION]
         box, station = chance.randint(1, len(site.boxes)), chance.choice(stations)

@@ -36,7 +36,7 @@ class TerminalShow:
             self._live.stop()
 
     def update(self, now_us: int) -> None:
-        """See ``Show``."""
+        """The picture in a terminal; and every line of the log that is new, wherever output goes."""
         if self._console.quiet:
             return
         run = self._run

@@ -16,34 +16,34 @@ if TYPE_CHECKING:  # the page's libraries are an extra
 
 
 class TurningStage(SystemStage[TurningPlant]):
-    """See ``SystemStage``."""
+    """One run of a turning shop: its lathes with their tools, and the jobs that are left."""
 
     def head(self) -> list[str]:
-        """See ``SystemStage``."""
+        """The usual line, and the number of orders."""
         return [f"{super().head()[0]}, {len(self.plant.site.orders)} orders"]
 
     def tally(self) -> Tally:
-        """See ``SystemStage``."""
+        """What became of each job: done, refused, or open still."""
         return count(self.plant)
 
     def bring(self, site: Turning, node: int) -> None:
-        """See ``SystemStage``."""
+        """The first job of the site that lathe ``node`` has a clamping for, once more."""
         lathe = site.lathes[node]
         fits = (one for one in site.orders if choose_clamping(one.job, site.drawings[one.job.drawing], lathe))
         wanted = next(fits)
         next(iter(self.plant.counters.values())).add(wanted)
 
     def power_up(self, node: int) -> None:
-        """See ``SystemStage``."""
+        """The control of lathe ``node`` says how it stands, as at power-up."""
         if node in self.plant.devices:
             self.plant.devices[node].start()
 
     def picture(self) -> str:
-        """See ``SystemStage``."""
+        """Lathes with their jobs and how far their tools are worn, in characters."""
         return board(self.plant)
 
     def source(self) -> "RunSource":
-        """See ``SystemStage``."""
+        """The run as the page shows it; a person may order any job of the site once more."""
         from bus_sim.web.orders import let_order  # noqa: PLC0415  # its libraries are an extra
 
         return let_order(super().source(), self.plant.counters, self.plant.site.orders)

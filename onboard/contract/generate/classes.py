@@ -35,7 +35,7 @@ def version(contract: DbcFile) -> str:
 
 
 def message_class(frame: DbcMessage) -> str:
-    """A frame's class."""
+    """The text of a frame's class, a part of a set or a message of its own."""
     base = "SetFrame" if frame.part_of else "Message"
     return _class(frame.layout.name, base, frame.layout.comment, frame.fields)
 

@@ -83,7 +83,7 @@ def struct_format(frame: DbcMessage) -> str:
 
 
 def function_name(frame: DbcMessage) -> str:
-    """``car_at`` of ``CarAt``."""
+    """The message's name as functions have it: ``car_at`` of ``CarAt``."""
     return "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in frame.layout.name).lstrip("_")
 
 

@@ -29,7 +29,7 @@ class ContractError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class ValueTable:
-    """An enumeration."""
+    """An enumeration of a DBC: ``choices`` are values with their names, ``module`` where it stands."""
 
     name: str
     comment: str

@@ -105,13 +105,13 @@ class Compartment:
 
     @property
     def station(self) -> Station:
-        """The bay."""
+        """The bay, as the site has it for this compartment."""
         assert self.fleet.machine.station is not None
         return self.fleet.machine.station
 
     @property
     def state(self) -> MachineState:
-        """Heartbeat state."""
+        """STARTING until bay and doors are known, then IDLE or WORKING, for heartbeats."""
         if self.phase is BayPhase.STARTING:
             return MachineState.STARTING
         return MachineState.IDLE if self.phase is BayPhase.FREE else MachineState.WORKING
@@ -126,7 +126,7 @@ class Compartment:
         return []
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
-        """Doors, bay and desk."""
+        """Doors and bay are noted, and orders said again; a new desk event is taken up once."""
         if isinstance(message, DoorState):
             self.doors = message
             return self.outputs.again(message, now_us)

@@ -84,12 +84,12 @@ class Lift:
 
     @property
     def track(self) -> int:
-        """The lift's shaft."""
+        """The lift's shaft, as the number of a track."""
         return self.fleet.machine.home.track
 
     @property
     def state(self) -> MachineState:
-        """Heartbeat state."""
+        """For heartbeats: WAITING already where it stands and only its robot is not heard yet."""
         if self.phase is LiftPhase.STARTING:
             # Who knows where it stands takes part, though it waits for the robot that has its platform to be heard.
             stands = self.drive is not None and self.drive.mode is DriveMode.STANDING

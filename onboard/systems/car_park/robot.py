@@ -61,12 +61,12 @@ OVERDUE_US = 2_000_000
 
 @dataclass(frozen=True)
 class ParkingRobotFactory(BehaviourFactory):
-    """Makes mobile robots."""
+    """Makes the mobile robots of a car park, with a program each."""
 
     fleet_type = WayFleet
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> CarParkGeneration:
-        """The robot's task-generation function."""
+        """What its bids come from; it asks lifts first where the site says rides "before"."""
         park = car_park(site)
         generation = AskingGeneration if park.rides is RideCalls.BEFORE else CarParkGeneration
         return generation(park, machine, way_mirror(mirror), Program(park))
@@ -124,7 +124,7 @@ class ParkingRobot:
 
     @property
     def state(self) -> MachineState:
-        """Heartbeat state."""
+        """For heartbeats: STOPPED by a fault, OBSTACLE in a person's hand, STARTING until placed."""
         is_astray = self.starting.is_over and self.shuttle.is_astray
         is_held_back = self.starting.stage is StartStage.HELD or self.going_around.is_stuck or is_astray
         if self._fault is not Reason.NONE or is_held_back:
@@ -147,7 +147,7 @@ class ParkingRobot:
         return []
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
-        """Drive and shuttle states."""
+        """States of drive and shuttle; a shuttle that fails stops the robot for good."""
         if isinstance(message, DriveState):
             return self.carriage.sense(message, now_us, self.program.version, self.program.leg)
         if isinstance(message, ShuttleState):

@@ -40,14 +40,14 @@ class GoalOrder(WorkOrder):
 
 @dataclass(frozen=True)
 class GoalManagerFactory(BehaviourFactory):
-    """Makes goal managers."""
+    """Makes the machine at the counter, which calls for arms."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
-        """Nothing to offer."""
+        """A desk bids for nothing itself."""
         return NoEstimator()
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> "GoalManager":
-        """The desk's steps."""
+        """A desk with the goals of its journal."""
         return GoalManager(fleet)
 
 
@@ -123,7 +123,7 @@ class GoalManager(OrderDesk[GoalOrder]):
     # --- the OrderDesk -----------------------------------------------------------------------------------------
 
     def terms(self, order: GoalOrder) -> RequestedTerms:
-        """A call to robots."""
+        """The call to arms: whoever brings the part there at least cost."""
         return call_terms(order.goal)
 
     def may_take_back(self, order: GoalOrder) -> bool:
@@ -145,7 +145,7 @@ class GoalManager(OrderDesk[GoalOrder]):
         order.cost = offer.cost if offer is not None else 0.0
 
     def state_record(self, order: GoalOrder) -> GoalStateRecord:
-        """With the contract's cost."""
+        """How far the goal is, with the cost in m that its contract has."""
         return GoalStateRecord(order.task.number, order.state, order.winner, order.cost)
 
     def order_record(self, order: GoalOrder) -> GoalOrderRecord:
@@ -167,6 +167,6 @@ class GoalManager(OrderDesk[GoalOrder]):
                     self.take_up(order, record.state)
 
     def answer(self, order: GoalOrder) -> Message:
-        """With the cost."""
+        """The end of the order for the counter, with its cost in mm."""
         number, result = order.task.number, OrderResult[order.result_name]
         return OrderAnswer(self.fleet.node_id, number, result, round(1000 * order.cost))

@@ -47,7 +47,7 @@ class ArmDriver:
         return Point(self.state.x_mm, self.state.y_mm) if self.state is not None else None
 
     def sense(self, state: ArmState) -> None:
-        """What the drive says."""
+        """Takes up where the drive is; the first time also which order it had last."""
         if self.state is None:
             self.link.go_on_from(state.sequence)
         self.state = state

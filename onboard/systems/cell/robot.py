@@ -46,7 +46,7 @@ class ArmFactory(BehaviourFactory):
     """Makes robots of a cell."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> ArmGeneration:
-        """The robot's task-generation function."""
+        """What its bids come from. Raises ``TypeError`` for a site that is no cell."""
         if not isinstance(site, Cell):
             raise TypeError("a robot of a cell needs a cell")
         return ArmGeneration(site, machine, site.arms[machine.node_id].home)
@@ -107,7 +107,7 @@ class ArmRobot:
 
     @property
     def state(self) -> MachineState:
-        """Heartbeat state."""
+        """STARTING until drive and gripper are heard, then IDLE or WORKING, for heartbeats."""
         if self.driver.state is None or self.grip is None:
             return MachineState.STARTING
         return MachineState.IDLE if self.active is None else MachineState.WORKING

@@ -34,11 +34,11 @@ class HostFactory(BehaviourFactory):
     """Makes hosts of node agents."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
-        """Nothing to offer."""
+        """Agents of nodes bid for nothing."""
         return NoEstimator()
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> "NodeAgents":
-        """The agents' steps."""
+        """The agents of this host's nodes. Raises ``TypeError`` for a site that is no graph."""
         if not isinstance(fleet.site, FactoryGraph):
             raise TypeError("a host of node agents needs a graph")
         return NodeAgents(fleet, fleet.site)
@@ -74,12 +74,12 @@ class NodeAgents:
 
     @property
     def state(self) -> MachineState:
-        """Heartbeat state."""
+        """WORKING while any robot waits for one of its nodes, for heartbeats."""
         return MachineState.WORKING if self.waiting else MachineState.IDLE
 
     @property
     def itinerary_version(self) -> int:
-        """Nodes go nowhere."""
+        """Always 0, for nodes go nowhere."""
         return 0
 
     def start(self, now_us: int) -> list[Effect]:
@@ -87,7 +87,7 @@ class NodeAgents:
         return []
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
-        """No devices."""
+        """Nothing: a host of agents has no devices."""
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
@@ -113,7 +113,7 @@ class NodeAgents:
         return []
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
-        """Takes no part."""
+        """Nothing: agents neither call nor bid."""
         return []
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
@@ -138,7 +138,7 @@ class NodeAgents:
         return None
 
     def statements(self, now_us: int) -> list[Effect]:
-        """Rights, and edges kept."""
+        """The rights that it holds; edges that are kept are said again when asked for."""
         self._kept.clear()
         return self.fleet.tokens.statements()
 

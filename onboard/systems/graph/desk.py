@@ -48,14 +48,14 @@ class Visits(WorkOrder):
 
 @dataclass(frozen=True)
 class VisitDeskFactory(BehaviourFactory):
-    """Makes order desks."""
+    """Makes the machine at the counter, which calls for robots."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
-        """Nothing to offer."""
+        """A desk bids for nothing itself."""
         return NoEstimator()
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> "VisitDesk":
-        """The desk's steps."""
+        """A desk with the orders of its journal."""
         return VisitDesk(fleet)
 
 
@@ -143,11 +143,11 @@ class VisitDesk(OrderDesk[Visits]):
         return super().go_on(order, now_us)
 
     def order_record(self, order: Visits) -> VisitRecord:
-        """All of it."""
+        """The whole order: one record tells what was ordered and how far it is."""
         return self.state_record(order)
 
     def state_record(self, order: Visits) -> VisitRecord:
-        """All of it."""
+        """The whole order, with its winner and how far it is."""
         origin, number = order.task
         return VisitRecord(number, order.winner, order.named, order.stops, order.state, origin)
 

@@ -53,7 +53,7 @@ class GraphRobotFactory(BehaviourFactory):
     """Makes robots of a factory graph."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> RobotPlanning:
-        """The robot's task-generation function."""
+        """What its bids come from. Raises ``TypeError`` for a site that is no graph."""
         if not isinstance(site, FactoryGraph):
             raise TypeError("a robot of a graph needs a graph")
         return RobotPlanning(site, machine, Position(machine.home.track))
@@ -123,14 +123,14 @@ class GraphRobot:
 
     @property
     def site(self) -> FactoryGraph:
-        """The graph."""
+        """The graph on which it drives."""
         return self.planning.site
 
     # --- the Behaviour -----------------------------------------------------------------------------------------
 
     @property
     def state(self) -> MachineState:
-        """Heartbeat state."""
+        """For heartbeats: OBSTACLE with another map or in a person's hand, WAITING before a node."""
         if self.body is None:
             return MachineState.STARTING
         if self.has_other_map or self.manual.at_rest:

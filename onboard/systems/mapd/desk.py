@@ -73,7 +73,7 @@ class TransportDesk(Plain):
     # --- the Behaviour -----------------------------------------------------------------------------------------
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
-        """Orders at the counter."""
+        """An order that a person typed at the counter; nothing else is heard there."""
         return self._on_key(message) if isinstance(message, TransportKey) else []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:

@@ -18,7 +18,7 @@ class UnitRobotFactory(BehaviourFactory):
     """Makes robots that move in unit steps."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> UnitGeneration:
-        """The robot's task-generation function."""
+        """What its bids come from. Raises ``TypeError`` for a site of another system."""
         if not isinstance(site, Mapd):
             raise TypeError("a machine of a pick-up and delivery site needs one")
         return UnitGeneration()

@@ -103,7 +103,7 @@ class UnitRobot(Plain):
     # --- the Behaviour -----------------------------------------------------------------------------------------
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
-        """The body."""
+        """Where the cart is; a cell that is not on the floor is dropped and counted."""
         if isinstance(message, CartState):
             if message.cell >= len(self.site.floor.ways):
                 self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1

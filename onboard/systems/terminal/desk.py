@@ -69,12 +69,12 @@ class DeskGeneration(NoEstimator):
 
 @dataclass(frozen=True)
 class TerminalDeskFactory(BehaviourFactory):
-    """Makes desks."""
+    """Makes the desk of a terminal, with keyboard and cameras."""
 
     fleet_type = CarFleet
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> DeskGeneration:
-        """The desk's picture."""
+        """What the desk knows of others' plans; it bids for nothing."""
         return DeskGeneration(TerminalMirror(terminal(site), machine.node_id, car_mirror(mirror)))
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Desk":
@@ -113,7 +113,7 @@ class Desk:
 
     @property
     def site(self) -> Terminal:
-        """The site."""
+        """The terminal whose orders it takes."""
         return self.mirror.site
 
     @property
@@ -125,12 +125,12 @@ class Desk:
 
     @property
     def state(self) -> MachineState:
-        """Heartbeat state."""
+        """WORKING while an order or a mission is open, for heartbeats."""
         return MachineState.WORKING if self.orders.open or self.orders.missions else MachineState.IDLE
 
     @property
     def itinerary_version(self) -> int:
-        """A desk goes nowhere."""
+        """Always 0, for a desk goes nowhere."""
         return 0
 
     def start(self, now_us: int) -> list[Effect]:
@@ -145,7 +145,7 @@ class Desk:
         return []
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
-        """Keyboard and cameras."""
+        """Missions and manual orders from the keyboard, and lanes as the cameras see them."""
         match message:
             case MissionKey():
                 return self._typed(message, now_us)
@@ -216,7 +216,7 @@ class Desk:
         return effects
 
     def next_wake(self) -> int | None:
-        """The next look."""
+        """When it looks after open orders, says one again, or repeats a manual order, us."""
         return min(
             (one for one in (self._look_at_us, self._repeat_at_us, self._manual_at_us) if one is not None), default=None
         )

@@ -55,7 +55,7 @@ class Planner:
 
     @property
     def site(self) -> Terminal:
-        """The site."""
+        """The terminal for which it plans."""
         return self.generation.site
 
     @property
@@ -65,7 +65,7 @@ class Planner:
 
     @property
     def owned(self) -> Owned | None:
-        """My plan in execution."""
+        """The plan of this vehicle that is being carried out; None without one."""
         return self.mirror.traffic.plans.get(self.fleet.node_id)
 
     def start(self, now_us: int) -> None:

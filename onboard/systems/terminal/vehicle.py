@@ -47,7 +47,7 @@ def terminal(site: Site) -> Terminal:
 
 @dataclass(frozen=True)
 class VehicleFactory(BehaviourFactory):
-    """Makes vehicles."""
+    """Makes the vehicles of a terminal, with a planner each."""
 
     fleet_type = CarFleet
 
@@ -86,7 +86,7 @@ class Vehicle:
 
     @property
     def site(self) -> Terminal:
-        """The site."""
+        """The terminal in which it drives."""
         return self.generation.site
 
     @property
@@ -96,12 +96,12 @@ class Vehicle:
 
     @property
     def owned(self) -> Owned | None:
-        """My plan in execution."""
+        """The plan of this vehicle that is being carried out; None without one."""
         return self.mirror.traffic.plans.get(self.fleet.node_id)
 
     @property
     def state(self) -> MachineState:
-        """Heartbeat state."""
+        """STARTING until drive and handler are known, WAITING in a person's hand, for heartbeats."""
         if not self.body.is_known:
             return MachineState.STARTING
         if not self.manual.is_automatic:
@@ -110,7 +110,7 @@ class Vehicle:
 
     @property
     def itinerary_version(self) -> int:
-        """Version of the plan."""
+        """The version of the plan in hand, 0 without one."""
         return self.planner.version if self.owned is not None else 0
 
     def start(self, now_us: int) -> list[Effect]:
@@ -122,7 +122,7 @@ class Vehicle:
         return []
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
-        """Drive and handler."""
+        """States of drive and handler; with the first of both the vehicle takes its place."""
         if isinstance(message, MoveState | HandlerState):
             was_known = self.body.is_known
             self.body.sense(message)

@@ -32,14 +32,14 @@ class BatchOrder(WorkOrder):
 
 @dataclass(frozen=True)
 class BatchDeskFactory(BehaviourFactory):
-    """Makes order desks."""
+    """Makes the machine at the counter, which calls for lathes."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
-        """Nothing to offer."""
+        """A desk bids for nothing itself."""
         return NoEstimator()
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> "JobDesk":
-        """The desk's steps."""
+        """A desk with the jobs of its journal."""
         return JobDesk(fleet)
 
 
@@ -76,7 +76,7 @@ class JobDesk(OrderDesk[BatchOrder]):
         return self.come_in(BatchOrder(task, job), now_us)
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
-        """Prices, and lathes' reports."""
+        """Notes what each lathe asks for a job, ct, and how far those are that were won."""
         if isinstance(message, BillBar) and message.manager == self.fleet.node_id:
             self._prices[message.sender, Reference(message.manager, message.task)] = message.total_ct
         elif isinstance(message, LatheProgress):

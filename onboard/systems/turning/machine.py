@@ -81,7 +81,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class LatheFactory(BehaviourFactory):
-    """Makes lathes."""
+    """Makes the lathes of a turning shop."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> LatheGeneration:
         """The lathe's task-generation function; the mirror is of no use to it (row P21)."""
@@ -130,14 +130,14 @@ class LatheMachine:
 
     @property
     def state(self) -> MachineState:
-        """Heartbeat state."""
+        """STARTING until the control is heard, then IDLE or WORKING, for heartbeats."""
         if self.nc is None:
             return MachineState.STARTING
         return MachineState.WORKING if self.tasks.in_hand else MachineState.IDLE
 
     @property
     def itinerary_version(self) -> int:
-        """A lathe goes nowhere."""
+        """Always 0, for a lathe goes nowhere."""
         return 0
 
     def start(self, now_us: int) -> list[Effect]:

@@ -111,7 +111,7 @@ def run_diagram(args: argparse.Namespace) -> int:
     assert site is not None, "argparse asks for it"
     module = part(site.system, "diagram")
     if module is None:
-        raise TraceError(f"diagram: {site.name} is a {site.system}, and nobody has said what to draw of one over time")
+        raise TraceError(f"diagram: {site.name}: the system {site.system} has no diagram over time (docs/new-kind.md)")
     with open_log(args) as log:
         heard = _Heard(log, site)
         messages = heard.first()

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import Criterion, KindCode, MachineState, Operation, Reason, TaskPhase
-from onboard.contract.messages import NO_REFERENCE, CallForProposals, Message, Reference, TaskReport
+from onboard.contract.messages import CallForProposals, Message, Reference, TaskReport
 from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.effects import Effect, Send, Tell
 from onboard.core.mirror import Mirror
@@ -103,8 +103,9 @@ class Desk(Plain):
         if not isinstance(message, PartIn) or message.number in self.called:
             return []
         self.called.add(message.number)
+        # The part goes by its task's name.
         task = Reference(self.fleet.node_id, message.number)
-        terms = RequestedTerms(task, Operation.MACHINE, KindCode.LATHE, Criterion.FINISH_TIME, 0, 0, NO_REFERENCE, 0)
+        terms = RequestedTerms(task, Operation.MACHINE, KindCode.LATHE, Criterion.FINISH_TIME, 0, 0, task, 0)
         return self.fleet.negotiation.open(terms, now_us)
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:

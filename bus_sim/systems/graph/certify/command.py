@@ -36,7 +36,7 @@ exit status: 0 certified; 1 not certified, or undecided; 2 a mistake in the comm
 
 
 def add_certify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """The subcommand's options."""
+    """Adds ``bus-sim certify``: whether robots can stick on a graph, and how many are best."""
     parser = commands.add_parser(
         "certify",
         help="can robots ever stick on a graph? and how many robots are best?",
