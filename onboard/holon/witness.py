@@ -24,6 +24,7 @@ from onboard.contract.messages import (
     TokenSeen,
 )
 from onboard.core.authority import TokenBook, TokenKey
+from onboard.core.bus_time import MAX_SLEW_US
 from onboard.core.effects import Effect, Send
 from onboard.core.mirror import Mirror
 from onboard.core.serial import is_newer
@@ -137,6 +138,10 @@ class Witness:
         self._answer_at_us = _later(self._answer_at_us, by_us)
         self._quiet_until_us = _later(self._quiet_until_us, by_us)
         self._crowd_until_us = _later(self._crowd_until_us, by_us)
+        if abs(by_us) > MAX_SLEW_US:
+            for peer in self.mirror.peers.values():
+                # Who has just come has no earlier life because the time was set.
+                peer.since_us += by_us
 
     def slept(self, now_us: int) -> None:
         """I heard nothing for a while, or my clock has jumped: who has not answered has had no time to."""
