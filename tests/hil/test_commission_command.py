@@ -92,4 +92,4 @@ def test_mistakes_are_one_line_and_status_2(tmp_path: Path, capsys: Capture) -> 
     assert main(["commission", "--machine", str(tmp_path / "MR1.toml")]) == 2
     assert "is the server running" in capsys.readouterr().err
     assert main([]) == 2
-    assert "python -m hil commission --machine FILE" in capsys.readouterr().err
+    assert "a command is missing; write commission" in capsys.readouterr().err

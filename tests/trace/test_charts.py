@@ -92,7 +92,7 @@ def test_the_diagram_is_svg_with_a_panel_for_every_track(tmp_path: Path) -> None
     root = ET.parse(out).getroot()
     texts = [one.text or "" for one in root.iter(f"{_SVG}text")]
     assert [text for text in texts if re.match(r"track \d|lift ", text)] == [
-        *("track 1", "track 2", "track 3", "lift ER1", "lift ER2")
+        *("track 3", "track 2", "track 1", "lift ER1", "lift ER2")
     ]
     notes = {one.text for one in root.iter(f"{_SVG}title")}
     assert {"MR1: reserved", "MR1: authority", "MR2: reserved", "MR2: authority"} <= notes
