@@ -13,13 +13,11 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from bus_sim.campaign.trial import STEP_US
+from bus_sim.campaign.trial import STEP_US, stage_of
 from bus_sim.faults.scenario import FaultScenario
-from bus_sim.options import RunOptions
 from bus_sim.run import run_until
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Arrivals
-from bus_sim.systems.car_park.stage import CarPark
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.contract.codes import TokenKind
 from onboard.core.site import Site, journal_owner
@@ -41,7 +39,7 @@ def played(site: Site, name: str, cars: int) -> dict[int, list[Entry]]:
     loop = VirtualTimeLoop()
 
     async def play() -> dict[int, list[Entry]]:
-        stage = CarPark(site, scenario, RunOptions(seed=5), loop)
+        stage = stage_of(site, scenario, loop)
         stage.run.start()
         for journal in stage.run.journals.values():
             journal.least_bytes = sys.maxsize

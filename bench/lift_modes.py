@@ -23,7 +23,7 @@ from onboard.contract.codes import CallResult, KindCode
 from onboard.contract.messages import Award, Bid, CallForProposals, Itinerary, Message, TaskReport
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.site import Site
-from onboard.systems.car_park.site import RideCalls
+from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.systems.registry import factory_for
 from onboard.wire.codec import fleet_codec
 
@@ -105,7 +105,7 @@ async def _play(site: Site, mode: Mode, demand: Demand, seed: int, loop: Virtual
 def measure(site: Site, mode: Mode, cars: int, seeds: range) -> Count:
     """One mode on a site, over all seeds."""
     count = Count()
-    site = dataclasses.replace(site, rides=mode.rides)
+    site = dataclasses.replace(car_park(site), rides=mode.rides)
     for seed in seeds:
         demand = Demand.by_mean(*INTERVAL_S, seed, count=cars)
         loop = VirtualTimeLoop()

@@ -42,6 +42,7 @@ from onboard.core.negotiation import delay_us as better_bids_sooner
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Segment, Site, Timing
 from onboard.ways.kinematics import run_duration_us
+from onboard.ways.site import WaySite, way_site
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
 
@@ -73,7 +74,7 @@ class Party(Protocol):
 class IdleRobot:
     """A task-generation function without plans: the way to the car, then the task. Implements ``Estimator``."""
 
-    site: Site
+    site: WaySite
     node_id: int
     position: int = 1
 
@@ -233,17 +234,17 @@ PROTOCOLS: dict[str, Maker] = {
 }
 
 
-def alley(robots: int) -> Site:
+def alley(robots: int) -> WaySite:
     """One alley, one compartment and ``robots`` robots, with the times that a site file has by default."""
     text = f'[site]\nname = "bench"\n[floors]\ncount = 1\npositions = {POSITIONS}\n'
     text += f'[[compartments]]\nname = "IOC1"\nnode = {INITIATOR}\nat = "p(1,4)"\n'
     for number in range(robots):
         node, home = FIRST_ROBOT + number, 6 + number
         text += f'[[robots]]\nname = "MR{number + 1}"\nnode = {node}\nhome = "p(1,{home})"\n'
-    return parse_site(text, "bench", crowded=True)  # they negotiate and do not drive
+    return way_site(parse_site(text, "bench", crowded=True))  # they negotiate and do not drive
 
 
-async def _measure(maker: Maker, site: Site, calls: int, seed: int, processing_us: int) -> Tally:
+async def _measure(maker: Maker, site: WaySite, calls: int, seed: int, processing_us: int) -> Tally:
     loop = asyncio.get_running_loop()
     if not isinstance(loop, VirtualTimeLoop):
         raise TypeError("to be run in virtual time")

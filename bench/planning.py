@@ -18,7 +18,8 @@ from bus_sim.sites import find_site
 from onboard.config.site import parse_site
 from onboard.contract.codes import Grade, KindCode, LegAction, Side
 from onboard.contract.messages import Itinerary, Leg, Stamp
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark, car_park
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses, standing_segments, travel_windows
 from onboard.ways.refuges import open_refuges, refuges
@@ -47,7 +48,7 @@ home = "p(1,2)"
 """
 
 
-def pass_by(site: Site, rng: random.Random) -> list[SlotWindow]:
+def pass_by(site: CarPark, rng: random.Random) -> list[SlotWindow]:
     """Windows of a machine that comes, works for ten seconds and goes on, all within some minutes."""
     length = site.tracks[1].length
     here, begin_us = Segment(1, rng.randint(1, length)), rng.randrange(240) * SECOND
@@ -65,7 +66,7 @@ def pass_by(site: Site, rng: random.Random) -> list[SlotWindow]:
 def measure(length: int, others: int, queries: int, seed: int) -> list[str]:
     """One row of the table."""
     rng = random.Random(f"{seed} {length} {others}")
-    site = parse_site(SITE.format(length=length), "bench")
+    site = car_park(parse_site(SITE.format(length=length), "bench"))
     took_us: list[float] = []
     expansions: list[int] = []
     found = delayed = 0
@@ -122,20 +123,20 @@ home = "p({floor},{index})"
 MAX_EXPANSIONS = 4_000
 
 
-def park(floors: int, length: int, compartments: int) -> Site:
+def park(floors: int, length: int, compartments: int) -> CarPark:
     """Floors with a lift at each end, compartments on the lowest, one robot at home on each other floor."""
     text = FLOORS.format(floors=floors, length=length)
     for number in range(1, compartments + 1):
         text += IN_OUT.format(number=number, index=1 + number * length // (compartments + 1))
     for floor in range(2, floors + 1):
         text += ROBOT.format(number=floor - 1, node=9 + floor, floor=floor, index=length // 2)
-    return parse_site(text, "bench")
+    return car_park(parse_site(text, "bench"))
 
 
 class Fleet:
     """Robots with their plans, made one after the other; ``dwell_us`` is how long each handling of a car takes."""
 
-    def __init__(self, site: Site, rng: random.Random, dwell_us: int = 15 * SECOND) -> None:
+    def __init__(self, site: CarPark, rng: random.Random, dwell_us: int = 15 * SECOND) -> None:
         self.site, self.rng, self.dwell_us = site, rng, dwell_us
         self.reservations = Reservations()
         self.ends = {node: m.home for node, m in site.machines.items() if m.kind is KindCode.ROBOT}
@@ -189,7 +190,7 @@ class Fleet:
         self._tell(itinerary)
 
 
-def measure_floors(site: Site, busy: int, queries: int, fleets: int, seed: int) -> list[str]:
+def measure_floors(site: CarPark, busy: int, queries: int, fleets: int, seed: int) -> list[str]:
     """One row of the second table: plans of one robot around the firm plans of ``busy`` others, of so many fleets."""
     rng = random.Random(f"{seed} {site.name} {len(site.places)} {busy}")
     took_us: list[float] = []
@@ -213,7 +214,7 @@ def measure_floors(site: Site, busy: int, queries: int, fleets: int, seed: int) 
 
 def measure_bound(length: int, calls: int) -> float:
     """Microseconds of one free-flow bound with two visits."""
-    site = parse_site(SITE.format(length=length), "bench")
+    site = car_park(parse_site(SITE.format(length=length), "bench"))
     visits = (Visit(Segment(1, 4), 10 * SECOND), Visit(Segment(1, length - 1), 10 * SECOND))
     free_flow_us(site, Segment(1, 2), 0, visits)
     before = time.process_time_ns()
@@ -238,7 +239,7 @@ def main() -> None:
     for floors, length, compartments, busy in FLEETS:
         row = measure_floors(park(floors, length, compartments), busy, options.queries, fleets, options.seed)
         print("  ".join(f"{cell:>11}" for cell in (f"{floors} x {length}", *row)))
-    row = measure_floors(find_site("large"), 11, options.queries, fleets, options.seed)
+    row = measure_floors(car_park(find_site("large")), 11, options.queries, fleets, options.seed)
     print("  ".join(f"{cell:>11}" for cell in ("large", *row)))
     print(f"free-flow bound, two visits: {measure_bound(40, 20_000):.1f} us")
 

@@ -25,7 +25,8 @@ from typing import Any, NamedTuple
 
 from planning import MAX_EXPANSIONS, Fleet, park
 
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark
 from onboard.ways.departures import Departures
 from onboard.ways.reservations import Interval
 from onboard.ways.roads import Roads, roads_of
@@ -45,7 +46,7 @@ Cell = tuple[int, int]
 Blocked = set[tuple[Cell, int]]
 
 
-def grid_park(floors: int, length: int, compartments: int) -> Site:
+def grid_park(floors: int, length: int, compartments: int) -> CarPark:
     """A park in which everything takes whole ticks."""
     site = park(floors, length, compartments)
     tracks = {number: replace(track, pitch_mm=PITCH_MM) for number, track in site.tracks.items()}
@@ -63,7 +64,7 @@ def grid_park(floors: int, length: int, compartments: int) -> Site:
 class GridOfSite:
     """What pymapf's searches ask of a grid: the neighbours of a cell, and how many cells there are."""
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: CarPark) -> None:
         self.roads: Roads = roads_of(site)
         self.length = site.tracks[1].length
         floors = sorted(number for number, track in site.tracks.items() if track.kind is TrackKind.ALLEY)
@@ -192,7 +193,7 @@ class Row(NamedTuple):
     later_ticks: list[int]
 
 
-def measure(site: Site, peer: Peer, busy: int, legs: int, queries: int, seed: int) -> tuple[Row, int]:
+def measure(site: CarPark, peer: Peer, busy: int, legs: int, queries: int, seed: int) -> tuple[Row, int]:
     """One row: random problems around the plans of ``busy`` others; also how many neither or only one could solve."""
     rng = random.Random(f"{seed} {busy} {legs}")
     row, unsolved = Row([], [], [], []), 0
