@@ -77,8 +77,11 @@ class MouthRules:
         track = self._site.tracks[end.position.track]
         if other.track != track.number:
             return False
-        off_mm = abs(other.motion.at(time_us)[0] - self._site.position_mm(track.inside(end.position.index)))
-        return track.length == 1 or off_mm < self._reach_mm
+        off_mm = other.motion.at(time_us)[0] - self._site.position_mm(track.inside(end.position.index))
+        if track.length > 1:
+            return abs(off_mm) < self._reach_mm
+        # Nearer to the mouth is inside too; farther from it is aboard of a lift at the other end.
+        return off_mm * (-1 if end.position.index == 0 else 1) > -self._reach_mm
 
     def _meeting_us(self, inside: Motion, other: MotionSpan, end: _End, from_us: int, to_us: int) -> int | None:
         """When one is over its mouth, at least in part, while another is in it, by its own track or a third."""
