@@ -13,15 +13,12 @@ from rich.text import Text
 PICTURES_S = 10
 
 
-class LiveText:
-    """Draws a picture of text; nothing where it is not wanted, or output is no terminal."""
+class LiveOutput:
+    """Room of a terminal for a picture, for as long as a run goes on; none where none is shown."""
 
-    def __init__(self, picture: Callable[[], str], console: Console, *, wanted: bool) -> None:
-        self._picture = picture
-        shown = wanted and console.is_terminal and not console.quiet
+    def __init__(self, console: Console, *, shown: bool) -> None:
         self._live = Live(console=console, auto_refresh=False, transient=True) if shown else None
-        self._next_s = 0.0
-        #: Of the page, if one is served: shown below every picture.
+        #: Of the page, if one is served: shown with every picture.
         self.address: str | None = None
 
     def __enter__(self) -> Self:
@@ -34,6 +31,15 @@ class LiveText:
     ) -> None:
         if self._live is not None:
             self._live.stop()
+
+
+class LiveText(LiveOutput):
+    """Draws a picture of text; nothing where it is not wanted, or output is no terminal."""
+
+    def __init__(self, picture: Callable[[], str], console: Console, *, wanted: bool) -> None:
+        super().__init__(console, shown=wanted and console.is_terminal and not console.quiet)
+        self._picture = picture
+        self._next_s = 0.0
 
     def update(self, now_us: int) -> None:
         """A new picture, not too often."""

@@ -3,16 +3,14 @@
 import time
 from collections.abc import Callable
 from datetime import datetime, timedelta
-from types import TracebackType
-from typing import Self
 
 from rich.console import Console, Group
-from rich.live import Live
 from rich.text import Text
 
 from bus_sim.systems.car_park.car_labels import bay_letters, car_labels
 from bus_sim.systems.car_park.show_plan import draw_plans
 from bus_sim.systems.car_park.slots import boxed, named, style, text_columns
+from bus_sim.systems.picture import LiveOutput
 from onboard.contract.codes import KindCode, MachineState, Side
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.outlines import is_elevation
@@ -248,34 +246,21 @@ def draw(
     return Group(head, *floors, *states, bus, *events, *foot)
 
 
-class ConsoleShow:
+class ConsoleShow(LiveOutput):
     """A live picture where output is a terminal, else one plain line each simulated hour, or oftener."""
 
     def __init__(
         self, site: WaySite, view: SiteView, clock: DayClock, figures: Callable[[], str], console: Console
     ) -> None:
+        super().__init__(console, shown=console.is_terminal)
         self._site = site
         self._view = view
         self._clock = clock
         self._figures = figures
         self._console = console
-        #: Of the page, if one is served: shown in every picture.
-        self.address: str | None = None
         self._next_line_us = 0
         self._every_us = 3_600_000_000
         self._last_s = 0.0
-        self._live = Live(console=console, auto_refresh=False, transient=True) if console.is_terminal else None
-
-    def __enter__(self) -> Self:
-        if self._live is not None:
-            self._live.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._live is not None:
-            self._live.stop()
 
     def every(self, every_us: int) -> None:
         """From now on a line each ``every_us`` of simulated time, a divisor of an hour."""

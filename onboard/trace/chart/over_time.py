@@ -4,6 +4,7 @@ A system's folder says in ``diagram.py`` which rows it has, and what its message
 ``Diagram``. Everything is drawn from the fleet bus.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -74,7 +75,7 @@ class Panel:
     bars: list[Bar] = field(default_factory=list)
 
 
-class Rows:
+class Rows(ABC):
     """What the diagrams of all systems but those with tracks share. A system says ``take`` and ``end``."""
 
     #: What the kinds of bars mean, for the reader.
@@ -99,11 +100,11 @@ class Rows:
         self.words.hear(logged.message)
         self.take(logged.message, fact, logged.time_us)
 
+    @abstractmethod
     def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Take up one message at ``time_us``, and what it told; each system's rows say which they draw."""
-        raise NotImplementedError
 
-    def end(self, time_us: int) -> None:
+    def end(self, time_us: int) -> None:  # noqa: B027  # not every system has something that goes on
         """The log is over: what goes on ends with it."""
 
     def log_us(self, bus_ms: int, near_us: int) -> int:
