@@ -31,7 +31,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
     robots = sum(1 for machine in fleet.by_node.values() if machine.kind is KindCode.ROBOT)
     timing = read_timing(root.table("timing"), robots, len(fleet.by_node), bitrate)
     negotiation = root.table("negotiation")
-    rides = RideCalls(negotiation.choice("rides", [one.value for one in RideCalls], "after"))
+    rides = RideCalls(negotiation.choice("rides", [one.value for one in RideCalls], "planned"))
     timing = replace(timing, sub_call_percent=negotiation.integer("sub_call_percent", 20, 80, 50))
     _check_whole(root, layout, fleet, uses)
     root.check_unknown()
