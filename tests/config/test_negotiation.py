@@ -15,6 +15,11 @@ def test_rides_are_planned_unless_the_site_says_that_lifts_are_asked_before() ->
     assert site.digest != one_floor().digest, "machines that ask at different times do not bid together"
 
 
+def test_bids_keep_their_itineraries_unless_the_site_says_otherwise() -> None:
+    assert not one_floor().tells_offers
+    assert one_floor(extra='[negotiation]\noffers = "told"\n').tells_offers
+
+
 @pytest.mark.parametrize(
     ("line", "told"),
     [('rides = "never"', '"never"'), ("sub_call_percent = 90", "from 20 to 80"), ("ride = 1", "ride")],

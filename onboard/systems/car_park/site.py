@@ -88,6 +88,8 @@ class CarPark(WaySite):
     shuttle_reach_mm: int
     cars: CarLimits
     rides: RideCalls = RideCalls.PLANNED
+    #: Whether a bid brings its tentative itinerary: to be seen, as in the paper; nobody plans around it.
+    tells_offers: bool = False
     #: In the order in which a car is tried against them; numbers are from 1.
     classes: tuple[SizeClass, ...] = ()
     #: Number of a place's class by its station's number; who is not named takes every car of the site.

@@ -133,7 +133,7 @@ _OPERATION = (
     TrafficBound("Bid", _ROBOT, lambda n: n.compartments, _window, "one for each desk's call"),
     TrafficBound("Bid", (), _rides, _window, "one for each ride asked for"),
     TrafficBound(
-        "ItineraryHead", _ROBOT, _two, _window, "tentative with a bid, firm with its award, and a delay", _window
+        "ItineraryHead", _ROBOT, _two, _window, "with an award, a delay, and a bid where offers are told", _window
     ),
     TrafficBound(
         "ItineraryLeg", _ROBOT, lambda _: _MOST_LEGS, _window, "the most legs, of all these together", _window

@@ -32,6 +32,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
     timing = read_timing(root.table("timing"), robots, len(fleet.by_node), bitrate)
     negotiation = root.table("negotiation")
     rides = RideCalls(negotiation.choice("rides", [one.value for one in RideCalls], "planned"))
+    tells_offers = negotiation.choice("offers", ["kept", "told"], "kept") == "told"
     timing = replace(timing, sub_call_percent=negotiation.integer("sub_call_percent", 20, 80, 50))
     _check_whole(root, layout, fleet, uses)
     root.check_unknown()
@@ -55,6 +56,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
         cars=constants.cars,
         timing=timing,
         rides=rides,
+        tells_offers=tells_offers,
         bay_uses=uses,
         classes=classes,
         place_class=place_class,
