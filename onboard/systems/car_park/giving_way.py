@@ -43,13 +43,22 @@ class GivingWay:
     program: Program
 
     def heed(self, sender: int, now_us: int) -> YieldDecision:
-        """What the newest plan of ``sender`` means; at LATER the program's times have been changed."""
+        """What the newest plan of ``sender`` means; at LATER the program is to be told again, mostly with other times."""
         meetings = self._meetings(sender, now_us)
         unordered = [meeting for meeting in meetings if meeting.first is None]
         yields = self.fleet.mirror.order.who_yields(self.fleet.node_id, sender, unordered) if unordered else NOBODY
         if any(self._has_to_turn(meeting, sender, yields) for meeting in unordered):
             return YieldDecision.ANEW
-        return self._come_behind([meeting for meeting in meetings if meeting.first == sender])
+        answer = self._come_behind([meeting for meeting in meetings if meeting.first == sender])
+        if answer is YieldDecision.NOTHING and unordered and self._is_counted_on(sender):
+            # It may have counted on my way back to yield; that is begun, and it hears so.
+            self.program.shift(0)
+            return YieldDecision.LATER
+        return answer
+
+    def _is_counted_on(self, sender: int) -> bool:
+        plan = self.fleet.mirror.itineraries.get(sender)
+        return plan is not None and has_work(plan) and not self.program.works()
 
     def stamp_for(self, sender: int, now_us: int) -> Stamp:
         """Under which stamp I make room for ``sender``: its own where I only stand in its way, without work."""
