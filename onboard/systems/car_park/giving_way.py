@@ -43,7 +43,7 @@ class GivingWay:
     program: Program
 
     def heed(self, sender: int, now_us: int) -> YieldDecision:
-        """What the newest plan of ``sender`` means; at LATER the program is to be told again, mostly with other times."""
+        """What the newest plan of ``sender`` means; at LATER the program is told again, mostly with other times."""
         meetings = self._meetings(sender, now_us)
         unordered = [meeting for meeting in meetings if meeting.first is None]
         yields = self.fleet.mirror.order.who_yields(self.fleet.node_id, sender, unordered) if unordered else NOBODY
