@@ -69,11 +69,12 @@ class Clearance:
 
     def have_room(
         self, plan: BegunItinerary, waiting: Mapping[int, tuple[Segment, int]], taken: Reservations, now_us: int
-    ) -> bool:
-        """Whether all who wait find a refuge from where and since when they do, around ``plan`` and what is ``taken``.
+    ) -> int | None:
+        """By how much later all who wait together are in a refuge, from where and since when they wait, us; None: never.
 
-        One after the other; ``taken`` is used up.
+        They go around ``plan`` and what is ``taken``, one after the other; ``taken`` is used up.
         """
+        later_us = 0
         _replace(self.site, taken, self.node, plan, now_us)
         ends = [*self.mirror.others_standing(), final_position(self.site, plan.itinerary)]
         for node, (place, since_us) in waiting.items():
@@ -83,14 +84,16 @@ class Clearance:
             floors = self.mirror.lift_floors(now_us, start_us, taken)
             route = plan_route(self.site, taken, node, place, start_us, (), refuges, MAX_EXPANSIONS, floors)
             if isinstance(route, NoRoute):
-                return False
+                return None
             stamp, steps = Stamp(to_bus_ms(now_us), 0, 0), list(steps_of(route, ()))
             way = to_itinerary(node, 1, Grade.FIRM, stamp, steps)
             if not steps:
                 way = standing_itinerary(node, 1, stamp, place, start_us)
             _replace(self.site, taken, node, BegunItinerary(way, start_us), now_us)
             ends.append(final_position(self.site, way))
-        return True
+            planned_us = self.mirror.reservations.standing_since(node)
+            later_us += 0 if planned_us is None else max(0, (steps[-1].end_us if steps else start_us) - planned_us)
+        return later_us
 
 
 def _replace(site: CarPark, taken: Reservations, node: int, plan: BegunItinerary, now_us: int) -> None:

@@ -178,9 +178,9 @@ class CarParkGeneration:
         mine = to_itinerary(self.machine.node_id, 1, Grade.FIRM, Stamp(to_bus_ms(now_us), 0, 0), list(solution.steps))
         plan = BegunItinerary(mine, solution.start_us)
         standing = self.clearance.standing_in(plan, now_us)
-        return standing is not None and self.clearance.have_room(
-            plan, standing, self.mirror.reservations.copy(), now_us
-        )
+        if standing is None:
+            return False
+        return self.clearance.have_room(plan, standing, self.mirror.reservations.copy(), now_us) is not None
 
     def _past_retreats(
         self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], best: Solution | None
@@ -188,7 +188,7 @@ class CarParkGeneration:
         """A sooner solution than ``best`` that counts on others' ways back to yield; None where there is none.
 
         Those who yield stand where their work ends, which the solution does not touch, and find a way back around it
-        and all plans: so nobody waits for whom it delays.
+        and all plans: so nobody waits for whom it delays. Together they are not delayed by more than it is sooner.
         """
         stamp = _stamp(call)
         horizon_us = max(self._deadline_us(call, now_us), now_us) + AWARD_LATENCY_US + HEARD_US
@@ -203,7 +203,10 @@ class CarParkGeneration:
             if not refusing:
                 waits = {node: (held[node].place, held[node].since_us) for node in yielding}
                 taken = self.clearance.without_retreats({node: held[node] for node in yielding}, now_us)
-                return (found, tried) if self.clearance.have_room(plan, waits, taken, now_us) else None
+                later_us = self.clearance.have_room(plan, waits, taken, now_us)
+                if later_us is None or (best is not None and best.finish_us - found.finish_us < later_us):
+                    return None
+                return found, tried
             held = {node: held[node] for node in yielding}
         return None
 
