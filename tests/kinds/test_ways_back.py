@@ -151,20 +151,19 @@ def two_lifts() -> CarPark:
     return car_park(parse_site(TWO_LIFTS, "two_lifts.toml"))
 
 
-def way_back(site: CarPark, award_ms: int = 0) -> Itinerary:
-    """It works at p(1,8) until 30 s, then goes by the left lift to the third floor."""
+def way_back(site: CarPark, award_ms: int = 0, works_s: int = 30) -> Itinerary:
+    """It works at p(1,8) for 30 s, then goes by the left lift to the third floor."""
     mirror = WayMirror(way_site(site), EMPTY)
     refuges = open_refuges(site, [Segment(2, 3)])
-    visit = (Visit(Segment(1, 8), 30_000_000),)
+    visit = (Visit(Segment(1, 8), works_s * 1_000_000),)
     route = plan_route(site, mirror.reservations, EMPTY, Segment(1, 8), 0, visit, refuges, 4_000)
     assert isinstance(route, Route)
     steps = [CarStep(*leg[:4], leg.begin_us, leg.end_us) for leg in route.legs]
     return to_itinerary(EMPTY, 1, Grade.FIRM, Stamp(award_ms, 2, 1), steps)
 
 
-def carrier_at(site: CarPark, plan: Itinerary) -> CarParkGeneration:
+def carrier_at(site: CarPark, plan: Itinerary, here: Segment = Segment(1, 2)) -> CarParkGeneration:
     """It stands at p(1,2), beside the car that is wanted one position away."""
-    here = Segment(1, 2)
     mirror = WayMirror(way_site(site), CARRIER)
     mirror.on_itinerary(standing_itinerary(CARRIER, 1, Stamp(0, 0, 0), here, 0), 0)
     mirror.on_itinerary(plan, 0)
@@ -200,3 +199,11 @@ def test_a_plan_counts_on_no_way_back_that_is_begun_or_has_aged() -> None:
     begun.mirror.on_progress(Progress(EMPTY, 1, 1, 1, 8, 0, 0))
     solution, _ = begun.solve(fetch(), 0)
     assert solution is not None and solution.finish_us > free.finish_us + 10_000_000
+
+
+@pytest.mark.parametrize(("works_s", "finish_s"), [(28, 90), (46, 67)])
+def test_a_way_back_is_not_asked_to_lose_more_than_the_work_gains(works_s: int, finish_s: int) -> None:
+    # From floor 2: it gains 24 s where the other comes 47 s later to its refuge, or 42 s where that is 29 s later.
+    site = two_lifts()
+    solution, _ = carrier_at(site, way_back(site, works_s=works_s), Segment(2, 3)).solve(fetch(), 0)
+    assert solution is not None and solution.finish_us // 1_000_000 == finish_s

@@ -70,9 +70,10 @@ class Clearance:
     def have_room(
         self, plan: BegunItinerary, waiting: Mapping[int, tuple[Segment, int]], taken: Reservations, now_us: int
     ) -> int | None:
-        """By how much later all who wait together are in a refuge, from where and since when they wait, us; None: never.
+        """By how much later all who wait come to a refuge, in sum, us; None: one does not.
 
-        They go around ``plan`` and what is ``taken``, one after the other; ``taken`` is used up.
+        ``waiting`` says from where and since when. They go around ``plan`` and what is ``taken``, one after the other;
+        ``taken`` is used up.
         """
         later_us = 0
         _replace(self.site, taken, self.node, plan, now_us)
