@@ -145,6 +145,7 @@ node = 12
 home = "p(3,4)"
 """
 CARRIER, EMPTY = 11, 12
+BESIDE = Segment(1, 2)
 
 
 def two_lifts() -> CarPark:
@@ -162,7 +163,7 @@ def way_back(site: CarPark, award_ms: int = 0, works_s: int = 30) -> Itinerary:
     return to_itinerary(EMPTY, 1, Grade.FIRM, Stamp(award_ms, 2, 1), steps)
 
 
-def carrier_at(site: CarPark, plan: Itinerary, here: Segment = Segment(1, 2)) -> CarParkGeneration:
+def carrier_at(site: CarPark, plan: Itinerary, here: Segment = BESIDE) -> CarParkGeneration:
     """It stands at p(1,2), beside the car that is wanted one position away."""
     mirror = WayMirror(way_site(site), CARRIER)
     mirror.on_itinerary(standing_itinerary(CARRIER, 1, Stamp(0, 0, 0), here, 0), 0)
