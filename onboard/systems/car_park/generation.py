@@ -155,7 +155,9 @@ class CarParkGeneration:
     ) -> tuple[Solution | None, list[Alternative]]:
         """All solutions evaluated, the earliest finish first; ties by the site's order of places.
 
-        A bid comes behind what this machine has bid for already (``behind_bids``); a task that is won does not.
+        A bid comes behind what this machine has bid for already (``behind_bids``); a task that is won does not. Others'
+        ways back are asked to yield to a task that is won, and to one for which there is no way else: where they were
+        for every bid, machines from far away won in place of those that were about to be near.
 
         Candidates whose bound is no better than the best found are not searched; they are told with that bound. Where
         there is no solution around machines that only stand there, one that counts on their giving way (design,
@@ -163,7 +165,7 @@ class CarParkGeneration:
         """
         start = self._start(call, now_us, behind_bids=behind_bids)
         best, alternatives = self._search(call, now_us, start, self.mirror.reservations)
-        if alternatives:
+        if alternatives and (best is None or not behind_bids):
             best, alternatives = self._past_retreats(call, now_us, start, best) or (best, alternatives)
         if best is None and alternatives:
             asked_us = max(self._deadline_us(call, now_us), now_us) + YIELDING_US
@@ -188,7 +190,8 @@ class CarParkGeneration:
         """A sooner solution than ``best`` that counts on others' ways back to yield; None where there is none.
 
         Those who yield stand where their work ends, which the solution does not touch, and find a way back around it
-        and all plans: so nobody waits for whom it delays. Together they are not delayed by more than it is sooner.
+        and all plans: so nobody waits for whom it delays. Together they are not delayed by more than twice what it
+        is sooner: a customer waits for it, and the next one for them.
         """
         stamp = _stamp(call)
         horizon_us = max(self._deadline_us(call, now_us), now_us) + AWARD_LATENCY_US + HEARD_US
@@ -204,7 +207,7 @@ class CarParkGeneration:
                 waits = {node: (held[node].place, held[node].since_us) for node in yielding}
                 taken = self.clearance.without_retreats({node: held[node] for node in yielding}, now_us)
                 later_us = self.clearance.have_room(plan, waits, taken, now_us)
-                if later_us is None or (best is not None and best.finish_us - found.finish_us < later_us):
+                if later_us is None or (best is not None and 2 * (best.finish_us - found.finish_us) < later_us):
                     return None
                 return found, tried
             held = {node: held[node] for node in yielding}
