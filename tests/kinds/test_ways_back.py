@@ -206,7 +206,7 @@ def test_a_plan_counts_on_no_way_back_that_is_begun_or_has_aged() -> None:
 
 @pytest.mark.parametrize(("works_s", "finish_s"), [(25, 87), (40, 67)])
 def test_a_way_back_is_not_asked_to_lose_far_more_than_the_work_gains(works_s: int, finish_s: int) -> None:
-    # From floor 2: it would gain 21 s where the other comes 50 s later to its refuge, and gains 36 s where that is 35 s.
+    # From floor 2: it would gain 21 s where the other loses 50 s, and gains 36 s where that loses 35 s.
     site = two_lifts()
     solution, _ = carrier_at(site, way_back(site, works_s=works_s), Segment(2, 3)).solve(fetch(), 0, behind_bids=False)
     assert solution is not None and solution.finish_us // 1_000_000 == finish_s
