@@ -216,7 +216,7 @@ class ParkingRobot:
         return effects + self._publish(now_us)
 
     def _reroute(self, sender: int, now_us: int) -> list[Effect]:
-        """Do the same work by another way, under the same stamp; where there is none, come behind on the old one."""
+        """Do the same work by another way; where there is none, come behind on the old one."""
         kept, origin, start_us = self.program.turning(now_us)
         works = [step.work for step in self.program.remaining[kept:] if step.work is not None]
         unplanned = self.program.unplanned
@@ -228,9 +228,9 @@ class ParkingRobot:
             steps = self.generation.reroute(origin, start_us, works, now_us)
         if steps is None:
             return self._publish(now_us) if self.giving_way.fall_back(sender, now_us) is YieldDecision.LATER else []
-        if not kept:
-            self._begun = False
-        self.program.replace([*self.program.remaining[:kept], *steps], self.program.stamp, unplanned)
+        self._begun = self._begun and bool(kept)
+        stamp = self.giving_way.stamp_for(sender, now_us)
+        self.program.replace([*self.program.remaining[:kept], *steps], stamp, unplanned)
         effects: list[Effect] = [Report(f"gives way to node {sender}: " + "; ".join(str(step) for step in steps))]
         return effects + self._publish(now_us)
 

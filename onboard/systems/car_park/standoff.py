@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from onboard.contract.codes import KindCode
 from onboard.contract.constants import NOBODY
 from onboard.core.authority import segment_token
-from onboard.core.serial import ranks_before
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.mirror import WayFleet
 
@@ -33,7 +32,7 @@ class Standoff:
         other = self._facing()
         if other != self._with:
             self._with = other
-            waits = 2 if other != NOBODY and self._ranks_before(other) else 1
+            waits = 2 if self.fleet.mirror.order.ranks_before(self.fleet.node_id, other) else 1
             self.due_us = None if other == NOBODY else now_us + waits * PATIENCE_US
         if self.due_us is None or now_us < self.due_us:
             return NOBODY
@@ -51,8 +50,3 @@ class Standoff:
         petitions = self.fleet.petitions
         wants = any(petitions.claim(segment_token(here), other) is not None for here in self.carriage.occupied())
         return other if wants else NOBODY
-
-    def _ranks_before(self, other: int) -> bool:
-        plans = self.fleet.mirror.itineraries
-        mine, theirs = plans.get(self.fleet.node_id), plans.get(other)
-        return mine is not None and theirs is not None and ranks_before(mine.stamp, theirs.stamp)
