@@ -317,9 +317,9 @@ class TokenBook:
                 self.behind_since_us.setdefault(key, now_us)
             else:
                 self.behind_since_us.pop(key, None)
-            is_kept = refusal.reason is Reason.DOOR_NOT_READY or (key.kind is TokenKind.SEGMENT and not is_behind)
-            is_kept = is_kept and key not in self.unordered and self.claim(key).itinerary_version > 0
-            rest_us = self.backoff.longest_us if is_kept else REFUSED_REPEATS * self.backoff.repeat_us
+            is_soon = is_behind or key in self.unordered or not self.claim(key).itinerary_version
+            is_soon |= refusal.reason is Reason.TOKEN_NOT_GRANTABLE_YET and key.kind is not TokenKind.SEGMENT
+            rest_us = REFUSED_REPEATS * self.backoff.repeat_us if is_soon else self.backoff.longest_us
             self.wanted[key] = max(now_us + rest_us, 0 if is_behind else self.wanted[key])
             self.changes += 1
 

@@ -18,7 +18,8 @@ def _refused(folder: Path, seed: int) -> tuple[int, dict[Call, str]]:
     faults = [InjectedFault(FaultKind.OMISSION, probability=0.03, seed=seed)]
     with pytest.MonkeyPatch.context() as patch:
         recorder.attach(patch)
-        play(find_site("small"), stays((0, 120), (10, 130), (20, 140)), seed=seed, limit_s=400, faults=faults, extra_s=0)
+        cars = stays((0, 120), (10, 130), (20, 140))
+        play(find_site("small"), cars, seed=seed, limit_s=400, faults=faults, extra_s=0)
     return len(recorder.calls), refused_calls(folder, recorder)
 
 
