@@ -5,7 +5,7 @@ overhangs its sill.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from onboard.contract.codes import DriveMode, KindCode
 from onboard.contract.messages import DriveOrder, DriveState, Message, PlatformState, Progress
@@ -149,7 +149,7 @@ class PlatformThere(Rule):
         site, body = self.picture.site, self.picture.on_floor(body)
         self._judge(event, body, sent_through(site, body, event.message), "is sent over")
 
-    def _judge(self, event: LogEvent[Message], body: ReportedPosition, slots: list[Segment], how: str) -> None:
+    def _judge(self, event: LogEvent[Message], body: ReportedPosition, slots: Sequence[Segment], how: str) -> None:
         site, wrong = self.picture.site, False
         for slot in slots:
             lift = self.picture.bodies.get(site.stewards.get(slot.track, 0))
