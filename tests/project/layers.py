@@ -151,8 +151,8 @@ LAYERS: dict[str, Layer] = {
     ),
     # Logs a million frames at a time: on a desk, never on a board; the rest of the trace does without.
     "onboard.trace.columns": Layer(
-        ("onboard.core.frame", "onboard.trace", "onboard.wire"),
-        ("numpy",),
+        (*CORE_TYPES, "onboard.trace", "onboard.wire"),
+        ("numpy", "pyarrow"),
         not_stdlib=frozenset({"asyncio", "random", "threading"}),
     ),
     # The trace's own command line reads site files; the composition root loads it where it is asked for.
@@ -259,6 +259,7 @@ EXCLUSIVE: dict[str, str] = {
     "can": "onboard/io/pycan.py",
     "cantools": "onboard/wire/dbc_file.py",
     "distributed": "bus_sim/campaign/engine.py",
+    "pyarrow": "onboard/trace/columns/parquet.py",
     "ortools": "bus_sim/systems/car_park/compare/optimum.py",
 }
 
