@@ -141,8 +141,6 @@ def test_what_is_wrong_with_a_log_is_counted_and_the_rest_is_read(tmp_path: Path
     ("text", "guess"),
     [
         (b"\x7fELF\x02\x01\n\0\0", "it looks like a program; name a log"),
-        (b"LOGG\x90\0\0\0\n\0", "it looks like a Vector BLF log; write it anew as ASC: can_logconvert LOG LOG.asc"),
-        (b";$FILEVERSION=1.1\n;\n 1) 2 Rx 0300 8 00\n", "it looks like a PEAK TRC log; write it anew as ASC"),
         (b"timestamp,arbitration_id\n1,2\n", "it looks like python-can's CSV; write it anew as ASC"),
         (b"\xd4\xc3\xb2\xa1\x02\0\x04\0", "it looks like a pcap capture; write it anew as pcapng: editcap"),
         (b"\x1f\x8b\x08\0\n", "it looks like packed by gzip; unpack it first"),

@@ -106,10 +106,14 @@ class Log:
         return _Watched(self._file, self._bar)
 
     def _placed(self, watched: "_Watched") -> Iterator[tuple[int, RawFrame]] | None:
-        """Frames of a binary log or an ASC one, with their places; None for what is read as candump's."""
+        """Frames of every format but candump's, with their places; None for what is read as candump's."""
         head = watched.first_line
         if head[: len(MAGIC)] == MAGIC:
             return read_pcapng(watched.read, self.faults)
+        if head.startswith((b"LOGG", b";$FILEVERSION")):
+            from onboard.trace.readers.python_can import BLF_MAGIC, read_blf, read_trc  # noqa: PLC0415  # for these only
+
+            return (read_blf if head.startswith(BLF_MAGIC) else read_trc)(watched.read, self.faults)
         return read_asc(watched, self.faults) if _ASC.match(head) else None
 
     def _texts(self, watched: "_Watched") -> "Iterator[LogText]":
@@ -124,7 +128,7 @@ class Log:
         if not head:
             raise LogOpenError(f"{self.name}: is empty; name a log that something was written to")
         if self.faults.is_no_log:
-            known = "candump -L, Vector ASC, pcapng"
+            known = "candump -L, Vector ASC and BLF, PEAK TRC, pcapng"
             raise LogOpenError(f"{self.name}: no frame of a log that we read ({known}); {guess(head)}")
 
 
