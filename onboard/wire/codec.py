@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
-from onboard.contract.base import FrameCode
+from onboard.contract.base import FrameCode, SetFrame
 from onboard.contract.codes import Grade, Reason
 from onboard.contract.messages import (
     Call,
@@ -77,6 +77,11 @@ class Codec:
             return Reason.UNKNOWN_IDENTIFIER
         return self._known(frame.arbitration_id, frame.data)
 
+    def whole(self, arbitration_id: int, data: bytes) -> Message | None:
+        """The message of a classic data frame with a 29-bit identifier; None for a part of a set and what is none."""
+        found = self._known(arbitration_id, data)
+        return found if isinstance(found, Message) and not isinstance(found, SetFrame) else None
+
     def name_of(self, frame: Frame) -> str | None:
         """The DBC name of a frame's message, or None."""
         found = self._by_id.get(frame.arbitration_id & ~_NODE_MASK) if frame.is_extended else None
@@ -133,6 +138,11 @@ _SETS: dict[type[Message], Callable[[Any], tuple[Message, ...]]] = {
     CallForProposals: _parts_of_call,
     Itinerary: _parts_of_itinerary,
 }
+
+
+def is_one_frame(message: Message) -> bool:
+    """Whether a message of either bus is one frame, not a set."""
+    return type(message) not in _SETS
 
 
 def _wheelbase_mm(call: CallForProposals) -> int:
