@@ -32,7 +32,10 @@ JUMP_US = 100_000
 #: A clock that is far off is set anew by the second word, and that comes within two periods of 5 s, us.
 SETTLING_US = 11_000_000
 #: What the picture is made of: half of what is said on a bus is none of it.
-_TAKEN = {BusTime, TokenGrant, TokenHeld, TokenAssigned, Regeneration, Progress, ManualState, Heartbeat, Halted}
+_TAKEN = {
+    *(BusTime, TokenGrant, TokenHeld, TokenAssigned, Regeneration),
+    *(Progress, DriveState, ManualState, Heartbeat, Halted),
+}
 
 
 class BusPicture:
@@ -121,18 +124,13 @@ class BusPicture:
         return None if sensed_mm is None else body_at(self.site, body, sensed_mm)
 
     def feed(self, event: LogEvent[Message]) -> None:
-<<<<<<< HEAD
         """Take up one message before the rules see it."""
-        self.now_us = time_us = event.time_us
-=======
-        """Take up one message of the fleet bus before the rules see it."""
         self.now_us = event.time_us
         if type(event.message) in _TAKEN:
             self._take(event)
 
     def _take(self, event: LogEvent[Message]) -> None:
         time_us = event.time_us
->>>>>>> 3ad1f460
         match event.message:
             case Heartbeat() as beat:
                 if not self.boots:
