@@ -55,7 +55,7 @@ class FrameBlock:
         return self.data.view("<u8")[:, 0]
 
     def frames(self) -> Iterator[RawFrame]:
-        """The rows as frames."""
+        """One frame a row, in the order of the log, extended identifiers marked as such."""
         blob = self.data.tobytes()
         names, marks = self.channels, {UNMARKED: None, 0: False, 1: True}
         rows: Iterator[RawFrame] = map(
