@@ -26,7 +26,7 @@ def is_task(call: CallForProposals) -> bool:
     return call.depth == 0 and call.operation not in _NO_TASKS
 
 
-@dataclass
+@dataclass(slots=True)
 class CallHistory:
     """One call; times in us of the log. ``finished_us`` None: not yet, or the fleet bus does not tell."""
 
