@@ -189,6 +189,7 @@ class TokenBook:
             return False
         for table in (self.seen, self.held, self.given, self._genesis, self._disputed):
             table.pop(key, None)
+        self.gifts.discard(key)
         self.beliefs.forget(key)
         self._said_us = {said: due_us for said, due_us in self._said_us.items() if said[0] != key}
         self.changes += 1
@@ -379,10 +380,9 @@ class TokenBook:
         return key not in self.seen and self._first_holder(key) == self.node_id
 
     def _first_holder(self, key: Key) -> int:
-        found = self._genesis.get(key)
-        if found is None:
-            found = self._genesis[key] = genesis_holder(self.site, TokenKey(*key))
-        return found
+        if key not in self._genesis:
+            self._genesis[key] = genesis_holder(self.site, TokenKey(*key))
+        return self._genesis[key]
 
     def _hold(self, key: TokenKey, version: int) -> None:
         self.held[key] = self.seen[key] = version

@@ -30,7 +30,7 @@ _NODE_MASK = 0xFF
 #: What a call says where no car is meant (dbc/fleet.dbc); no site takes cars so short.
 NO_WHEELBASE_MM = 1500
 #: Decoded frames kept for the other receivers of the same frame: a simulated fleet decodes each frame once.
-_MEMORY = 4096
+_MEMORY = 1024
 #: Frames of the two contracts of all.
 _FLEET = (*presence.FRAMES, *rights.FRAMES, *calls.FRAMES, *plans.FRAMES)
 _DEVICE = device.FRAMES
