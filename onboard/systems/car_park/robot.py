@@ -102,11 +102,11 @@ class ParkingRobot:
         self.carriage.is_clear = lambda: self.shuttle.is_home
         self.carriage.route_ahead = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
         self.riding = Riding(self.fleet)
-        self.giving_way = GivingWay(self.fleet, self.program)
         self.recovery = JournalRecovery.read(self.fleet.node_id, self.fleet.entries)
         custody.replay(self.fleet, self.recovery.cars.values())
         self.fleet.tokens.before_grant = partial(custody.before_grant, self.fleet)
         self.going_around = GoingAround(self.fleet, self.generation, self.carriage, self.shuttle, self._take_up)
+        self.giving_way = GivingWay(self.fleet, self.program, self.going_around.standoff)
         self.holding = RobotHold(self.fleet, self.generation, self.carriage, self.shuttle)
         machine = RobotDevices(self.carriage, self.shuttle, self.riding)
         self.starting = Starting(
