@@ -133,6 +133,8 @@ class Presence:
     def halted_ones(self, now_us: int) -> list[Halted]:
         """What I say of machines that are silent, or stand laden, as the lowest live one that is no obstacle."""
         obstacles = self.mirror.aside
+        if not obstacles:
+            return []
         alive = self.mirror.alive(now_us)
         if self.is_held or min([node for node in alive if node not in obstacles], default=self.node_id) < self.node_id:
             return []
@@ -171,8 +173,17 @@ class Presence:
         if self._listening_since_us is None:
             self._listening_since_us = now_us
         for machine in self.site.machines.values():
-            if machine.node_id != self.node_id:
+            if machine.node_id != self.node_id and not self._takes_part(machine.node_id, now_us):
                 self._judge(machine, now_us)
+
+    def _takes_part(self, node: int, now_us: int) -> bool:
+        """Whether a machine takes part as it did, with nothing said or known against it."""
+        peer = self.mirror.peers.get(node)
+        if peer is None or now_us - peer.heard_at_us >= self.patience_us or peer.state in STILL:
+            return False
+        if node in self.mirror.aside or node in self.halts or node in self.foreign:
+            return False
+        return not self.mirror.stands(node, now_us)
 
     def _begin_anew(self, now_us: int) -> None:
         """I have not listened for a while myself: everybody gets the time to be heard again."""

@@ -38,6 +38,7 @@ from onboard.contract.messages import (
     TokenRequest,
 )
 from onboard.core.authority import TokenKey, station_token
+from onboard.core.behaviour import NEVER_US, OverheardWord
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, NegotiationEvent
 from onboard.core.serial import successor
@@ -276,9 +277,13 @@ class Compartment:
         due = [time for time in (retry_us, self.stewardship.next_wake()) if time is not None]
         return min(due, default=None)
 
-    def watches(self, now_us: int) -> bool:
+    def looks_from(self) -> int:
         """It looks often whether an award of its own was never heard."""
-        return self.job is not None and not self.job.winner
+        return 0 if self.job is not None and not self.job.winner else NEVER_US
+
+    def heeds(self, message: OverheardWord) -> bool:
+        """Others' rights and places are nothing to it."""
+        return False
 
     def statements(self, now_us: int) -> list[Effect]:
         """The cars in my custody and the tokens that I hold."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from onboard.contract.codes import CallResult, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
+from onboard.contract.codes import CallResult, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase, TokenKind
 from onboard.contract.messages import (
     Award,
     CallForProposals,
@@ -13,13 +13,14 @@ from onboard.contract.messages import (
     Itinerary,
     ManualOrder,
     Message,
+    Progress,
     Reference,
     ShuttleState,
     Stamp,
     TaskReport,
 )
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import BehaviourFactory, Fleet
+from onboard.core.behaviour import BehaviourFactory, Fleet, OverheardWord
 from onboard.core.effects import Effect, Halt, Report, Send
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import (
@@ -335,11 +336,18 @@ class ParkingRobot:
         due = [time for time in times if time is not None]
         return min(due) if due else None
 
-    def watches(self, now_us: int) -> bool:
+    def looks_from(self) -> int:
         """It looks often while it starts, waits for a slot or rides, and for a drive that got stuck, or goes again."""
         step = self.program.step
         waits = self.carriage.blocked is not None or (step is not None and step.action is LegAction.RIDE)
-        return waits or not self.starting.is_over or self.going_around.drive_changes(now_us)
+        return 0 if waits or not self.starting.is_over else self.going_around.drive_changes_from()
+
+    def heeds(self, message: OverheardWord) -> bool:
+        """Where lifts are, and who has a station or a car; of slots it knows what it has, and waits for."""
+        if isinstance(message, Progress):
+            machine = self.fleet.site.machines.get(message.sender)
+            return machine is not None and machine.kind is KindCode.LIFT
+        return message.token_kind is not TokenKind.SEGMENT
 
     def statements(self, now_us: int) -> list[Effect]:
         """My firm itinerary as I told it under its version, where I am in it, and the tokens that I hold."""
