@@ -16,8 +16,6 @@ class ToldDrops:
 
     def words(self, sender: int, totals: Counter[Reason]) -> list[Effect]:
         """One message for each reason whose count has grown since it was told."""
-        if totals == self._told:
-            return []
         grown = [reason for reason in sorted(totals) if totals[reason] != self._told[reason]]
         self._told = totals
         return [Send(Diagnostic(sender, reason, totals[reason] & 0xFFFFFFFF)) for reason in grown]

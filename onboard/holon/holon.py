@@ -452,7 +452,8 @@ class Holon:
         return effects
 
     def _all_drops(self) -> Counter[Reason]:
-        return sum(self.wire_drops, Counter(self.drops))
+        counts = [one for one in (self.drops, *self.wire_drops) if one]
+        return sum(counts, Counter()) if counts else Counter()
 
     def _heartbeat(self) -> Heartbeat:
         return Heartbeat(

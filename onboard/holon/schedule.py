@@ -40,6 +40,8 @@ class Schedule:
     _work_due_us: int | None = None
     #: Who said last what changes nothing, by node.
     _unchanged: dict[int, Peer] = field(default_factory=dict)
+    #: The mirror, the epoch of the rights, and whether I send bus time, as they were when that was found.
+    _ground: tuple[int, int, bool] | None = None
     _attentive: Attentive | None = field(init=False)
 
     def __post_init__(self) -> None:
@@ -55,8 +57,6 @@ class Schedule:
     def changed(self) -> None:
         """Something happened here that any part may have to do with."""
         self.is_known, self.waits_until_us = False, 0
-        if self._unchanged:
-            self._unchanged.clear()
 
     # --- when --------------------------------------------------------------------------------------------------
 
@@ -65,6 +65,7 @@ class Schedule:
         if not self.is_known:
             self._work_due_us, self.is_known = self._first_work_us(), True
             self._is_due_from()
+            self._keep_unchanged()
         return self._due_us
 
     def has_spoken(self) -> None:
@@ -77,11 +78,11 @@ class Schedule:
             self.waits_until_us = min(due_us, self._attentive.looks_from())
 
     def _first_work_us(self) -> int | None:
-        part = self.part
+        part, is_apart = self.part, self.part.holding.is_apart
         times = [part.holding.next_wake(), part.regeneration.next_wake(), part.presence.held_until_us]
-        if not part.holding.is_apart:
+        if not is_apart:
             times.append(part.witness.next_wake())
-        if part.deals:
+        if not (is_apart or part.regeneration.is_frozen):
             times += (self.fleet.tokens.next_wake(), self.rights.petition_due())
         if part.begins:
             # In the negotiation nothing is due while bus time is lost: its deadlines mean nothing then. What the last
@@ -105,6 +106,7 @@ class Schedule:
     def lives_on(self, beat: Heartbeat, now_us: int) -> bool:
         """Note the time of a sign of life that says nothing new, and nothing else; False where it may be news."""
         if now_us >= self.waits_until_us:
+            self._unchanged.pop(beat.sender, None)
             return False
         peer = self._unchanged.get(beat.sender)
         if peer is None or peer.beat is not beat or now_us - peer.heard_at_us > self._sleeps_after_us:
@@ -117,10 +119,20 @@ class Schedule:
 
     def _is_unchanged(self, beat: Heartbeat, now_us: int) -> bool:
         if not self.part.lives_on(beat, now_us):
+            self._unchanged.pop(beat.sender, None)
             return False
         peer = self._unchanged[beat.sender] = self.fleet.mirror.peers[beat.sender]
         peer.beat = beat
         return True
+
+    def _keep_unchanged(self) -> None:
+        """Let go of whose word said nothing new, unless all that this was judged by is as it was."""
+        part, mirror = self.part, self.fleet.mirror
+        is_usual = not (mirror.aside or part.presence.foreign or part.presence.halts) and part.deals
+        ground = mirror.digest(), part.regeneration.epoch, part.time.clock.is_source
+        if ground != self._ground or not is_usual:
+            self._unchanged.clear()
+        self._ground = ground
 
     def before(self, message: Message, now_us: int) -> int | None:
         """The state of my rights before a message that may be none of my business; None for what changes everything.
