@@ -38,6 +38,8 @@ class Schedule:
     _due_us: int | None = None
     #: The same of all but what is said at fixed times.
     _work_due_us: int | None = None
+    #: From when on the behaviour is to see every event.
+    _looks_from_us: int = 0
     #: Who said last what changes nothing, by node.
     _unchanged: dict[int, Peer] = field(default_factory=dict)
     #: The mirror, the epoch of the rights, and whether I send bus time, as they were when that was found.
@@ -64,6 +66,7 @@ class Schedule:
         """When the first of all parts has something to do: a matter of what they know, not of when that is asked."""
         if not self.is_known:
             self._work_due_us, self.is_known = self._first_work_us(), True
+            self._looks_from_us = self._attentive.looks_from() if self._attentive is not None else 0
             self._is_due_from()
             self._keep_unchanged()
         return self._due_us
@@ -74,8 +77,8 @@ class Schedule:
 
     def _is_due_from(self) -> None:
         self._due_us = due_us = self.fixed.due_us(self._work_due_us)
-        if due_us is not None and self._attentive is not None:
-            self.waits_until_us = min(due_us, self._attentive.looks_from())
+        if due_us is not None:
+            self.waits_until_us = min(due_us, self._looks_from_us)
 
     def _first_work_us(self) -> int | None:
         part, is_apart = self.part, self.part.holding.is_apart
@@ -92,14 +95,14 @@ class Schedule:
 
     def only_speaks(self, local_us: int) -> bool:
         """Whether nothing but a word that is said at fixed times is due, and nobody looks for anything."""
-        if self._attentive is None or not self.is_known or not self.part.begins:
+        if not self.is_known or not self.part.begins:
             return False
         now_us = self.part.time.clock.bus_us(local_us)
         if self._work_due_us is not None and self._work_due_us <= now_us:
             return False
         if self.part.time.clock.is_lost(local_us) != self.is_time_lost or self.part.presence.slept(now_us):
             return False
-        return now_us < self._attentive.looks_from()
+        return now_us < self._looks_from_us
 
     # --- who ---------------------------------------------------------------------------------------------------
 

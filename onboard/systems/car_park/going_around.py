@@ -133,9 +133,12 @@ class GoingAround:
             self.turn_later(now_us)
         return self.take_up(kept, steps or (), works, now_us)
 
-    def drive_changes_from(self) -> int:
-        """From when on that may be so, bus us."""
-        return 0 if self.is_stuck else min(self.carriage.stall.stuck_from_us, self.shuttle.stall.stuck_from_us)
+    def looks_from(self) -> int:
+        """From when on every event counts, bus us: while it waits for a slot, rides, or a drive has got stuck."""
+        step = self.program.step
+        if self.is_stuck or self.carriage.blocked is not None or (step is not None and step.action is LegAction.RIDE):
+            return 0
+        return min(self.carriage.stall.stuck_from_us, self.shuttle.stall.stuck_from_us)
 
     def drive_changes(self, now_us: int) -> bool:
         """Whether drive or shuttle have got stuck by now, or are so no more."""

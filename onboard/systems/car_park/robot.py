@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from onboard.contract.codes import CallResult, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase, TokenKind
+from onboard.contract.codes import CallResult, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
 from onboard.contract.messages import (
     Award,
     CallForProposals,
@@ -13,7 +13,6 @@ from onboard.contract.messages import (
     Itinerary,
     ManualOrder,
     Message,
-    Progress,
     Reference,
     ShuttleState,
     Stamp,
@@ -333,21 +332,15 @@ class ParkingRobot:
         step = self.program.step
         if step is not None and self._begun:
             times.append(step.end_us if step.action is LegAction.STAND else step.end_us + OVERDUE_US)
-        due = [time for time in times if time is not None]
-        return min(due) if due else None
+        return min([time for time in times if time is not None], default=None)
 
     def looks_from(self) -> int:
         """It looks often while it starts, waits for a slot or rides, and for a drive that got stuck, or goes again."""
-        step = self.program.step
-        waits = self.carriage.blocked is not None or (step is not None and step.action is LegAction.RIDE)
-        return 0 if waits or not self.starting.is_over else self.going_around.drive_changes_from()
+        return self.going_around.looks_from() if self.starting.is_over else 0
 
     def heeds(self, message: OverheardWord) -> bool:
         """Where lifts are, and who has a station or a car; of slots it knows what it has, and waits for."""
-        if isinstance(message, Progress):
-            machine = self.fleet.site.machines.get(message.sender)
-            return machine is not None and machine.kind is KindCode.LIFT
-        return message.token_kind is not TokenKind.SEGMENT
+        return self.riding.sill.heeds(message)
 
     def statements(self, now_us: int) -> list[Effect]:
         """My firm itinerary as I told it under its version, where I am in it, and the tokens that I hold."""
@@ -422,9 +415,8 @@ class ParkingRobot:
         return [] if step.work is None else self.shuttle.begin(step.work) + self._announce_start(step.work)
 
     def _announce_start(self, work: StationWork) -> list[Effect]:
-        if work.handling is CarHandling.LEAVE:
-            return []
-        return [self._report(work.call.task, TaskPhase.STARTED, work.station.number)]
+        is_left = work.handling is CarHandling.LEAVE
+        return [] if is_left else [self._report(work.call.task, TaskPhase.STARTED, work.station.number)]
 
     def _carry_on(self, step: CarStep, now_us: int) -> list[Effect]:
         if step.action is LegAction.RIDE:
