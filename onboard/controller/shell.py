@@ -130,7 +130,7 @@ class Controller:
             except Exception as error:  # noqa: BLE001  # as in ``_guarded``, without its call: this is for every frame
                 self._give_up(error)
             # Where nothing is to be said and nothing can have fallen due, all is as it was when this was done last.
-            if self._outbox or not self.holon.schedule.is_known:
+            if self._outbox or not self.holon.schedule.is_asked:
                 self._carry_out()
         elif len(self._inbox) < INBOX_LIMIT:
             self._inbox.append((handle, frame, time_us))

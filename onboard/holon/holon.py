@@ -173,6 +173,7 @@ class Holon:
         why = self.admission.why_not(message)
         if why is not Reason.NONE:
             self.drops[why] += 1
+            self.schedule.changed()
             return self.admission.passed_over(message, why) if self.halted is None else []
         self.holding.heard(now_us)
         if isinstance(message, BusTime):
@@ -293,7 +294,12 @@ class Holon:
         heard = self.time.hear(message, local_us)
         now_us = self.clock.bus_us(local_us)
         self.witness.shift(now_us - before_us)
+        was_lost = self.schedule.is_time_lost
         self.schedule.is_time_lost &= heard in (TimeHeard.NOTHING, TimeHeard.REFUTED)
+        if heard in (TimeHeard.NOTHING, TimeHeard.FOLLOWED) and self.schedule.is_time_lost is was_lost:
+            self.schedule.slewed()
+            return []
+        self.schedule.changed()
         match heard:
             case TimeHeard.REFUTED:
                 return [self.fixed.bus_time(now_us)]
@@ -418,6 +424,9 @@ class Holon:
 
     def _approve(self, effects: list[Effect]) -> list[Effect]:
         """What of all effects may leave this machine: nothing moves without authority, nor is a right said without."""
+        if not effects:
+            self.fleet.motion.event += 1
+            return effects
         fault = self.fleet.motion.fault(effects, self.site.moved_by)
         if fault is not None:
             return self._halt(fault, Reason.NOT_AUTHORISED)

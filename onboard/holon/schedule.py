@@ -7,7 +7,7 @@ next. ``sweeps`` keeps nothing: every event is followed by every part, so that a
 from dataclasses import dataclass, field
 from typing import ClassVar, get_args
 
-from onboard.contract.messages import Heartbeat, Message
+from onboard.contract.messages import BusTime, Heartbeat, Message
 from onboard.core.behaviour import Attentive, Behaviour, Fleet, OverheardWord
 from onboard.core.mirror import Peer
 from onboard.holon.fixed_times import FixedTimes
@@ -32,6 +32,8 @@ class Schedule:
     behaviour: Behaviour
     #: Whether what is kept here holds, and until when nothing is to be done unless something happens.
     is_known: bool = False
+    #: Whether somebody has asked when that is since it was another time.
+    is_asked: bool = False
     waits_until_us: int = 0
     #: Whether bus time was lost when this machine woke last.
     is_time_lost: bool = False
@@ -58,12 +60,20 @@ class Schedule:
 
     def changed(self) -> None:
         """Something happened here that any part may have to do with."""
-        self.is_known, self.waits_until_us = False, 0
+        self.is_known, self.is_asked, self.waits_until_us = False, False, 0
+
+    def slewed(self) -> None:
+        """Bus time went on a little faster or slower: what is due stays due, at another time of my own clock."""
+        if self.part.witness.next_wake() is None:
+            self.is_asked = False
+        else:
+            self.changed()
 
     # --- when --------------------------------------------------------------------------------------------------
 
     def due_us(self) -> int | None:
         """When the first of all parts has something to do: a matter of what they know, not of when that is asked."""
+        self.is_asked = True
         if not self.is_known:
             self._work_due_us, self.is_known = self._first_work_us(), True
             self._looks_from_us = self._attentive.looks_from() if self._attentive is not None else 0
@@ -140,12 +150,13 @@ class Schedule:
     def before(self, message: Message, now_us: int) -> int | None:
         """The state of my rights before a message that may be none of my business; None for what changes everything.
 
-        None of an obstacle is: that it is heard may end that.
+        None of an obstacle is: that it is heard may end that. What bus time changes it says itself (``slewed``).
         """
         is_candidate = type(message) in _OVERHEARD and now_us < self.waits_until_us
         if is_candidate and message.sender not in self.fleet.mirror.aside:
             return self.fleet.tokens.changes
-        self.changed()
+        if type(message) is not BusTime:
+            self.changed()
         return None
 
     def is_overheard(self, message: Message, before: int | None) -> bool:
