@@ -126,7 +126,7 @@ class Schedule:
             return self._is_unchanged(beat, now_us)
         # Who was heard so lately was neither silent nor heard by somebody who slept, or was deaf.
         peer.heard_at_us = now_us
-        self.part.presence.begins(now_us)
+        self.part.presence.active_us = now_us
         self.part.holding.heard(now_us)
         return True
 
