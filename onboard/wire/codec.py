@@ -50,7 +50,7 @@ class Codec:
         #: Which kinds of machine may say what on the bus, by the DBC.
         self.speakers = speakers_of(frames)
         #: A whole message, a part of a set (``SetFrame``), or why the frame is none.
-        self.decode_part: Callable[[Frame], Message | Reason] = lru_cache(maxsize=_MEMORY)(self._decode)
+        self.decode_part = lru_cache(maxsize=_MEMORY)(self._decode)
 
     # --- out ---------------------------------------------------------------------------------------------------
 
