@@ -37,6 +37,11 @@ class RawFrame(NamedTuple):
         return self.remote_dlc if self.is_remote else len(self.data)
 
     @property
+    def is_data(self) -> bool:
+        """Whether it is a classic data frame."""
+        return not (self.is_error or self.is_remote) and self.fd_flags is None
+
+    @property
     def socketcan_id(self) -> int:
         """``can_id`` with SocketCAN's flag bits, as its filters see it."""
         flags = EFF_FLAG * self.is_extended | RTR_FLAG * self.is_remote | ERR_FLAG * self.is_error

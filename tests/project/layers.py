@@ -149,6 +149,12 @@ LAYERS: dict[str, Layer] = {
         (*CORE_TYPES, *REGISTRY, "onboard.history", "onboard.wire"),
         not_stdlib=frozenset({"asyncio", "random", "threading"}),
     ),
+    # Logs a million frames at a time: on a desk, never on a board; the rest of the trace does without.
+    "onboard.trace.columns": Layer(
+        ("onboard.core.frame", "onboard.trace", "onboard.wire"),
+        ("numpy",),
+        not_stdlib=frozenset({"asyncio", "random", "threading"}),
+    ),
     # The trace's own command line reads site files; the composition root loads it where it is asked for.
     "onboard.trace.cli": Layer((*CORE_TYPES, "onboard.config", "onboard.trace")),
     # Its commands are a composition root too: they name the contract of a site's system, and replay runs a controller.

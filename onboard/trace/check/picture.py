@@ -6,6 +6,7 @@ from onboard.contract.codes import KindCode, MachineState, ManualMode
 from onboard.contract.constants import STILL
 from onboard.contract.messages import (
     BusTime,
+    DriveState,
     Halted,
     Heartbeat,
     ManualState,
@@ -20,7 +21,7 @@ from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment, Site
 from onboard.trace.check.event import LogEvent
-from onboard.trace.check.geometry import ReportedPosition, body_of, floors_of
+from onboard.trace.check.geometry import ReportedPosition, body_at, body_of, floors_of
 from onboard.trace.check.tokens_seen import TokensSeen
 from onboard.ways.site import way_site
 
@@ -45,6 +46,8 @@ class BusPicture:
         self.offset_us: int | None = None
         self.tokens = TokensSeen(site)
         self.bodies: dict[int, ReportedPosition] = {}
+        #: Where drives last said that they are, mm by their own tape, by node: only on device buses.
+        self._sensed_mm: dict[int, int] = {}
         #: Boot counter and last sign of life, us of the log, by node.
         self.boots: dict[int, int] = {}
         self.heard_us: dict[int, int] = {}
@@ -110,20 +113,25 @@ class BusPicture:
         at = next(ways.beyond(sill) for sill in ways.tracks[lift_track].joins if sill.track == floor)
         return replace(body, track=at.track, index=at.index, position_mm=ways.position_mm(at))
 
+    def sensed(self, body: ReportedPosition) -> ReportedPosition | None:
+        """A body where its drive says that it is, told oftener than ``Progress``; None before any word of it."""
+        sensed_mm = self._sensed_mm.get(body.node)
+        return None if sensed_mm is None else body_at(self.site, body, sensed_mm)
+
     def feed(self, event: LogEvent[Message]) -> None:
-        """Take up one message of the fleet bus before the rules see it."""
+        """Take up one message before the rules see it."""
         self.now_us = time_us = event.time_us
         match event.message:
             case BusTime(bus_time_us=bus_us):
-                before_us, self.offset_us = self.offset_us, time_us - bus_us
-                if before_us is not None and abs(self.offset_us - before_us) > JUMP_US:
-                    self.clock_settles_us = max(self.clock_settles_us, time_us + SETTLING_US)
+                self._on_bus_time(bus_us, time_us)
             case TokenGrant() | TokenHeld() | TokenAssigned() | Regeneration() as word:
                 self.tokens.feed(word, time_us)
             case Progress() as progress if self._site is not None:
                 body = body_of(self._site, progress, time_us)
                 if body is not None:
                     self.bodies[progress.sender] = body
+            case DriveState(sender=node, position_mm=position_mm):
+                self._sensed_mm[node] = position_mm
             case ManualState() as state:
                 self._on_manual(state, time_us)
             case Heartbeat() as beat:
@@ -135,6 +143,11 @@ class BusPicture:
                 self._on_state(beat)
             case Halted() as word if word.sender == word.machine and word.reason in RIGHTS_LOST:
                 self.announcing.add(word.sender)
+
+    def _on_bus_time(self, bus_us: int, time_us: int) -> None:
+        before_us, self.offset_us = self.offset_us, time_us - bus_us
+        if before_us is not None and abs(self.offset_us - before_us) > JUMP_US:
+            self.clock_settles_us = max(self.clock_settles_us, time_us + SETTLING_US)
 
     def _on_state(self, beat: Heartbeat) -> None:
         if beat.state is MachineState.STARTING:

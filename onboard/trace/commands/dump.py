@@ -90,7 +90,8 @@ class _Chosen:
         self._left = count
 
     def __iter__(self) -> Iterator[RawFrame]:
-        for frame in self.log:
+        # Who asks for a number of frames gets an answer as soon as they are there.
+        for frame in self.log if self._left is None else self.log.one_by_one():
             if not any(one.passes(frame) for one in self._sets):
                 self.errors_hidden += frame.is_error and not any(one.error_mask for one in self._sets)
                 continue
