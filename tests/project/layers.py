@@ -35,7 +35,7 @@ REGISTRY = ("onboard.systems.contract", "onboard.systems.registry", "onboard.sys
 PURE_STDLIB = frozenset(
     {
         *("__future__", "abc", "array", "bisect", "collections", "contextlib", "copy", "dataclasses", "enum"),
-        *("fractions", "functools", "heapq", "itertools", "math", "numbers", "operator", "string", "struct"),
+        *("binascii", "fractions", "functools", "heapq", "itertools", "math", "numbers", "operator", "string", "struct"),
         *("types", "typing", "zlib"),
     }
 )
