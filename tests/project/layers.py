@@ -35,8 +35,8 @@ REGISTRY = ("onboard.systems.contract", "onboard.systems.registry", "onboard.sys
 PURE_STDLIB = frozenset(
     {
         *("__future__", "abc", "array", "bisect", "collections", "contextlib", "copy", "dataclasses", "enum"),
-        *("binascii", "fractions", "functools", "heapq", "itertools", "math", "numbers", "operator", "string", "struct"),
-        *("types", "typing", "zlib"),
+        *("fractions", "functools", "heapq", "itertools", "math", "numbers", "operator", "string", "struct"),
+        *("binascii", "types", "typing", "zlib"),
     }
 )
 
