@@ -108,7 +108,7 @@ class TokenBook:
     #: Words that came to nothing, by reason: the holon's own count; and who claimed a right of mine how often.
     drops: Counter[Reason] = field(default_factory=Counter)
     claimants: Counter[int] = field(default_factory=Counter)
-    #: Grows with every change of the tables above, so that nobody need look twice at the same state.
+    #: Grows with every change of what is held, given away, wanted or refused here, so that nobody need look twice.
     changes: int = 0
     _genesis: dict[Key, int] = field(default_factory=dict)
     #: Grants to me from whom I do not believe to hold the token, until that is settled.
@@ -306,7 +306,6 @@ class TokenBook:
     def on_seen(self, word: TokenSeen) -> None:
         """Somebody tells the newest that it knows: a hint."""
         self.beliefs.hint(TokenKey(word.token_kind, word.token), word.version, word.holder)
-        self.changes += 1
 
     def on_refusal(self, refusal: TokenRefusal, now_us: int) -> None:
         """Remember why the holder does not give a wanted token yet; as it remembers the request, ask less often."""
@@ -428,20 +427,19 @@ class TokenBook:
         if giver == belief.holder:
             return self._verified(key, version, holder, now_us, giver=giver)
         self.beliefs.hint(key, version, holder)
-        self.changes += 1
         return []
 
     def _verified(
         self, key: TokenKey, version: int, holder: int, now_us: int, *, confirmed: bool = False, giver: int = NOBODY
     ) -> list[Effect]:
         """The chain of beliefs goes on: my own grant has arrived with it, and a disputed one may be right now."""
-        self.changes += 1
         self.beliefs.take_up(key, version, holder, confirmed=confirmed, giver=giver)
         effects: list[Effect] = []
         pending = self.leaving.get(key)
         # Its receiver says that it holds the token, or that it gave it on: either proves that it had it.
         if pending is not None and (confirmed or version > pending.version):
             del self.leaving[key]
+            self.changes += 1
             self.backoff.forget(("leaving", key))
             self.given[key] = Belief(pending.version, pending.holder, confirmed=True)
             effects.append(_record(TokenGoneRecord, key, pending.version, pending.holder))
@@ -452,6 +450,7 @@ class TokenBook:
         """Somebody says that what I hold is not mine: counted, named, and I keep it and say so."""
         self.drops[Reason.RIGHT_CLAIMED] += 1
         self.claimants[by] += 1
+        self.changes += 1
         first = [Report(f"node {by} claims {key.kind.name} {key.number}, which is mine")] * (self.claimants[by] == 1)
         return [*first, *self._answer(key, now_us)]
 

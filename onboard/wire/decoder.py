@@ -57,7 +57,11 @@ class Decoder:
 
     def feed(self, frame: Frame, now_us: int) -> Message | None:
         """The message that this frame completes, if any. Never raises, whatever the frame."""
-        message = self._put_together(frame, now_us)
+        part = self._codec.decode_part(frame)
+        if isinstance(part, Message) and type(part) in self._codec.wholes:
+            message: Message | None = part
+        else:
+            message = self._put_together(part, now_us)
         if message is None or self._machines is None:
             return message
         why = why_unheard(message, self._machines, self._codec.speakers)
@@ -66,13 +70,10 @@ class Decoder:
         self.drops[why] += 1
         return None
 
-    def _put_together(self, frame: Frame, now_us: int) -> Message | None:
-        part = self._codec.decode_part(frame)
+    def _put_together(self, part: Message | Reason, now_us: int) -> Message | None:
         if isinstance(part, Reason):
             self.drops[part] += 1
             return None
-        if not isinstance(part, SetFrame):
-            return part
         if self._sets or self._whole:
             self._expire(now_us)
         match part:

@@ -36,7 +36,7 @@ PURE_STDLIB = frozenset(
     {
         *("__future__", "abc", "array", "bisect", "collections", "contextlib", "copy", "dataclasses", "enum"),
         *("fractions", "functools", "heapq", "itertools", "math", "numbers", "operator", "string", "struct"),
-        *("types", "typing", "zlib"),
+        *("binascii", "types", "typing", "zlib"),
     }
 )
 

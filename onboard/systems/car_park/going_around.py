@@ -61,7 +61,7 @@ class GoingAround:
     _retry_at_us: int | None = None
     #: Plans and cars heard, what was known when places were last looked at, and when to look again.
     _heard: int = 0
-    _places_seen: tuple[int, int] = (-1, -1)
+    _places_seen: tuple[int, ...] = ()
     _place_at_us: int | None = None
     #: Since when somebody stands in my way for ever, by its plan.
     _stands_since_us: int | None = None
@@ -132,6 +132,13 @@ class GoingAround:
         if steps is None:
             self.turn_later(now_us)
         return self.take_up(kept, steps or (), works, now_us)
+
+    def looks_from(self) -> int:
+        """From when on every event counts, bus us: while it waits for a slot, rides, or a drive has got stuck."""
+        step = self.program.step
+        if self.is_stuck or self.carriage.blocked is not None or (step is not None and step.action is LegAction.RIDE):
+            return 0
+        return min(self.carriage.stall.stuck_from_us, self.shuttle.stall.stuck_from_us)
 
     def drive_changes(self, now_us: int) -> bool:
         """Whether drive or shuttle have got stuck by now, or are so no more."""
@@ -224,7 +231,7 @@ class GoingAround:
 
     def _leave_elsewhere(self, now_us: int) -> list[Effect]:
         """A car whose place has become another's goes to a place that is free."""
-        changed = (self.fleet.tokens.changes, self._heard)
+        changed = (self.fleet.tokens.changes, self.fleet.tokens.beliefs.changes, self._heard)
         retries = self._place_at_us is not None and self._place_at_us <= now_us
         if changed == self._places_seen and not retries:
             return []
