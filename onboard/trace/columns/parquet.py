@@ -6,7 +6,7 @@ from typing import Any, Self
 
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]  # it comes without types
-import pyarrow.parquet as pq  # type: ignore[import-untyped]  # same
+import pyarrow.parquet as pq  # type: ignore[import-untyped]  # it comes without types
 
 from onboard.core.site import Site
 from onboard.trace.columns.block import FrameBlock

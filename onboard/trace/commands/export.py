@@ -37,8 +37,8 @@ def run(args: argparse.Namespace) -> int:
     """Write the tables, and tell what is in none. Raises ``TraceError``."""
     try:
         from onboard.trace.columns.parquet import export  # noqa: PLC0415  # its libraries are an extra
-        from onboard.trace.columns.reading import blocks_of  # noqa: PLC0415  # same
-        from onboard.trace.columns.signals import SignalDecoder  # noqa: PLC0415  # same
+        from onboard.trace.columns.reading import blocks_of  # noqa: PLC0415  # its libraries are an extra
+        from onboard.trace.columns.signals import SignalDecoder  # noqa: PLC0415  # its libraries are an extra
     except ImportError as error:
         raise TraceError("export: its libraries are missing; pip install 'onboard-fleet[parquet]'") from error
     site, folder = site_of(args), args.parquet

@@ -42,7 +42,7 @@ class AscWriter:
         self._file.write(f"{seconds:4d}.{microseconds:06d} {_event(bus, frame)}\n")
 
     def close(self) -> None:
-        """The last line."""
+        """Write the line that ends the log; a log without frames stays empty."""
         if self._start_us is not None:
             self._file.write("End TriggerBlock\n")
 
