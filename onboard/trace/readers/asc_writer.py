@@ -42,7 +42,7 @@ class AscWriter:
         self._file.write(f"{seconds:4d}.{microseconds:06d} {_event(bus, frame)}\n")
 
     def close(self) -> None:
-        """End the block, without which other readers take the file for cut off; nothing where no frame was written."""
+        """Write the line that ends the log; a log without frames stays empty."""
         if self._start_us is not None:
             self._file.write("End TriggerBlock\n")
 
