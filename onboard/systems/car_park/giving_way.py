@@ -18,6 +18,7 @@ from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Stamp
 from onboard.core.authority import segment_token
 from onboard.systems.car_park.program import CarStep, Program
+from onboard.systems.car_park.standoff import Standoff
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayFleet
 from onboard.ways.passing import TOLERANCE_US
@@ -41,13 +42,17 @@ class GivingWay:
 
     fleet: WayFleet
     program: Program
+    standoff: Standoff
     #: To whose work, by its stamp, my way back was told again last.
     _answered: tuple[int, Stamp] | None = None
 
     def heed(self, sender: int, now_us: int) -> YieldDecision:
         """What the newest plan of ``sender`` means; at LATER the program is told again, mostly with other times."""
+        first = self.standoff.goes_first(sender, now_us)
+        if first == sender:
+            return self.fall_back(sender, now_us)
         meetings = self._meetings(sender, now_us)
-        unordered = [meeting for meeting in meetings if meeting.first is None]
+        unordered = [meeting for meeting in meetings if meeting.first is None and first == NOBODY]
         yields = self.fleet.mirror.order.who_yields(self.fleet.node_id, sender, unordered) if unordered else NOBODY
         if any(self._has_to_turn(meeting, sender, yields) for meeting in unordered):
             return YieldDecision.ANEW

@@ -26,6 +26,23 @@ class Standoff:
     carriage: Carriage
     due_us: int | None = None
     _with: int = NOBODY
+    _turned: tuple[int, int] = NOBODY, 0
+
+    def turned(self, other: int, now_us: int) -> None:
+        """I have found another way, away from ``other``: it comes behind me on that."""
+        self._turned = other, now_us + 2 * PATIENCE_US
+
+    def goes_first(self, other: int, now_us: int) -> int:
+        """Who of me and ``other`` goes first wherever we meet, because of who turned; NOBODY where nobody had to.
+
+        One decision for all slots: if each turned for the slots that the other has a right to, both would answer each
+        other's plans for ever.
+        """
+        node, until_us = self._turned
+        if node == other and now_us < until_us:
+            return self.fleet.node_id
+        is_first = self._with == other and self.fleet.mirror.order.ranks_before(self.fleet.node_id, other)
+        return other if is_first else NOBODY
 
     def look(self, now_us: int) -> int:
         """The robot to turn away from, once that is due; NOBODY else."""
