@@ -106,6 +106,8 @@ def test_a_way_back_that_is_begun_is_told_again_and_goes_on() -> None:
     version = back.program.version
     assert back.hears(busy.told(), 199 * MS) is YieldDecision.LATER
     assert back.program.version != version
+    busy.program.shift(0)
+    assert back.hears(busy.told(), 199 * MS) is YieldDecision.NOTHING, "once, or they would answer each other for ever"
     assert busy.hears(back.told(), 199 * MS) is YieldDecision.ANEW
 
 

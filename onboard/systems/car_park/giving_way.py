@@ -43,6 +43,8 @@ class GivingWay:
     fleet: WayFleet
     program: Program
     standoff: Standoff
+    #: To whose work, by its stamp, my way back was told again last.
+    _answered: tuple[int, Stamp] | None = None
 
     def heed(self, sender: int, now_us: int) -> YieldDecision:
         """What the newest plan of ``sender`` means; at LATER the program is told again, mostly with other times."""
@@ -62,8 +64,12 @@ class GivingWay:
         return answer
 
     def _is_counted_on(self, sender: int) -> bool:
+        """Whether ``sender`` has to hear that I go on: once for its work, or two would answer each other for ever."""
         plan = self.fleet.mirror.itineraries.get(sender)
-        return plan is not None and has_work(plan) and not self.program.works()
+        if plan is None or not has_work(plan) or self.program.works() or self._answered == (sender, plan.stamp):
+            return False
+        self._answered = sender, plan.stamp
+        return True
 
     def stamp_for(self, sender: int, now_us: int) -> Stamp:
         """Under which stamp I make room for ``sender``: its own where I only stand in its way, without work."""
