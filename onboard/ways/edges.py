@@ -8,7 +8,7 @@ where they leave no departure all longer runs are out of the question too.
 """
 
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 
 from onboard.core.site import Segment
 from onboard.ways.departures import Departures, Held
@@ -16,18 +16,23 @@ from onboard.ways.kinematics import ceil_ms
 from onboard.ways.lifts import platform
 from onboard.ways.occupancy import Sweep, junction_segments
 from onboard.ways.reservations import FOREVER, Reservations
-from onboard.ways.roads import Move, Roads
+from onboard.ways.roads import Roads
 from onboard.ways.stops import paying_until_us
 
-_NOTHING_HELD: dict[int, Held] = {}
+_MS = 1_000
+#: Sets of goals for which a state keeps its edges.
+_MAX_GOAL_SETS = 4
+#: Searches from different times, or of different machines, whose edges are kept.
+_MAX_KEPT = 4
 
 
 class State:
-    """A safe interval ``[from_us, to_us)`` for standing at a position."""
+    """A safe interval ``[from_us, to_us)`` for standing at a position; its number is its place among all states."""
 
-    __slots__ = ("edges", "from_us", "segment", "since_us", "to_goals", "to_us")
+    __slots__ = ("edges", "from_us", "number", "segment", "since_us", "to_goals", "to_us")
 
-    def __init__(self, segment: Segment, from_us: int, to_us: int) -> None:
+    def __init__(self, number: int, segment: Segment, from_us: int, to_us: int) -> None:
+        self.number = number
         self.segment = segment
         self.from_us = from_us
         self.to_us = to_us
@@ -37,84 +42,89 @@ class State:
         self.to_goals: dict[frozenset[Segment], list[Edge]] = {}
 
 
-class Edge:
-    """A move that leads from one state to another, if it departs during ``[first_us, last_us)``.
+#: A move that leads from one state to another if it departs during ``[first, last)``: first, last, until, duration, the
+#: number of the state that it leads to, what the carrier drives in mm (nothing on a lift), clear. It pays to make it
+#: only while one stands here before ``until``. Departures are bounds, some may be safe at most, unless clear is
+#: ``SAFE``: until ``clear`` those sweeps are clear that a run shares with all longer ones. A plain tuple of integers:
+#: thousands are kept, and what refers to nothing else the collector of garbage leaves alone.
+Edge = tuple[int, int, int, int, int, int, int]
+SAFE = -1
+#: What is left of a bound that was looked at.
+NO_EDGE: Edge = (0, 0, 0, 0, 0, 0, SAFE)
+_NEVER_CLEAR = 0
 
-    It pays to make it only while one stands here before ``until_us``. Whoever could depart at ``asked_us`` or later
-    departs at ``departs_us`` if it can wait until then.
+#: Begins and ends of the windows that others hold of a segment, and when the move enters and leaves it.
+_Check = tuple[Sequence[int], Sequence[int], int, int]
+
+
+def _first_safe(checks: list[_Check], depart_us: int, last_us: int) -> tuple[int, int]:
+    """The first of the departures in ``[depart, last)`` that are safe; FOREVER for none, and the last one behind it.
+
+    It gets later whenever a check meets what is held, until all of them are clear. A whole millisecond.
+    """
+    until_us, count = FOREVER, len(checks)
+    place = clear = 0
+    while clear < count:
+        begins, ends, enter_us, leave_us = checks[place]
+        meets = bisect_right(ends, depart_us + enter_us)
+        if meets < len(ends):
+            clear_us = begins[meets] - leave_us
+            if clear_us < depart_us:
+                depart_us = -((enter_us - ends[meets]) // _MS) * _MS
+                if depart_us >= last_us:
+                    return FOREVER, FOREVER
+                clear, until_us = 0, FOREVER
+                continue
+            until_us = min(until_us, clear_us)
+        clear += 1
+        place = place + 1 if place + 1 < count else 0
+    return depart_us, until_us
+
+
+class _Shared:
+    """What runs in one direction share: the ``known`` first sweeps, and the departures ``[from, to)`` that these leave.
+
+    The first departures are clear of them until ``clear_us``.
     """
 
-    __slots__ = (
-        "asked_us",
-        "departs_us",
-        "distance_mm",
-        "duration_us",
-        "first_us",
-        "is_ride",
-        "last_us",
-        "sweeps",
-        "there",
-        "until_us",
-    )
+    __slots__ = ("_held", "_index", "_longest", "_step", "clear_us", "from_us", "known", "to_us")
 
-    def __init__(self, there: State, move: Move, first_us: int, last_us: int, until_us: int, sweeps: "_Sweeps") -> None:
-        self.there = there
-        self.duration_us = move.duration_us
-        self.distance_mm = move.distance_mm
-        self.is_ride = move.lift_track is not None
-        self.first_us = first_us
-        self.last_us = last_us
-        self.until_us = until_us
-        self.sweeps = sweeps
-        self.asked_us = FOREVER
-        self.departs_us = 0
+    def __init__(
+        self, longest: tuple[Sweep, ...], held: dict[int, Held], index: int, step: int, from_us: int, to_us: int
+    ) -> None:
+        self._longest, self._held, self._index, self._step = longest, held, index, step
+        self.from_us, self.to_us = from_us, to_us
+        self.clear_us, self.known = FOREVER, 0
 
-    def departure_us(self, from_us: int) -> int:
-        """The first departure at ``from_us`` (whole milliseconds) or later, within the edge's own; FOREVER for none."""
-        if self.asked_us <= from_us <= self.departs_us:
-            return self.departs_us
-        self.asked_us = from_us
-        self.departs_us = self._find(from_us)
-        return self.departs_us
+    def take(self, count: int) -> None:
+        """Take the first ``count`` sweeps into account."""
+        from_us, clear_us, known = self.from_us, self.clear_us, self.known
+        held, index, step = self._held, self._index, self._step
+        while known < count and from_us < self.to_us:
+            offset, enter_us, leave_us = self._longest[known]
+            known += 1
+            windows = held.get(index + step * offset)
+            if windows is None:
+                continue
+            begins, ends = windows
+            meets = bisect_right(ends, from_us + enter_us)
+            if meets == len(ends):
+                continue
+            if begins[meets] - leave_us < from_us:
+                from_us = -((enter_us - ends[meets]) // _MS) * _MS
+                known, clear_us = 0, FOREVER
+            else:
+                clear_us = min(clear_us, begins[meets] - leave_us)
+                self._end(windows, enter_us, leave_us)
+        self.from_us, self.clear_us, self.known = from_us, clear_us, known
 
-    def _find(self, depart_us: int) -> int:
-        """Try each sweep in turn, later whenever one meets what is held, until all of them are clear."""
-        last_us = self.last_us
-        step, held, here, sweeps, others = self.sweeps
-        get = held.get
-        place = clear = 0
-        count = len(sweeps)
-        while True:
-            while clear < count:
-                offset, enter_us, leave_us = sweeps[place]
-                windows = get(here + step * offset)
-                if windows is not None:
-                    begins, ends = windows
-                    meets = bisect_right(ends, depart_us + enter_us)
-                    if meets < len(ends) and begins[meets] < depart_us + leave_us:
-                        depart_us = -((enter_us - ends[meets]) // 1000) * 1000
-                        if depart_us >= last_us:
-                            return FOREVER
-                        clear = 0
-                        continue
-                clear += 1
-                place = place + 1 if place + 1 < count else 0
-            before_us = depart_us
-            for (begins, ends), enter_us, leave_us in others:
-                meets = bisect_right(ends, depart_us + enter_us)
-                while meets < len(ends) and begins[meets] < depart_us + leave_us:
-                    depart_us = -((enter_us - ends[meets]) // 1000) * 1000
-                    if depart_us >= last_us:
-                        return FOREVER
-                    meets = bisect_right(ends, depart_us + enter_us)
-            if depart_us == before_us:
-                return depart_us
-            clear = 0
-
-
-#: Direction, what is held on the track by index, the index of the start, the sweeps of the run; and what else has to
-#: be free, with when the move enters and leaves it.
-_Sweeps = tuple[int, dict[int, Held], int, tuple[Sweep, ...], tuple[tuple[Held, int, int], ...]]
+    def _end(self, windows: Held, enter_us: int, leave_us: int) -> None:
+        """The last departure is found as the first one is, from the other side."""
+        begins, ends = windows
+        meets = bisect_right(ends, self.to_us - 1 + enter_us)
+        while meets < len(ends) and begins[meets] - leave_us < self.to_us - 1:
+            self.to_us = begins[meets] - leave_us + 1
+            meets = bisect_right(ends, self.to_us - 1 + enter_us)
 
 
 class Edges:
@@ -123,6 +133,8 @@ class Edges:
     def __init__(self, departures: Departures) -> None:
         self.departures = departures
         self._roads: Roads = departures.roads
+        #: All states that were asked for, by their numbers.
+        self.numbered: list[State] = []
         self._states: dict[Segment, list[State]] = {}
         self._until_us: dict[int, dict[int, int]] = {}
 
@@ -131,7 +143,11 @@ class Edges:
         found = self._states.get(segment)
         if found is None:
             safe = self.departures.standing(segment)
-            found = self._states[segment] = [State(segment, from_us, to_us) for from_us, to_us in safe]
+            numbers = enumerate(safe, start=len(self.numbered))
+            found = self._states[segment] = [
+                State(number, segment, from_us, to_us) for number, (from_us, to_us) in numbers
+            ]
+            self.numbered += found
         return found
 
     def state_at(self, segment: Segment, time_us: int) -> State | None:
@@ -146,8 +162,9 @@ class Edges:
         if from_us < state.since_us:
             state.since_us = from_us
             state.to_goals.clear()
-            until_us = self._paying_until(state.segment.track)
-            state.edges = [*self._runs(state, from_us, until_us), *self._hops(state, from_us)]
+            state.edges = self._runs(state, from_us, self._paying_until(state.segment.track))
+            if self._roads.hops(state.segment):
+                state.edges += self._hops(state, from_us)
         return state.edges
 
     def to_goals(self, state: State, goals: frozenset[Segment]) -> list[Edge]:
@@ -159,10 +176,9 @@ class Edges:
             on_track = {
                 one.index: FOREVER for one in goals if one.track == track and until_us.get(one.index, FOREVER) < FOREVER
             }
-            found = list(self._runs(state, state.since_us, on_track)) if on_track else []
             if len(state.to_goals) >= _MAX_GOAL_SETS:
                 state.to_goals.clear()
-            state.to_goals[goals] = found
+            found = state.to_goals[goals] = self._runs(state, state.since_us, on_track) if on_track else []
         return found
 
     def _paying_until(self, track: int) -> dict[int, int]:
@@ -171,84 +187,104 @@ class Edges:
             found = self._until_us[track] = paying_until_us(self.departures, track)
         return found
 
-    def _runs(self, state: State, from_us: int, until_us: dict[int, int]) -> Iterator[Edge]:
+    def _runs(self, state: State, from_us: int, until_us: dict[int, int]) -> list[Edge]:
         """Runs along the track to indices of ``until_us`` that is later than ``from_us``, by growing index."""
-        down = list(self._runs_towards(state, from_us, -1, until_us))
-        yield from reversed(down)
-        yield from self._runs_towards(state, from_us, 1, until_us)
+        return self._runs_towards(state, from_us, -1, until_us)[::-1] + self._runs_towards(state, from_us, 1, until_us)
 
-    def _runs_towards(self, state: State, from_us: int, step: int, until_us: dict[int, int]) -> Iterator[Edge]:
-        roads, here = self._roads, state.segment
-        track, index = here.track, here.index
-        longest, held = roads.longest(track), self.departures.held_on(track)
-        depart_us, known = from_us, 0
-        for move in roads.runs(here, step):
-            there = move.destination.index
-            if until_us.get(there, 0) <= from_us:
+    def _runs_towards(self, state: State, from_us: int, step: int, until_us: dict[int, int]) -> list[Edge]:
+        """Runs in one direction, the nearest first."""
+        found: list[Edge] = []
+        here = state.segment
+        held = self.departures.held_on(here.track)
+        shared = _Shared(self._roads.longest(here.track), held, here.index, step, from_us, state.to_us)
+        for (there, duration_us, distance_mm, _), alike in self._roads.runs(here, step):
+            pays_us = until_us.get(there.index, 0)
+            if pays_us <= from_us:
                 continue
-            alike = roads.alike(track, abs(there - index))
-            while known < alike:
-                offset, enter_us, leave_us = longest[known]
-                windows = held.get(index + step * offset)
-                known += 1
-                if windows is not None:
-                    begins, ends = windows
-                    meets = bisect_right(ends, depart_us + enter_us)
-                    if meets < len(ends) and begins[meets] < depart_us + leave_us:
-                        depart_us = -((enter_us - ends[meets]) // 1000) * 1000
-                        known = 0
-                        if depart_us >= state.to_us:
-                            return
-            sweeps: _Sweeps | None = None
-            for one in self.states(move.destination):
-                first_us, last_us = (
-                    max(depart_us, ceil_ms(one.from_us - move.duration_us)),
-                    one.to_us - move.duration_us,
-                )
-                if first_us >= state.to_us:
+            if shared.known < alike:
+                shared.take(alike)
+                if shared.from_us >= shared.to_us:
                     break
+            depart_us, to_us = shared.from_us, shared.to_us
+            for one in self.states(there):
+                last_us = one.to_us - duration_us
+                if depart_us >= last_us:
+                    continue
+                first_us = max(depart_us, -((duration_us - one.from_us) // _MS) * _MS)
+                if first_us >= to_us:
+                    break
+                last_us = min(last_us, to_us)
                 if first_us < last_us:
-                    if sweeps is None:
-                        sweeps = self._swept(here, move, step, held)
-                    yield Edge(one, move, first_us, min(last_us, state.to_us), until_us[there], sweeps)
+                    found.append((first_us, last_us, pays_us, duration_us, one.number, distance_mm, shared.clear_us))
+        return found
 
-    def _swept(self, here: Segment, move: Move, step: int, held: dict[int, Held]) -> _Sweeps:
-        """What a run sweeps; from or to a platform it crosses the lift's sill while the platform is there."""
-        there = move.destination
-        sweeps = self._roads.sweeps(here.track, abs(there.index - here.index))
-        reach = -sweeps[0].offset
-        sills = tuple(
-            (self.departures.held(position), sweep.enter_us, sweep.leave_us)
-            for position, sweep in ((here, sweeps[reach]), (there, sweeps[-1 - reach]))
-            if self._roads.lift_at(position) is not None
-        )
-        # The last ones first: what all runs share was free at the edge's first departure.
-        return step, held, here.index, sweeps[::-1], sills
-
-    def _hops(self, state: State, from_us: int) -> Iterator[Edge]:
+    def _hops(self, state: State, from_us: int) -> list[Edge]:
         """Hops to other tracks and rides on a lift."""
-        for move in self._roads.hops(state.segment):
-            if move.lift_track is not None:
-                taken = [platform(move.lift_track)]
-            else:
-                taken = junction_segments(self._roads.site, state.segment, move.destination)
-            free = tuple((self.departures.held(segment), 0, move.duration_us) for segment in taken)
-            for one in self.states(move.destination):
-                first_us, last_us = max(from_us, ceil_ms(one.from_us - move.duration_us)), one.to_us - move.duration_us
-                if first_us >= state.to_us:
-                    break
-                if first_us < last_us:
-                    yield Edge(one, move, first_us, min(last_us, state.to_us), FOREVER, (1, _NOTHING_HELD, 0, (), free))
+        return [
+            (first_us, last_us, FOREVER, duration_us, one.number, distance_mm, _NEVER_CLEAR)
+            for there, duration_us, distance_mm, _ in self._roads.hops(state.segment)
+            for one in self.states(there)
+            if (first_us := max(from_us, ceil_ms(one.from_us - duration_us)))
+            < (last_us := min(one.to_us - duration_us, state.to_us))
+        ]
 
+    def looked_at(self, here: State, edge: Edge) -> list[Edge]:
+        """What a bound comes to: the first departures that are safe, if any, and a bound behind them."""
+        _, last_us, until_us, duration_us, number, distance_mm, _ = edge
+        safe_us, clear_us = self._safe(here.segment, edge)
+        if safe_us >= FOREVER:
+            return []
+        behind_us = ceil_ms(clear_us + 1)
+        found = [(safe_us, min(behind_us, last_us), until_us, duration_us, number, distance_mm, SAFE)]
+        if behind_us < last_us:
+            found.append((behind_us, last_us, until_us, duration_us, number, distance_mm, _NEVER_CLEAR))
+        return found
 
-#: Sets of goals for which a state keeps its edges.
-_MAX_GOAL_SETS = 4
+    def _safe(self, here: Segment, edge: Edge) -> tuple[int, int]:
+        """The first departure of an edge that is safe, in whole milliseconds, and the last one behind it.
+
+        FOREVER for none.
+        """
+        first_us, last_us, _, duration_us, number, distance_mm, clear_us = edge
+        there = self.numbered[number].segment
+        if here.track != there.track:
+            return _first_safe(self._hop_checks(here, there, duration_us, distance_mm), first_us, last_us)
+        if first_us <= clear_us:
+            depart_us, until_us = _first_safe(self._run_checks(here, there, True), first_us, last_us)
+            if depart_us <= clear_us or depart_us >= FOREVER:
+                return depart_us, min(until_us, clear_us)
+            first_us = depart_us
+        return _first_safe(self._run_checks(here, there, False), first_us, last_us)
+
+    def _hop_checks(self, here: Segment, there: Segment, duration_us: int, distance_mm: int) -> list[_Check]:
+        lift = None if distance_mm else self._roads.lift_at(here)
+        taken = junction_segments(self._roads.site, here, there) if lift is None else [platform(lift[0])]
+        return [(*self.departures.held(segment), 0, duration_us) for segment in taken]
+
+    def _run_checks(self, here: Segment, there: Segment, is_begun: bool) -> list[_Check]:
+        """What a run sweeps that others hold; if it is begun, without what it shares with all longer runs.
+
+        From or to a platform it crosses the lift's sill while the platform is there.
+        """
+        roads, index, held = self._roads, here.index, self.departures.held_on(here.track)
+        step = 1 if there.index > index else -1
+        sweeps, alike = roads.swept(here.track, abs(there.index - index))
+        found = [
+            (*held[index + step * offset], enter_us, leave_us)
+            for offset, enter_us, leave_us in (sweeps[alike:] if is_begun else sweeps)
+            if index + step * offset in held
+        ]
+        reach = -sweeps[0].offset
+        for position, sweep in ((here, sweeps[reach]), (there, sweeps[-1 - reach])):
+            if roads.lift_at(position) is not None:
+                found.append((*self.departures.held(position), sweep.enter_us, sweep.leave_us))
+        return found
 
 
 def edges_of(
     roads: Roads, reservations: Reservations, owner: int, start_us: int, lift_floors: Mapping[int, int]
 ) -> Edges:
-    """The states and edges of what all but ``owner`` hold from ``start_us`` on, as worked out before if they still hold."""
+    """The states and edges of what all but ``owner`` hold from ``start_us`` on, kept while they do."""
     key = owner, start_us, tuple(sorted(lift_floors.items()))
     found = reservations.kept.get(key)
     if not isinstance(found, Edges):
@@ -257,7 +293,3 @@ def edges_of(
             del reservations.kept[next(iter(reservations.kept))]
         reservations.kept[key] = found
     return found
-
-
-#: Searches from different times, or of different machines, whose edges are kept.
-_MAX_KEPT = 4

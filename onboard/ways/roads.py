@@ -46,11 +46,10 @@ class Roads:
         self._hops_in: dict[Segment, list[tuple[Segment, int]]] = {}
         self._junctions: dict[int, list[Segment]] = {}
         self._platforms: dict[Segment, tuple[int, int]] = {}
-        self._runs: dict[tuple[Segment, int], tuple[Move, ...]] = {}
+        self._runs: dict[tuple[Segment, int], tuple[_Run, ...]] = {}
         self._touched: dict[Segment, list[Segment]] = {}
         self._longest: dict[int, tuple[Sweep, ...]] = {}
-        self._sweeps: dict[tuple[int, int], tuple[Sweep, ...]] = {}
-        self._alike: dict[tuple[int, int], int] = {}
+        self._swept: dict[tuple[int, int], tuple[tuple[Sweep, ...], int]] = {}
         self._ways_us: dict[frozenset[Segment], WaysToGoals] = {}
         self._to_goals: dict[frozenset[Segment], _Ways] = {}
         for track in site.tracks.values():
@@ -116,11 +115,17 @@ class Roads:
             found = self._touched[position] = aboard + alley_segments(self.site, position)
         return found
 
-    def runs(self, here: Segment, step: int) -> tuple[Move, ...]:
-        """Runs from a position along its track to lower (``step`` -1) or higher indices (1), the shortest first."""
+    def runs(self, here: Segment, step: int) -> "tuple[_Run, ...]":
+        """Runs from a position along its track to lower (``step`` -1) or higher indices (1), the shortest first.
+
+        With each how many of its first sweeps it shares with the longest run of the track.
+        """
         found = self._runs.get((here, step))
         if found is None:
-            found = self._runs[here, step] = tuple(self._find_runs(here, step))
+            moves = self._find_runs(here, step)
+            found = self._runs[here, step] = tuple(
+                (move, self.swept(here.track, abs(move.destination.index - here.index))[1]) for move in moves
+            )
         return found
 
     def hops(self, here: Segment) -> Sequence[Move]:
@@ -155,21 +160,14 @@ class Roads:
             found = self._longest[track] = leg_sweeps(self.site, track, count) if count else ()
         return found
 
-    def sweeps(self, track: int, count: int) -> tuple[Sweep, ...]:
-        """Sweeps of a run over ``count`` steps of a track."""
-        found = self._sweeps.get((track, count))
+    def swept(self, track: int, count: int) -> tuple[tuple[Sweep, ...], int]:
+        """Sweeps of a run over ``count`` steps of a track; how many of the first it shares with the longest one."""
+        found = self._swept.get((track, count))
         if found is None:
-            found = self._sweeps[track, count] = leg_sweeps(self.site, track, count)
-        return found
-
-    def alike(self, track: int, count: int) -> int:
-        """How many of its first sweeps a run over ``count`` steps shares with the longest one of the track."""
-        found = self._alike.get((track, count))
-        if found is None:
-            sweeps = self.sweeps(track, count)
+            sweeps = leg_sweeps(self.site, track, count)
             pairs = zip(sweeps, self.longest(track), strict=False)
-            found = next((n for n, (one, other) in enumerate(pairs) if one != other), len(sweeps))
-            self._alike[track, count] = found
+            alike = next((n for n, (one, other) in enumerate(pairs) if one != other), len(sweeps))
+            found = self._swept[track, count] = sweeps, alike
         return found
 
     def shortest_us(self, origin: Segment, goal: Segment) -> int:
@@ -261,6 +259,7 @@ def _build(site: WaySite) -> Roads:
     return DirectedRoads(site) if any(track.one_way for track in site.tracks.values()) else Roads(site)
 
 
+_Run = tuple[Move, int]
 #: By track: index and time from there to a goal.
 _Ways = dict[int, list[tuple[int, int]]]
 

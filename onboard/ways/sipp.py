@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from onboard.contract.codes import LegAction
 from onboard.core.site import Segment
-from onboard.ways.edges import Edge, Edges, State, edges_of
+from onboard.ways.edges import NO_EDGE, SAFE, Edge, Edges, State, edges_of
 from onboard.ways.kinematics import ceil_ms
 from onboard.ways.reservations import FOREVER, Reservations
 from onboard.ways.roads import Roads, roads_of
@@ -139,11 +139,17 @@ class _Node(NamedTuple):
     visit_ends_us: tuple[int, ...]
     effort: _Effort
 
+    @property
+    def label(self) -> "_Label":
+        """Of those of a state the least is how it is reached."""
+        return self.time_us, *self.effort, -self.begin_us
 
-#: Arrival, effort, minus the last move's beginning: the least of a state is how it is reached.
+
+#: Arrival, effort, minus the last move's beginning.
 _Label = tuple[int, int, int, int, int]
-#: End of the last visit, arrival in a refuge, effort, minus the last move's beginning, order of discovery, node.
-_Entry = tuple[int, int, int, int, int, int, int, _Node]
+#: (End of the last visit, arrival in a refuge), (effort, minus the last move's beginning), order of discovery, node.
+#: That is the order of the states that it comes from, then of runs by index, then of hops: nothing kept changes it.
+_Entry = tuple[tuple[int, int], tuple[int, int, int, int], tuple[int, bool, Segment, int], _Node]
 
 
 class _IntervalSearch:
@@ -162,10 +168,10 @@ class _IntervalSearch:
         self._ways_us = [roads.ways_us(goals) for goals in self._targets]
         self._tails = _tails(roads, visits)
         self._queue: list[_Entry] = []
-        self._pushed = 0
+        self.expansions = 0
         self._goal_tracks = [{goal.track for goal in goals} for goals in self._targets]
         #: By phase: the best label of each state.
-        self._best: list[dict[State, _Label]] = [{} for _ in self._targets]
+        self._best: list[dict[int, _Label]] = [{} for _ in self._targets]
         #: By phase: intervals of its visit that are not reached yet. When there are none the phase is over.
         self._open = [{state for state in edges.states(visit.segment) if _fits(state, visit)} for visit in visits]
         #: End of the last visit and arrival in a refuge of the best route found.
@@ -174,24 +180,24 @@ class _IntervalSearch:
     def run(self, root: _Node, max_expansions: int) -> Route | NoRoute:
         """Search from ``root``; see ``plan_route``."""
         self._push(root)
-        expansions = pops = 0
+        pops = 0
         while self._queue:
             *_, node = heappop(self._queue)
             pops += 1
             phase, state = node.phase, node.state
-            if self._best[phase][state] != (node.time_us, *node.effort, -node.begin_us) or self._is_over(phase):
+            if self._best[phase][state.number] != node.label or self._is_over(phase):
                 continue
             if self._is_goal(phase, state):
                 finish_us = node.visit_ends_us[-1] if node.visit_ends_us else node.time_us
-                return Route(tuple(_legs(self.roads, node)), node.visit_ends_us, finish_us, expansions, pops)
-            if expansions >= max_expansions:
-                return NoRoute("the search's bound of expansions is reached", expansions, pops)
-            expansions += 1
+                return Route(tuple(_legs(self.roads, node)), node.visit_ends_us, finish_us, self.expansions, pops)
+            if self.expansions >= max_expansions:
+                return NoRoute("the search's bound of expansions is reached", self.expansions, pops)
+            self.expansions += 1
             # From now on one has to be earlier; until now it was enough to be as early, with less effort. A state can
             # come up again earlier after the last visit only: by a route that ends that visit later.
-            self._best[phase][state] = node.time_us, -1, 0, 0, 0
+            self._best[phase][state.number] = node.time_us, -1, 0, 0, 0
             self._expand(node)
-        return NoRoute("no order of waits and moves leads to the goal and a refuge", expansions, pops)
+        return NoRoute("no order of waits and moves leads to the goal and a refuge", self.expansions, pops)
 
     def _is_goal(self, phase: int, state: State) -> bool:
         return phase == len(self.visits) and state.segment in self.refuges and state.to_us >= FOREVER
@@ -211,49 +217,34 @@ class _IntervalSearch:
             self._push_moves(node, self.edges.to_goals(state, goals))
 
     def _push_moves(self, node: _Node, edges: list[Edge]) -> None:
-        """Queue each move's earliest arrival in its state, where none that is as good is known."""
+        """Queue each move's earliest arrival in its state, where none that is as good is known.
+
+        A bound that promises one is looked at, and what it comes to meets its turn in this very loop.
+        """
         phase, state, time_us, _, _, _, visit_ends_us, (aboard_us, travel_mm, moves) = node
-        best = self._best[phase]
-        is_aboard = self.roads.lift_at(state.segment) is not None
-        moves += 1
-        for edge in edges:
-            first_us = edge.first_us
-            if first_us < time_us:
-                first_us = time_us
-            if first_us >= edge.last_us or edge.until_us <= time_us:
-                continue
-            there, duration_us = edge.there, edge.duration_us
-            label = best.get(there)
-            if label is not None:
-                arrival_us = first_us + duration_us
-                if arrival_us > label[0]:
-                    continue
-                if (
-                    arrival_us == label[0]
-                    and not is_aboard
-                    and (aboard_us, travel_mm + edge.distance_mm, moves, -first_us) >= label[1:]
-                ):
-                    continue
-            depart_us = edge.departure_us(first_us)
-            if depart_us >= FOREVER:
+        best, is_aboard = self._best[phase], self.roads.lift_at(state.segment) is not None
+        is_any_over = False
+        for place, (first_us, last_us, until_us, duration_us, number, distance_mm, clear_us) in enumerate(edges):
+            depart_us = max(first_us, time_us)
+            if depart_us >= last_us or until_us <= time_us:
                 continue
             arrival_us = depart_us + duration_us
-            waited_us = ((arrival_us if edge.is_ride else depart_us) - time_us) if is_aboard else 0
-            effort = aboard_us + waited_us, travel_mm + edge.distance_mm, moves
-            found = arrival_us, *effort, -depart_us
-            if label is None or found < label:
-                self._push(
-                    _Node(
-                        phase,
-                        there,
-                        arrival_us,
-                        node,
-                        LegAction.RIDE if edge.is_ride else LegAction.TRAVEL,
-                        depart_us,
-                        visit_ends_us,
-                        effort,
-                    )
-                )
+            known = best.get(number)
+            if known is not None and arrival_us > known[0]:
+                continue
+            waited_us = ((depart_us if distance_mm else arrival_us) - time_us) if is_aboard else 0
+            effort = aboard_us + waited_us, travel_mm + distance_mm, moves + 1
+            if known is not None and (arrival_us, *effort, -depart_us) >= known:
+                continue
+            if clear_us != SAFE:
+                edges += self.edges.looked_at(state, edges[place])
+                edges[place] = NO_EDGE
+                is_any_over = True
+                continue
+            leg, there = LegAction.TRAVEL if distance_mm else LegAction.RIDE, self.edges.numbered[number]
+            self._push(_Node(phase, there, arrival_us, node, leg, depart_us, visit_ends_us, effort))
+        if is_any_over:
+            edges[:] = [edge for edge in edges if edge is not NO_EDGE]
 
     def _push_dwell(self, node: _Node, visit: Visit) -> None:
         begin_us = max(node.time_us, ceil_ms(visit.not_before_us))
@@ -273,23 +264,23 @@ class _IntervalSearch:
 
     def _push(self, node: _Node) -> None:
         """Queue a node whose label is better than the best of its state."""
-        phase, state, time_us, _, _, begin_us, visit_ends_us, (aboard_us, travel_mm, moves) = node
+        phase, state = node.phase, node.state
         way_us = self._ways_us[phase].to_us(state.segment)
         if phase < len(self.visits):
             work_us, floor_us = self._tails[phase]
             # Before the last visit is over the second is the time itself: the same end leads to the same refuge.
-            ends_us = max(time_us + way_us + work_us, floor_us), time_us
+            ends_us = max(node.time_us + way_us + work_us, floor_us), node.time_us
         else:
             # Without visits all ends are equal.
-            ends_us = visit_ends_us[-1] if visit_ends_us else 0, time_us + way_us
-        label = time_us, aboard_us, travel_mm, moves, -begin_us
-        known = self._best[phase].get(state)
+            ends_us = node.visit_ends_us[-1] if node.visit_ends_us else 0, node.time_us + way_us
+        label, known = node.label, self._best[phase].get(state.number)
         if max(ends_us) < FOREVER and ends_us <= self._found and (known is None or label < known):
-            self._best[phase][state] = label
+            self._best[phase][state.number] = label
             if self._is_goal(phase, state):
                 self._found = ends_us
-            self._pushed += 1
-            heappush(self._queue, (*ends_us, aboard_us, travel_mm, moves, -begin_us, self._pushed, node))
+            here = state.segment if node.parent is None else node.parent.state.segment
+            order = self.expansions, state.segment.track != here.track, state.segment, state.from_us
+            heappush(self._queue, (ends_us, label[1:], order, node))
 
 
 def _fits(state: State, visit: Visit) -> bool:
