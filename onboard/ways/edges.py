@@ -285,7 +285,7 @@ def edges_of(
     roads: Roads, reservations: Reservations, owner: int, start_us: int, lift_floors: Mapping[int, int]
 ) -> Edges:
     """The states and edges of what all but ``owner`` hold from ``start_us`` on, kept while they do."""
-    key = owner, start_us, tuple(sorted(lift_floors.items()))
+    key = owner, (start_us, tuple(sorted(lift_floors.items())))
     found = reservations.kept.get(key)
     if not isinstance(found, Edges):
         found = Edges(Departures(roads, reservations, owner, start_us, lift_floors))
