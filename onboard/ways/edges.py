@@ -168,7 +168,10 @@ class Edges:
         return state.edges
 
     def to_goals(self, state: State, goals: frozenset[Segment]) -> list[Edge]:
-        """Runs to those of ``goals`` on the same track at which stopping does not always pay; after ``edges``."""
+        """Runs to those of ``goals`` on the same track at which stopping does not always pay, the earliest first.
+
+        For departures from when ``edges`` was asked for on.
+        """
         found = state.to_goals.get(goals)
         if found is None:
             track = state.segment.track
@@ -179,6 +182,7 @@ class Edges:
             if len(state.to_goals) >= _MAX_GOAL_SETS:
                 state.to_goals.clear()
             found = state.to_goals[goals] = self._runs(state, state.since_us, on_track) if on_track else []
+            found.sort(key=_arrival_us)
         return found
 
     def _paying_until(self, track: int) -> dict[int, int]:
@@ -279,6 +283,10 @@ class Edges:
             if roads.lift_at(position) is not None:
                 found.append((*self.departures.held(position), sweep.enter_us, sweep.leave_us))
         return found
+
+
+def _arrival_us(edge: Edge) -> int:
+    return edge[0] + edge[3]
 
 
 def edges_of(

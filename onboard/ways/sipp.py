@@ -211,10 +211,10 @@ class _IntervalSearch:
         phase, state, time_us = node.phase, node.state, node.time_us
         if phase < len(self.visits) and self.visits[phase].segment == state.segment:
             self._push_dwell(node, self.visits[phase])
-        self._push_moves(node, self.edges.edges(state, time_us))
-        goals = self._targets[phase]
+        edges = self.edges.edges(state, time_us)
         if state.segment.track in self._goal_tracks[phase]:
-            self._push_moves(node, self.edges.to_goals(state, goals))
+            self._push_moves(node, self.edges.to_goals(state, self._targets[phase]))
+        self._push_moves(node, edges)
 
     def _push_moves(self, node: _Node, edges: list[Edge]) -> None:
         """Queue each move's earliest arrival in its state, where none that is as good is known.
@@ -223,14 +223,14 @@ class _IntervalSearch:
         """
         phase, state, time_us, _, _, _, visit_ends_us, (aboard_us, travel_mm, moves) = node
         best, is_aboard = self._best[phase], self.roads.lift_at(state.segment) is not None
-        is_any_over = False
+        is_last, is_any_over = phase == len(self.visits), False
         for place, (first_us, last_us, until_us, duration_us, number, distance_mm, clear_us) in enumerate(edges):
             depart_us = max(first_us, time_us)
             if depart_us >= last_us or until_us <= time_us:
                 continue
             arrival_us = depart_us + duration_us
             known = best.get(number)
-            if known is not None and arrival_us > known[0]:
+            if (known is not None and arrival_us > known[0]) or (is_last and arrival_us > self._found[1]):
                 continue
             waited_us = ((depart_us if distance_mm else arrival_us) - time_us) if is_aboard else 0
             effort = aboard_us + waited_us, travel_mm + distance_mm, moves + 1
