@@ -198,7 +198,7 @@ class BusRun(Generic[PlantT]):
                 for observer in self.observers:
                     observer(message, time_us)
 
-        self.fleet.tap(on_fleet)
+        self.fleet.tap(on_fleet, errors=self.writer is not None)
         if self.writer is not None and self.options.devices:
             for node_id, medium in self.devices.items():
                 medium.tap(self._device_tap(self.site.machines[node_id].name))

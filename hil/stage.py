@@ -58,7 +58,7 @@ class TestBench:
             if message is not None:
                 self._hear(time_us, machine.name, message)
 
-        simulation.devices[machine.node_id].tap(on_device)
+        simulation.devices[machine.node_id].tap(on_device, errors=False)
 
     # --- what happens ------------------------------------------------------------------------------------------
 

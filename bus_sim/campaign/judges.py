@@ -27,7 +27,7 @@ class Judges:
             self._listen(run.site.machines[node_id].name, medium)
 
     def _listen(self, channel: str, medium: Medium) -> None:
-        medium.tap(partial(self._hear, channel))
+        medium.tap(partial(self._hear, channel), errors=False)
 
     def _hear(self, channel: str, frame: Frame, time_us: int, _: str) -> None:
         self._checks.feed(time_us, channel, frame)

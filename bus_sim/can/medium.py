@@ -23,6 +23,7 @@ from bus_sim.can.failures import Failure
 from bus_sim.can.faults import FaultInjector, FaultKind, InjectedFault
 from bus_sim.can.node import AcceptanceFilter, NodeOptions, SimulatedBus
 from bus_sim.can.recovery import TICKS_PER_BIT, BusOffRecovery
+from bus_sim.can.repetition import Repetition
 from bus_sim.can.statistics import BusStatistics, LoadMeter
 from bus_sim.virtual_time import Clock
 from onboard.core.frame import Frame
@@ -49,8 +50,9 @@ class _Phase(Enum):
 class Medium:
     """One CAN bus. ``bit_rate``: 1,000 to 1,000,000 bit/s, ``ValueError`` outside. ``faults`` act in the order given.
 
-    A lone node's frame is not acknowledged and is repeated for ever, as on a real bus: virtual time then never stands
-    still, and every repetition is an error frame in the taps.
+    A lone node's frame is not acknowledged and is repeated for ever, as on a real bus. Every repetition is an error
+    frame for the taps that want them; where none does, the bus sets no timers meanwhile, and somebody who comes or asks
+    finds it as far as it would be by then.
     """
 
     def __init__(
@@ -73,6 +75,7 @@ class Medium:
         self._corrupters = tuple(i for i in self.injectors if i.fault.kind is FaultKind.CORRUPTION)
         self._meter = LoadMeter(bit_rate, clock.now_us())
         self._taps: list[Tap] = []
+        self._error_taps: list[Tap] = []
         #: Called by the nodes with every frame that they take for sending.
         self.queue_taps: list[Tap] = []
         self._nodes: list[SimulatedBus] = []
@@ -89,6 +92,8 @@ class Medium:
         self._wire_bits = 0
         self._failure: Failure | None = None
         self._deaf: list[SimulatedBus] = []
+        #: What a lone node says to nobody, since the start of frame that is set.
+        self._repetition: Repetition | None = None
 
     # --- for people and nodes ----------------------------------------------------------------------------------
 
@@ -106,6 +111,7 @@ class Medium:
         """
         if any(node.name == name for node in self._nodes):
             raise ValueError(f"bus {self.name}: a node named {name!r} is attached already")
+        self._catch_up()
         node = SimulatedBus(self, name, node_id, filters, options or NodeOptions())
         self._nodes.append(node)
         if self._phase is _Phase.BUSY:
@@ -121,9 +127,15 @@ class Medium:
         self.injectors.append(injector)
         self.delivery.add(injector)
 
-    def tap(self, callback: Tap) -> None:
-        """See every frame and error frame once, in wire order, without being on the bus: no ACK, no error flags."""
+    def tap(self, callback: Tap, *, errors: bool = True) -> None:
+        """See every frame once, in wire order, without being on the bus: no ACK, no error flags.
+
+        ``errors``: error frames as well. Who does not need them saves a bus with one lone node most of its work.
+        """
+        self._catch_up()
         self._taps.append(callback)
+        if errors:
+            self._error_taps.append(callback)
 
     def tap_queues(self, callback: Tap) -> None:
         """See every frame as a node takes it for sending, with the time and the node's name (response times)."""
@@ -131,25 +143,31 @@ class Medium:
 
     def statistics(self) -> BusStatistics:
         """What the bus carried up to now."""
+        self._catch_up()
         return self._meter.snapshot(self.clock.now_us())
 
     def restart_statistics(self) -> None:
         """Count frames and load from this moment on, as before an hour that is to be measured."""
+        self._catch_up()
         self._meter = LoadMeter(self.bit_rate, self.clock.now_us())
 
     @property
     def is_silent(self) -> bool:
         """Whether no frame is on the wire."""
+        self._catch_up()
         return self._phase is not _Phase.BUSY
 
     def load(self, node: SimulatedBus, frame: Frame) -> None:
         """A node puts a frame into one of its mailboxes."""
+        if self._repetition is not None:
+            self._catch_up()
         heapq.heappush(self._offers, (arbitration_key(frame), next(self._sequence), node, frame))
         if self._phase is _Phase.IDLE or self._suspended:
             self._plan()
 
     def detach(self, node: SimulatedBus, *, in_good_order: bool) -> None:
         """A node leaves; see ``SimulatedBus.close`` and ``power_off``."""
+        self._catch_up()
         self._nodes.remove(node)
         for members in (self._joining, self._suspended, self._ailing):
             if node in members:
@@ -193,6 +211,9 @@ class Medium:
         """The start bit is over: arbitrate among what is on offer."""
         if when_us != self._event_us or self._phase is not _Phase.STARTING:
             return
+        if self._suspended and self._is_to_nobody():
+            self._repetition = Repetition.of(self._offers[0][3], self._start_ticks)
+            return
         waiting = self._step_aside() if self._suspended else []
         offers = self._offers
         wire = [heapq.heappop(offers)] if offers else []
@@ -225,6 +246,40 @@ class Medium:
             (wire if tied else same_node).append(offer)
         for offer in same_node:
             heapq.heappush(self._offers, offer)
+
+    # --- a lone node -------------------------------------------------------------------------------------------
+
+    def _is_to_nobody(self) -> bool:
+        """Whether all that happens from this start of frame on is one node's attempts, and nobody looks at them."""
+        if len(self._nodes) > 1 or self._error_taps or self._corrupters or not self._offers:
+            return False
+        node = self._offers[0][2]
+        is_free = node.ready_ticks < self._start_ticks + TICKS_PER_BIT
+        return is_free and node.counters.state is ErrorState.ERROR_PASSIVE and not node.options.receive_errors
+
+    def _catch_up(self) -> None:
+        """Somebody looks: book the attempts that are over, and go on from the one that is under way."""
+        repetition, self._repetition = self._repetition, None
+        if repetition is None:
+            return
+        now_us, node = self.clock.now_us(), self._offers[0][2]
+        attempts = repetition.failed_before(now_us, self.bit_rate)
+        if attempts:
+            repetition.book(self._meter, attempts)
+            self._start_ticks = node.ready_ticks = repetition.start_ticks + attempts * repetition.period_ticks
+            self._idle_ticks = self._start_ticks - SUSPEND_BITS * TICKS_PER_BIT
+            self.recovery.bus_idle_from(self._idle_ticks)
+            self._event_us = -(-(self._start_ticks + TICKS_PER_BIT) // self.bit_rate)
+        if attempts and self._event_us >= now_us:
+            self.clock.at_us(self._event_us, self._resolve)
+            return
+        # As it began: who comes or goes now does so while it is on its way.
+        self._phase = _Phase.BUSY
+        self._suspended.clear()
+        self._wire = [heapq.heappop(self._offers)]
+        self._wire_bits = frame_length_bits(self._wire[0][3])
+        self._failure = failures.acknowledgement_missing(self._wire_bits)
+        self._set_end(self._failure.detected_bits)
 
     # --- a frame on the wire -----------------------------------------------------------------------------------
 
@@ -415,7 +470,7 @@ class Medium:
         self.delivery.forget_routes()
 
     def _announce(self, frame: Frame, when_us: int) -> None:
-        for callback in self._taps:
+        for callback in self._error_taps:
             callback(frame, when_us, "")
         for node in list(self._nodes):
             if node.options.receive_errors:

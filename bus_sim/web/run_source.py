@@ -51,7 +51,7 @@ class RunSource:
         run.observers.append(self.picture.feed)
         run.fleet.tap(self._count)
         for node, medium in run.devices.items():
-            medium.tap(self._device_tap(node))
+            medium.tap(self._device_tap(node), errors=False)
 
     def _count(self, frame: Frame, _time_us: int, _sender: str) -> None:
         self.picture.count_frame(frame)

@@ -71,8 +71,8 @@ async def _watch(
         if message is not None:
             seen.desk.append(message)
 
-    simulation.devices[11].tap(on_device)
-    simulation.devices[1].tap(on_desk)
+    simulation.devices[11].tap(on_device, errors=False)
+    simulation.devices[1].tap(on_desk, errors=False)
     simulation.plant.street.add_all(stays(*[(0.0, leave_s)] * cars), ORIGIN_US)
     arm(simulation, injections)
     simulation.start()

@@ -153,4 +153,4 @@ def _listen(scene: Scene, name: str, codec: Codec, node_id: int | None = None) -
         if message is not None:
             scene.said.append(Said(time_us, name, message))
 
-    medium.tap(on_frame)
+    medium.tap(on_frame, errors=False)

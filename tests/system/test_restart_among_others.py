@@ -100,6 +100,26 @@ def test_who_was_off_while_its_task_was_called_anew_does_not_begin_it() -> None:
     assert report.verdict is RunVerdict.SERVED, report.why()
 
 
+def test_who_stands_face_to_face_turns_though_the_other_has_rights_behind_it() -> None:
+    """Each had been granted slots beyond the other, took them for blocked, and found no way for ten minutes.
+
+    Two crashes a seed on `standard`, seed 4017.
+    """
+    crash = "crash:at_s=450.741843,target=MR3,restart_s=7.641,write=6,durable=no"
+    report = played("standard", 4017, Arrivals(8, 15, 7.5, 200), crash, limit_s=3_600)
+    assert report.verdict is RunVerdict.SERVED, report.why()
+
+
+def test_a_winner_that_is_not_noted_yet_is_believed_when_all_are_asked() -> None:
+    """The power failed between the award and its record; the task was called anew, and awarded to a second robot.
+
+    Two crashes a seed on `small`, seed 4315.
+    """
+    crash = "crash:at_s=213.74776,target=IOC1,restart_s=14.953,write=8,durable=no"
+    report = played("small", 4315, Arrivals(6, 20, 10, 200), crash, limit_s=3_600)
+    assert report.verdict is RunVerdict.SERVED, report.why()
+
+
 def test_who_works_where_another_was_to_come_first_does_not_plan_to_work_there_until_that_one_has_been() -> None:
     """The other then planned to wait for it, for 154 s, aboard a lift, and nobody moved although it left after six.
 

@@ -225,3 +225,15 @@ def test_a_robot_over_the_sill_of_an_empty_shaft_is_found() -> None:
     assert tape.broken() == {}
     tape = Tape(two_floors()).say(1, at(ER1, LIFT, 2), *rights).say(2, at(MR2, 1, 0, 600))
     assert tape.broken() == {"platform-there": 1}
+
+
+@pytest.mark.parametrize(("sensed_mm", "broken"), [(0, {}), (-1250, {"platform-there": 1})])
+def test_an_order_repeated_to_a_robot_that_came_off_the_sill_is_none_over_it(
+    sensed_mm: int, broken: dict[str, int]
+) -> None:
+    """Between two borders of segments only the drive tells that the sill is free; the lift may go at once."""
+    rights = [grant(Segment(1, index), 1, 1, MR2) for index in (1, 2)]
+    tape = Tape(two_floors()).say(1, at(ER1, LIFT, 1), *rights).say(2, at(MR2, 1, 1, -1250, 1095))
+    state = DriveState(MR2, 1, sensed_mm, 1500, DriveMode.MOVING, at_mark=False)
+    tape.say(3, state, at(ER1, LIFT, 1, 300, 500)).say(4, DriveOrder(MR2, 1, 2500, 1500))
+    assert {rule: count for rule, count in tape.broken().items() if rule == "platform-there"} == broken

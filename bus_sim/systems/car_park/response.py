@@ -42,7 +42,7 @@ class Meter:
     def attach(self, simulation: Simulation) -> None:
         """Watch a fleet bus that has not begun."""
         simulation.fleet.tap_queues(self._on_queued)
-        simulation.fleet.tap(self._on_end)
+        simulation.fleet.tap(self._on_end, errors=False)
 
     def _on_queued(self, frame: Frame, time_us: int, node: str) -> None:
         name = fleet_codec().name_of(frame) or "?"
@@ -50,8 +50,6 @@ class Meter:
         self._waiting.setdefault(node, deque()).append((time_us, frame))
 
     def _on_end(self, frame: Frame, time_us: int, node: str) -> None:
-        if frame.is_error:
-            return
         queued_us, first = self._waiting[node].popleft()
         assert first == frame, "a node's frames leave in the order in which they were queued"
         self.frames += 1

@@ -160,12 +160,12 @@ class Compartment:
         job, machine = self.job, self.fleet.site.machines.get(report.sender)
         if job is not None and report.task == job.task and report.phase is TaskPhase.FORFEITED:
             return self._on_forfeit(job, report.sender, now_us)
-        if machine is None or machine.kind is not KindCode.ROBOT or self.phase is BayPhase.STARTING:
-            return []
+        is_robot = machine is not None and machine.kind is KindCode.ROBOT
+        if not is_robot or self.phase is BayPhase.STARTING:
+            return self.stewardship.claimed(report, self.memory) if is_robot else []
         if job is None or report.task != job.task:
             return bay_task.withdrawal(self.fleet.node_id, report)
         if report.phase is TaskPhase.AWARDED and not job.winner and job.retry_at_us is not None and not job.call:
-            # I was restarted and asked all: its winner says that the task is in hand.
             return self._won_by(report.sender, job.call)
         return job.remind(self.fleet.node_id, report.sender)
 

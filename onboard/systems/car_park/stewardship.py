@@ -113,6 +113,19 @@ class Stewardship:
         self.tasks[car] = task, version
         return [winner_record(car, winner, task, version)]
 
+    def claimed(self, report: TaskReport, memory: BayMemory) -> list[Effect]:
+        """The winner of the task in hand by its own word: all are asked at a restart, and the journal may know of none.
+
+        The award was said, and the power failed before it was noted.
+        """
+        if memory.job is None:
+            return []
+        task, _, car, _ = memory.job
+        if report.task != task or report.phase is not TaskPhase.AWARDED or car in self.winners:
+            return []
+        known, version = self.tasks.get(car, (task, 1))
+        return self.won(car, report.sender, task, version if known == task else 1)
+
     def _is_news(self, car: Reference, award: Award) -> bool:
         """Whether an award says more than is known; an older version of the same task counts no more."""
         task, version = self.tasks.get(car, (award.task, 0))

@@ -6,6 +6,7 @@ from onboard.contract.codes import KindCode, MachineState, ManualMode
 from onboard.contract.constants import STILL
 from onboard.contract.messages import (
     BusTime,
+    DriveState,
     Halted,
     Heartbeat,
     ManualState,
@@ -20,7 +21,7 @@ from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment, Site
 from onboard.trace.check.event import LogEvent
-from onboard.trace.check.geometry import ReportedPosition, body_of, floors_of
+from onboard.trace.check.geometry import ReportedPosition, body_at, body_of, floors_of
 from onboard.trace.check.tokens_seen import TokensSeen
 from onboard.ways.site import way_site
 
@@ -30,6 +31,11 @@ SILENT_US = 7_000_000
 JUMP_US = 100_000
 #: A clock that is far off is set anew by the second word, and that comes within two periods of 5 s, us.
 SETTLING_US = 11_000_000
+#: What the picture is made of: half of what is said on a bus is none of it.
+_TAKEN = {
+    *(BusTime, TokenGrant, TokenHeld, TokenAssigned, Regeneration),
+    *(Progress, DriveState, ManualState, Heartbeat, Halted),
+}
 
 
 class BusPicture:
@@ -45,6 +51,8 @@ class BusPicture:
         self.offset_us: int | None = None
         self.tokens = TokensSeen(site)
         self.bodies: dict[int, ReportedPosition] = {}
+        #: Where drives last said that they are, mm by their own tape, by node: only on device buses.
+        self._sensed_mm: dict[int, int] = {}
         #: Boot counter and last sign of life, us of the log, by node.
         self.boots: dict[int, int] = {}
         self.heard_us: dict[int, int] = {}
@@ -110,22 +118,20 @@ class BusPicture:
         at = next(ways.beyond(sill) for sill in ways.tracks[lift_track].joins if sill.track == floor)
         return replace(body, track=at.track, index=at.index, position_mm=ways.position_mm(at))
 
+    def sensed(self, body: ReportedPosition) -> ReportedPosition | None:
+        """A body where its drive says that it is, told oftener than ``Progress``; None before any word of it."""
+        sensed_mm = self._sensed_mm.get(body.node)
+        return None if sensed_mm is None else body_at(self.site, body, sensed_mm)
+
     def feed(self, event: LogEvent[Message]) -> None:
-        """Take up one message of the fleet bus before the rules see it."""
-        self.now_us = time_us = event.time_us
+        """Take up one message before the rules see it."""
+        self.now_us = event.time_us
+        if type(event.message) in _TAKEN:
+            self._take(event)
+
+    def _take(self, event: LogEvent[Message]) -> None:
+        time_us = event.time_us
         match event.message:
-            case BusTime(bus_time_us=bus_us):
-                before_us, self.offset_us = self.offset_us, time_us - bus_us
-                if before_us is not None and abs(self.offset_us - before_us) > JUMP_US:
-                    self.clock_settles_us = max(self.clock_settles_us, time_us + SETTLING_US)
-            case TokenGrant() | TokenHeld() | TokenAssigned() | Regeneration() as word:
-                self.tokens.feed(word, time_us)
-            case Progress() as progress if self._site is not None:
-                body = body_of(self._site, progress, time_us)
-                if body is not None:
-                    self.bodies[progress.sender] = body
-            case ManualState() as state:
-                self._on_manual(state, time_us)
             case Heartbeat() as beat:
                 if not self.boots:
                     # The first sign of life of a whole site in its first life: all tokens are where the site file says.
@@ -133,8 +139,25 @@ class BusPicture:
                 self.boots[beat.sender] = beat.boot
                 self.heard_us[beat.sender] = time_us
                 self._on_state(beat)
+            case BusTime(bus_time_us=bus_us):
+                self._on_bus_time(bus_us, time_us)
+            case TokenGrant() | TokenHeld() | TokenAssigned() | Regeneration() as word:
+                self.tokens.feed(word, time_us)
+            case Progress() as progress if self._site is not None:
+                body = body_of(self._site, progress, time_us)
+                if body is not None:
+                    self.bodies[progress.sender] = body
+            case DriveState(sender=node, position_mm=position_mm):
+                self._sensed_mm[node] = position_mm
+            case ManualState() as state:
+                self._on_manual(state, time_us)
             case Halted() as word if word.sender == word.machine and word.reason in RIGHTS_LOST:
                 self.announcing.add(word.sender)
+
+    def _on_bus_time(self, bus_us: int, time_us: int) -> None:
+        before_us, self.offset_us = self.offset_us, time_us - bus_us
+        if before_us is not None and abs(self.offset_us - before_us) > JUMP_US:
+            self.clock_settles_us = max(self.clock_settles_us, time_us + SETTLING_US)
 
     def _on_state(self, beat: Heartbeat) -> None:
         if beat.state is MachineState.STARTING:

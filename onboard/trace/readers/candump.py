@@ -21,12 +21,12 @@ _SHORT, _LONG = 3, 8
 _MILLION = 1_000_000
 
 
-def read_candump(lines: Iterable[bytes], faults: LogFaults) -> Iterator[tuple[int, RawFrame]]:
-    """Frames with their line numbers; what gives none is counted. ``lines`` come with their ends.
+def read_candump(lines: Iterable[bytes], faults: LogFaults, first: int = 1) -> Iterator[tuple[int, RawFrame]]:
+    """Frames with their line numbers from ``first`` on; what gives none is counted. ``lines`` come with their ends.
 
     A last line without its end is not believed, whole as it may look: half of its data may be missing.
     """
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(lines, first):
         if line.isspace():
             continue
         found = parse_line(line) if line.endswith(b"\n") else LogFault.CUT

@@ -24,6 +24,8 @@ class LogFaults:
         self.counts: Counter[LogFault] = Counter()
         self.first: dict[LogFault, int] = {}
         self.frames = 0
+        #: Time of the last frame of each channel, us of the log.
+        self.latest_us: dict[str, int] = {}
 
     def add(self, fault: LogFault, where: int) -> None:
         """Count one fault of the log, and keep where the first of its kind is."""
@@ -48,7 +50,7 @@ class LogFaults:
 
         Two buses that were logged in turn may each be in order while the log is not.
         """
-        latest: dict[str, int] = {}
+        latest = self.latest_us
         for where, frame in frames:
             self.frames += 1
             if frame.time_us < latest.get(frame.channel, frame.time_us):

@@ -1,13 +1,16 @@
 """A log of any format that we read, told apart by its first bytes; in bounded memory, with a bar where one looks."""
 
+import io
 import os
 import re
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
+from itertools import chain, islice
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Self, TextIO
+from typing import TYPE_CHECKING, NamedTuple, Self, TextIO, cast
 
 from onboard.trace.raw import RawFrame
 from onboard.trace.readers.asc import read_asc
@@ -16,9 +19,16 @@ from onboard.trace.readers.faults import LogFaults
 from onboard.trace.readers.guess import guess
 from onboard.trace.readers.pcapng import MAGIC, read_pcapng
 
+if TYPE_CHECKING:
+    from onboard.trace.columns.block import FrameBlock
+
 _ASC = re.compile(rb"\s*(date\s|base\s+(hex|dec)|//\s*version|begin\s+trigger)", re.IGNORECASE)
 _BAR_PERIOD_S = 0.2
 _BAR_WIDTH = 30
+#: What is read at once, bytes, and what is worth reading by columns: a live bus brings less.
+_PIECE_BYTES, _LEAST_BYTES = 1 << 18, 1 << 14
+#: Frames of other formats that are handed on together.
+_STRETCH = 1 << 16
 #: A pipe has no length; what it holds so far is told instead.
 _MEGABYTE = 1_000_000
 
@@ -42,7 +52,9 @@ class Log:
         self.faults = LogFaults()
         self._bar = bar if bar is not None and bar.isatty() else None
         try:
-            self._file: BinaryIO = sys.stdin.buffer if name == "-" else Path(name).open("rb")  # noqa: SIM115  # closed by __exit__
+            # Typed as a file of any kind, standard input is the one that there is.
+            stdin = cast("io.BufferedIOBase", sys.stdin.buffer)
+            self._file: io.BufferedIOBase = stdin if name == "-" else Path(name).open("rb")  # noqa: SIM115  # closed by __exit__
         except OSError as error:
             raise LogOpenError(f"{name}: cannot be read ({error.strerror}); name an existing log") from error
 
@@ -56,43 +68,117 @@ class Log:
             self._file.close()
 
     def __iter__(self) -> Iterator[RawFrame]:
-        watched = _Watched(self._file, self._bar)
-        head = watched.head()
+        return chain.from_iterable(frames for frames, _ in self.portions())
+
+    def portions(self) -> Iterator[tuple[Iterator[RawFrame], bool]]:
+        """The same frames some at a time, and whether these are there already: those of a live bus come one by one."""
+        with self._watched() as watched:
+            placed = self._placed(watched)
+            if placed is not None:
+                yield self.faults.watch(placed), False
+                return
+            for text in self._texts(watched):
+                read_block = _block_reader() if text.is_whole and len(text.lines) >= _LEAST_BYTES else None
+                if read_block is not None:
+                    yield read_block(text.lines, text.first, self.faults).frames(), True
+                else:
+                    yield self.faults.watch(read_candump(io.BytesIO(text.lines), self.faults, text.first)), False
+
+    def one_by_one(self) -> Iterator[RawFrame]:
+        """The same frames, but nothing of the log is looked at behind the one that is asked for."""
+        with self._watched() as watched:
+            placed = self._placed(watched)
+            yield from self.faults.watch(placed if placed is not None else read_candump(watched, self.faults))
+            if placed is None:
+                self._check(watched.first_line)
+
+    def stretches(self) -> "Iterator[LogText | list[tuple[int, RawFrame]]]":
+        """The log in pieces for who reads it by columns: text of candump, or frames with their places."""
+        with self._watched() as watched:
+            placed = self._placed(watched)
+            if placed is None:
+                yield from self._texts(watched)
+                return
+            while stretch := list(islice(placed, _STRETCH)):
+                yield stretch
+
+    def _watched(self) -> "_Watched":
+        return _Watched(self._file, self._bar)
+
+    def _placed(self, watched: "_Watched") -> Iterator[tuple[int, RawFrame]] | None:
+        """Frames of every format but candump's, with their places; None for what is read as candump's."""
+        head = watched.first_line
         if head[: len(MAGIC)] == MAGIC:
-            yield from self.faults.watch(read_pcapng(watched.read, self.faults))
-        elif _ASC.match(head):
-            yield from self.faults.watch(read_asc(watched, self.faults))
-        else:
-            yield from self.faults.watch(read_candump(watched, self.faults))
-            self._check(head)
-        watched.finish()
+            return read_pcapng(watched.read, self.faults)
+        if head.startswith((b"LOGG", b";$FILEVERSION")):
+            from onboard.trace.readers.python_can import BLF_MAGIC, read_blf, read_trc  # noqa: PLC0415  # for these only
+
+            return (read_blf if head.startswith(BLF_MAGIC) else read_trc)(watched.read, self.faults)
+        return read_asc(watched, self.faults) if _ASC.match(head) else None
+
+    def _texts(self, watched: "_Watched") -> "Iterator[LogText]":
+        number = 1
+        for piece in watched.pieces():
+            yield LogText(number, piece)
+            number += piece.count(b"\n")
+        self._check(watched.first_line)
 
     def _check(self, head: bytes) -> None:
         """What says of itself no other format must have had a frame of candump's."""
         if not head:
             raise LogOpenError(f"{self.name}: is empty; name a log that something was written to")
         if self.faults.is_no_log:
-            known = "candump -L, Vector ASC, pcapng"
+            known = "candump -L, Vector ASC and BLF, PEAK TRC, pcapng"
             raise LogOpenError(f"{self.name}: no frame of a log that we read ({known}); {guess(head)}")
+
+
+@cache
+def _block_reader() -> "Callable[[bytes, int, LogFaults], FrameBlock] | None":
+    """What reads many lines at once; None where there is no numpy, as on a board."""
+    try:
+        from onboard.trace.columns.candump_text import read_block  # noqa: PLC0415  # short logs do without numpy
+    except ImportError:
+        return None
+    return read_block
+
+
+class LogText(NamedTuple):
+    """A stretch of a candump log: the number of its first line, and its lines with their ends."""
+
+    first: int
+    lines: bytes
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the last line has its end."""
+        return self.lines.endswith(b"\n")
 
 
 class _Watched:
     """A binary file that tells how far it was read."""
 
-    def __init__(self, file: BinaryIO, bar: TextIO | None) -> None:
+    def __init__(self, file: io.BufferedIOBase, bar: TextIO | None) -> None:
         self._file = file
         self._bar = bar
         self._done = 0
         self._shown_s = time.monotonic()
         self._total = os.fstat(file.fileno()).st_size if bar is not None else 0
-        self._first = b""
+        #: The first line; it is read again afterwards. A binary log's first bytes hold a line's end.
+        self.first_line = self._file.read(len(MAGIC))
+        if self.first_line != MAGIC and not self.first_line.endswith(b"\n"):
+            self.first_line += self._file.readline()
+        self._first = self.first_line
 
-    def head(self) -> bytes:
-        """The first line; it is read again afterwards. A binary log's first bytes hold a line's end."""
-        self._first = self._file.read(len(MAGIC))
-        if self._first != MAGIC and not self._first.endswith(b"\n"):
-            self._first += self._file.readline()
-        return self._first
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Wipe the bar, where all was read."""
+        if kind is None and self._bar is not None:
+            self._bar.write("\r\x1b[K")
+            self._bar.flush()
 
     def __iter__(self) -> Iterator[bytes]:
         first, self._first = self._first, b""
@@ -114,11 +200,23 @@ class _Watched:
             self._show()
         return data
 
-    def finish(self) -> None:
-        """Wipe the bar."""
-        if self._bar is not None:
-            self._bar.write("\r\x1b[K")
-            self._bar.flush()
+    def pieces(self) -> Iterator[bytes]:
+        """Whole lines, as many as there are at once; at the end what has no end of a line."""
+        waiting, self._first = [self._first], b""
+        self._done += len(waiting[0])
+        while piece := self._file.read1(_PIECE_BYTES):
+            self._done += len(piece)
+            if self._bar is not None:
+                self._show()
+            end = piece.rfind(b"\n") + 1
+            if not end:
+                waiting.append(piece)
+                continue
+            yield b"".join((*waiting, piece[:end]))
+            waiting = [piece[end:]]
+        text = b"".join(waiting)
+        end = text.rfind(b"\n") + 1
+        yield from (part for part in (text[:end], text[end:]) if part)
 
     def _show(self) -> None:
         now_s = time.monotonic()

@@ -5,7 +5,7 @@ overhangs its sill.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from onboard.contract.codes import DriveMode, KindCode
 from onboard.contract.messages import DriveOrder, DriveState, Message, PlatformState, Progress
@@ -147,9 +147,11 @@ class PlatformThere(Rule):
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
         site, body = self.picture.site, self.picture.on_floor(body)
-        self._judge(event, body, sent_through(site, body, event.message), "is sent over")
+        # Its last Progress may be of before it came off the sill: the next one is due at the border of a segment.
+        slots = sent_through(site, self.picture.sensed(body) or body, event.message)
+        self._judge(event, body, slots, "is sent over")
 
-    def _judge(self, event: LogEvent[Message], body: ReportedPosition, slots: list[Segment], how: str) -> None:
+    def _judge(self, event: LogEvent[Message], body: ReportedPosition, slots: Sequence[Segment], how: str) -> None:
         site, wrong = self.picture.site, False
         for slot in slots:
             lift = self.picture.bodies.get(site.stewards.get(slot.track, 0))

@@ -1,15 +1,14 @@
 """Motion: only under authority and inside it, and never two bodies in one slot (design, section 5)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from onboard.contract.codes import KindCode
-from onboard.contract.messages import DriveOrder, DriveState, Progress
+from onboard.contract.messages import DriveOrder, Progress
 from onboard.core.site import Segment
 from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.geometry import (
     TOLERANCE_MM,
     ReportedPosition,
-    body_at,
     body_of,
     lifts_under,
     occupied,
@@ -41,12 +40,11 @@ class InsideAuthority(Rule):
     def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._told: set[tuple[int, Segment]] = set()
-        self._sensed_mm: dict[int, int] = {}
         self._pushed: dict[int, tuple[LogEvent[Progress], ReportedPosition, int]] = {}
 
     def handlers(self) -> Handlers:
         """Where bodies are, and with device buses where drives are sent."""
-        return {Progress: self._on_progress, DriveState: self._on_state, DriveOrder: self._on_order}
+        return {Progress: self._on_progress, DriveOrder: self._on_order}
 
     def _on_progress(self, event: LogEvent[Progress]) -> None:
         body = body_of(self.picture.site, event.message, event.time_us)
@@ -77,24 +75,21 @@ class InsideAuthority(Rule):
                 del self._pushed[node]
                 self._judge(event, body, occupied(self.picture.site, body), "was pushed, and stays in", now_us)
 
-    def _on_state(self, event: LogEvent[DriveState]) -> None:
-        self._sensed_mm[event.message.sender] = event.message.position_mm
-
     def _on_order(self, event: LogEvent[DriveOrder]) -> None:
         body = self.picture.bodies.get(event.message.sender)
-        sensed_mm = self._sensed_mm.get(event.message.sender)
-        if body is None or sensed_mm is None or self.picture.kind(body.node) is not KindCode.ROBOT:
+        if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
         site, body = self.picture.site, self.picture.on_floor(body)
-        if way_site(site).tracks[body.track].kind is not TrackKind.LIFT:
-            slots = sent_through(site, body_at(site, body, sensed_mm), event.message)
+        sensed = self.picture.sensed(body)
+        if sensed is not None and way_site(site).tracks[body.track].kind is not TrackKind.LIFT:
+            slots = sent_through(site, sensed, event.message)
             self._judge(event, body, slots, "is sent through")
 
     def _judge(
         self,
         event: LogEvent[Progress] | LogEvent[DriveOrder],
         body: ReportedPosition,
-        slots: list[Segment],
+        slots: Sequence[Segment],
         how: str,
         now_us: int | None = None,
     ) -> None:
