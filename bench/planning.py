@@ -16,17 +16,15 @@ import time
 
 from bus_sim.sites import find_site
 from onboard.config.site import parse_site
-from onboard.contract.codes import Grade, KindCode, LegAction, Side
-from onboard.contract.messages import Itinerary, Leg, Stamp
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.ways.kinematics import run_duration_us
-from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses, standing_segments, travel_windows
-from onboard.ways.refuges import open_refuges, refuges
+from onboard.ways.occupancy import standing_segments, travel_windows
+from onboard.ways.refuges import refuges
 from onboard.ways.reservations import Reservations, SlotWindow
-from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
+from onboard.ways.sipp import Route, Visit, free_flow_us, plan_route
+from tests.ways.fleets import SECOND, Fleet, park
 
-SECOND = 1_000_000
 #: Floors, positions on each, compartments, robots with a plan beside the one that asks.
 FLEETS = ((3, 10, 2, 1), (5, 20, 3, 0), (5, 20, 3, 3), (10, 40, 4, 8))
 #: Queries around the same plans of others.
@@ -92,124 +90,30 @@ def measure(length: int, others: int, queries: int, seed: int) -> list[str]:
     return [str(cell) for cell in (*row, statistics.median(expansions), max(expansions), found, delayed)]
 
 
-FLOORS = """
-[site]
-name = "bench"
-[floors]
-count = {floors}
-positions = {length}
-[[lifts]]
-name = "LL"
-node = 5
-end = "left"
-[[lifts]]
-name = "LR"
-node = 6
-end = "right"
-"""
-IN_OUT = """
-[[compartments]]
-name = "IOC{number}"
-node = {number}
-at = "p(1,{index})"
-"""
-ROBOT = """
-[[robots]]
-name = "MR{number}"
-node = {node}
-home = "p({floor},{index})"
-"""
-#: The planner's bound of expansions: what a machine grants one search.
-MAX_EXPANSIONS = 4_000
-
-
-def park(floors: int, length: int, compartments: int) -> CarPark:
-    """Floors with a lift at each end, compartments on the lowest, one robot at home on each other floor."""
-    text = FLOORS.format(floors=floors, length=length)
-    for number in range(1, compartments + 1):
-        text += IN_OUT.format(number=number, index=1 + number * length // (compartments + 1))
-    for floor in range(2, floors + 1):
-        text += ROBOT.format(number=floor - 1, node=9 + floor, floor=floor, index=length // 2)
-    return car_park(parse_site(text, "bench"))
-
-
-class Fleet:
-    """Robots with their plans, made one after the other; ``dwell_us`` is how long each handling of a car takes."""
-
-    def __init__(self, site: CarPark, rng: random.Random, dwell_us: int = 15 * SECOND) -> None:
-        self.site, self.rng, self.dwell_us = site, rng, dwell_us
-        self.reservations = Reservations()
-        self.ends = {node: m.home for node, m in site.machines.items() if m.kind is KindCode.ROBOT}
-        for node, home in self.ends.items():
-            stand = Leg(LegAction.STAND, home.track, home.index, home.index, Side.NEAR, 0)
-            self._tell(Itinerary(node, 1, Grade.FIRM, Stamp(0, 1, 1), (stand,)))
-
-    def _tell(self, itinerary: Itinerary) -> None:
-        self.reservations.release(itinerary.sender)
-        windows, uses = itinerary_windows(self.site, itinerary, 0), lift_uses(self.site, itinerary, 0)
-        self.reservations.reserve(itinerary.sender, windows, uses)
-
-    def task(self) -> tuple[Visit, ...]:
-        """A random car to park or to fetch."""
-        ends = (self.rng.choice(list(self.site.compartments.values())), self.rng.choice(self.site.places))
-        return tuple(Visit(one.segment, self.dwell_us) for one in (ends if self.rng.random() < 0.5 else ends[::-1]))
-
-    def busy(self, nodes: list[int]) -> None:
-        """Give each of some robots a task within the first minute."""
-        for node in nodes:
-            start_us = self.rng.randrange(60_000) * 1000
-            route, _ = self.query(node, start_us)
-            if isinstance(route, Route):
-                self.take(node, start_us, route)
-
-    def query(self, node: int, start_us: int) -> tuple[Route | NoRoute, float]:
-        """A random task for a robot that stands at its end, and the processor microseconds that its plan took."""
-        visits = self.task()
-        standing = [end for other, end in self.ends.items() if other != node]
-        refuges = open_refuges(self.site, standing)
-        before = time.process_time_ns()
-        route = plan_route(
-            self.site, self.reservations, node, self.ends[node], start_us, visits, refuges, MAX_EXPANSIONS
-        )
-        took_us = (time.process_time_ns() - before) / 1000
-        self.delayed = isinstance(route, Route) and route.finish_us > free_flow_us(
-            self.site, self.ends[node], start_us, visits
-        )
-        return route, took_us
-
-    def take(self, node: int, start_us: int, route: Route) -> None:
-        """Make a plan that begins at ``start_us`` the node's firm itinerary, so that later plans go around it."""
-        home = self.ends[node]
-        legs = [Leg(LegAction.STAND, home.track, home.index, home.index, Side.NEAR, start_us // 1000)]
-        legs += [
-            Leg(one.action, one.track, one.from_index, one.to_index, Side.NEAR, one.end_us // 1000)
-            for one in route.legs
-        ]
-        itinerary = Itinerary(node, 2, Grade.FIRM, Stamp(0, 1, 1), tuple(legs))
-        self.ends[node] = final_position(self.site, itinerary) or home
-        self._tell(itinerary)
-
-
 def measure_floors(site: CarPark, busy: int, queries: int, fleets: int, seed: int) -> list[str]:
     """One row of the second table: plans of one robot around the firm plans of ``busy`` others, of so many fleets."""
     rng = random.Random(f"{seed} {site.name} {len(site.places)} {busy}")
     took_us: list[float] = []
     expansions: list[int] = []
+    pops: list[int] = []
     found = delayed = 0
     for _ in range(fleets):
         fleet = Fleet(site, rng)
         myself, *others = rng.sample(list(fleet.ends), busy + 1)
         fleet.busy(others)
         for _ in range(queries // fleets):
-            route, one_us = fleet.query(myself, 30 * SECOND)
-            took_us.append(one_us)
+            before = time.process_time_ns()
+            route = fleet.query(myself, 30 * SECOND)
+            took_us.append((time.process_time_ns() - before) / 1000)
+            pops.append(route.pops)
             expansions.append(route.expansions)
             found += isinstance(route, Route)
             delayed += fleet.delayed
     took_us.sort()
     figures = (statistics.median(took_us), took_us[len(took_us) * 99 // 100], took_us[-1])
     row = [busy, *(f"{figure:.0f}" for figure in figures)]
-    return [str(cell) for cell in (*row, statistics.median(expansions), max(expansions), found, delayed)]
+    figures = (*row, statistics.median(expansions), max(expansions), found, delayed, f"{statistics.mean(pops):.0f}")
+    return [str(cell) for cell in figures]
 
 
 def measure_bound(length: int, calls: int) -> float:
@@ -234,7 +138,7 @@ def main() -> None:
     for length, others in ((20, 0), (40, 0), (20, 5), (40, 5), (40, 20)):
         print("  ".join(f"{cell:>11}" for cell in measure(length, others, options.queries, options.seed)))
     print()
-    print("  ".join(f"{head:>11}" for head in ("floors", *heads[1:])))
+    print("  ".join(f"{head:>11}" for head in ("floors", *heads[1:], "pops mean")))
     fleets = max(1, options.queries // QUERIES_A_FLEET)
     for floors, length, compartments, busy in FLEETS:
         row = measure_floors(park(floors, length, compartments), busy, options.queries, fleets, options.seed)

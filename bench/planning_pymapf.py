@@ -23,8 +23,6 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from planning import MAX_EXPANSIONS, Fleet, park
-
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.departures import Departures
@@ -32,6 +30,7 @@ from onboard.ways.reservations import Interval
 from onboard.ways.roads import Roads, roads_of
 from onboard.ways.sipp import Route, Visit, plan_route
 from onboard.ways.site import Axis, TrackKind
+from tests.ways.fleets import MAX_EXPANSIONS, Fleet, park
 
 TICK_US = 400_000
 #: So long that rounding to mm, and a body shorter than a place by a trifle, are less than a millisecond in a tick.
@@ -202,7 +201,7 @@ def measure(site: CarPark, peer: Peer, busy: int, legs: int, queries: int, seed:
         myself, *others = rng.sample(list(fleet.ends), busy + 1)
         for node in others:
             start_us = rng.randrange(150) * TICK_US
-            plan, _ = fleet.query(node, start_us)
+            plan = fleet.query(node, start_us)
             if isinstance(plan, Route):
                 fleet.take(node, start_us, plan)
         start, goals = fleet.ends[myself], [visit.segment for visit in fleet.task()][-legs:]

@@ -7,6 +7,9 @@ from onboard.core.site import Segment
 from onboard.ways.kept import Kept
 from onboard.ways.site import TrackKind, WaySite
 
+#: Sets of lost lifts, in each direction, whose steps are kept.
+_MAX_KEPT = 8
+
 
 class Network:
     """Built once for a site. Lifts that do not run are left out by the ``lost`` tracks of each question."""
@@ -14,6 +17,7 @@ class Network:
     def __init__(self, site: WaySite) -> None:
         self._site = site
         self._on: dict[Segment, tuple[Segment, ...]] = {}
+        self._kept_steps: dict[tuple[frozenset[int], bool], dict[Segment, tuple[Segment, ...]]] = {}
         for track in site.tracks.values():
             if track.kind is not TrackKind.LIFT:
                 for index in range(1, track.length + 1):
@@ -47,43 +51,47 @@ class Network:
         self, starts: Iterable[Segment], *, closed: Collection[Segment] = (), lost: Collection[int] = ()
     ) -> frozenset[Segment]:
         """Segments to which a carrier can come from any of ``starts``; not those that are closed, nor through them."""
-        return self._search(starts, self._on, closed, self._rides(lost, boarding=True))
+        return self._search(starts, self._steps(frozenset(lost), is_back=False), closed)
 
     def to_any(
         self, goals: Iterable[Segment], *, closed: Collection[Segment] = (), lost: Collection[int] = ()
     ) -> frozenset[Segment]:
         """Segments from which a carrier can come to any of ``goals``."""
-        return self._search(goals, self._back, closed, self._rides(lost, boarding=False))
+        return self._search(goals, self._steps(frozenset(lost), is_back=True), closed)
 
     def _search(
-        self,
-        starts: Iterable[Segment],
-        steps: dict[Segment, tuple[Segment, ...]],
-        closed: Collection[Segment],
-        rides: list[tuple[frozenset[Segment], list[Segment]]],
+        self, starts: Iterable[Segment], steps: dict[Segment, tuple[Segment, ...]], closed: Collection[Segment]
     ) -> frozenset[Segment]:
-        ahead = list(starts)
+        ahead = [start for start in starts if start in self._on]
         found: set[Segment] = set()
         while ahead:
             here = ahead.pop()
-            if here in found or here in closed or here not in self._on:
-                continue
-            found.add(here)
-            ahead += steps.get(here, ())
-            for boards, leaves in rides:
-                if here in boards:
-                    ahead += leaves
+            if here not in found and here not in closed:
+                found.add(here)
+                ahead += steps[here]
         return frozenset(found)
 
-    def _rides(self, lost: Collection[int], *, boarding: bool) -> list[tuple[frozenset[Segment], list[Segment]]]:
-        """Of each lift the sills over which one boards, and over which one leaves; the other way round against them."""
-        found = []
+    def _steps(self, lost: frozenset[int], *, is_back: bool) -> dict[Segment, tuple[Segment, ...]]:
+        """Where one comes from each segment, or to it, with rides on the lifts that run; kept."""
+        found = self._kept_steps.get((lost, is_back))
+        if found is None:
+            ways = self._back if is_back else self._on
+            rides: dict[Segment, list[Segment]] = {}
+            for boards, leaves in self._rides(lost):
+                for sill in leaves if is_back else boards:
+                    rides.setdefault(sill, []).extend(boards if is_back else leaves)
+            found = {here: (*ways.get(here, ()), *rides.get(here, ())) for here in self._on}
+            if len(self._kept_steps) >= _MAX_KEPT:
+                self._kept_steps.clear()
+            self._kept_steps[lost, is_back] = found
+        return found
+
+    def _rides(self, lost: Collection[int]) -> Iterator[tuple[list[Segment], list[Segment]]]:
+        """Of each lift that runs the sills over which one boards, and over which one leaves."""
         for lift in self._site.lifts:
             sills = self._site.tracks[lift].joins if lift not in lost else ()
             boards = [sill for sill in sills if self._crosses(sill, is_boarding=True)]
-            leaves = [sill for sill in sills if self._crosses(sill, is_boarding=False)]
-            found.append((frozenset(boards), leaves) if boarding else (frozenset(leaves), boards))
-        return found
+            yield boards, [sill for sill in sills if self._crosses(sill, is_boarding=False)]
 
     def _crosses(self, sill: Segment, *, is_boarding: bool) -> bool:
         beyond = self._site.beyond(sill)

@@ -1,7 +1,7 @@
 """Who plans to be on which segment, and on which lift, when: half-open windows ``[from, to)`` in bus us."""
 
 from bisect import insort
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from typing import NamedTuple
 
 from onboard.core.site import Segment
@@ -50,6 +50,8 @@ class Reservations:
         self._segments: dict[int, set[Segment]] = {}
         self._uses: dict[int, list[Use]] = {}
         self._fixed: set[int] = set()
+        #: What was worked out around all but one owner, by that and more: forgotten when another's windows change.
+        self.kept: dict[tuple[int, Hashable], object] = {}
 
     def fix(self, owner: int) -> None:
         """``owner`` is an obstacle, which never gives way, until it is released."""
@@ -57,6 +59,7 @@ class Reservations:
 
     def reserve(self, owner: int, windows: Iterable[SlotWindow], uses: Iterable[Use] = ()) -> None:
         """Add windows and lift uses of ``owner`` (a node-ID). Raises ``ValueError`` where one has no length."""
+        self._forget(owner)
         touched = self._segments.setdefault(owner, set())
         for window in windows:
             if window.from_us >= window.to_us:
@@ -70,6 +73,7 @@ class Reservations:
 
     def release(self, owner: int) -> None:
         """Remove all windows and uses of ``owner``."""
+        self._forget(owner)
         self._fixed.discard(owner)
         for lift_track, uses in self._uses.items():
             self._uses[lift_track] = [use for use in uses if use.owner != owner]
@@ -79,6 +83,9 @@ class Reservations:
                 self._windows[segment] = kept
             else:
                 del self._windows[segment]
+
+    def _forget(self, owner: int) -> None:
+        self.kept = {key: found for key, found in self.kept.items() if key[0] == owner}
 
     def safe_intervals(self, segment: Segment, owner: int, from_us: int) -> list[Interval]:
         """Gaps that the windows of all but ``owner`` leave from ``from_us`` on, in order; the last may be endless."""

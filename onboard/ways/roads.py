@@ -4,7 +4,7 @@ Built once for a site and kept: run tables are the same for every search. A lift
 each alley that it serves, index 0 or length + 1; a ride is a move from one of them to another.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from heapq import heappop, heappush
 from typing import NamedTuple
 
@@ -19,6 +19,8 @@ from onboard.ways.site import TrackKind, WaySite
 
 #: Goals, and sets of them, whose tables are kept for one site.
 _MAX_GOALS = 1_024
+#: Goals whose least times from each position are kept.
+_MAX_WAYS = 32
 
 
 class Move(NamedTuple):
@@ -44,10 +46,11 @@ class Roads:
         self._hops_in: dict[Segment, list[tuple[Segment, int]]] = {}
         self._junctions: dict[int, list[Segment]] = {}
         self._platforms: dict[Segment, tuple[int, int]] = {}
-        self._moves: dict[Segment, tuple[Move, ...]] = {}
+        self._runs: dict[tuple[Segment, int], tuple[_Run, ...]] = {}
         self._touched: dict[Segment, list[Segment]] = {}
         self._longest: dict[int, tuple[Sweep, ...]] = {}
-        self._alike: dict[tuple[int, int], int] = {}
+        self._swept: dict[tuple[int, int], tuple[tuple[Sweep, ...], int]] = {}
+        self._ways_us: dict[frozenset[Segment], WaysToGoals] = {}
         self._to_goals: dict[frozenset[Segment], _Ways] = {}
         for track in site.tracks.values():
             if track.kind is not TrackKind.LIFT:
@@ -112,18 +115,29 @@ class Roads:
             found = self._touched[position] = aboard + alley_segments(self.site, position)
         return found
 
-    def moves(self, here: Segment) -> tuple[Move, ...]:
-        """All moves from a position: runs by growing index, then hops and rides in the order of the site's tracks."""
-        found = self._moves.get(here)
+    def runs(self, here: Segment, step: int) -> "tuple[_Run, ...]":
+        """Runs from a position along its track to lower (``step`` -1) or higher indices (1), the shortest first.
+
+        With each how many of its first sweeps it shares with the longest run of the track.
+        """
+        found = self._runs.get((here, step))
         if found is None:
-            found = self._moves[here] = (*self._runs(here), *self._hops.get(here, ()))
+            moves = self._find_runs(here, step)
+            found = self._runs[here, step] = tuple(
+                (move, self.swept(here.track, abs(move.destination.index - here.index))[1]) for move in moves
+            )
         return found
 
-    def _runs(self, here: Segment) -> Iterator[Move]:
+    def hops(self, here: Segment) -> Sequence[Move]:
+        """Hops and rides from a position, in the order of the site's tracks."""
+        return self._hops.get(here, ())
+
+    def _find_runs(self, here: Segment, step: int) -> Iterator[Move]:
         durations, pitch_mm = self._run_us[here.track], self.site.tracks[here.track].pitch_mm
-        for _, there in sorted(self._positions[here.track].items()):
-            count = abs(there.index - here.index)
-            if count:
+        positions = self._positions[here.track]
+        for count in range(1, len(positions)):
+            there = positions.get(here.index + step * count)
+            if there is not None:
                 yield Move(there, durations[count], count * pitch_mm)
 
     def run_us(self, track: int, count: int) -> int:
@@ -146,14 +160,14 @@ class Roads:
             found = self._longest[track] = leg_sweeps(self.site, track, count) if count else ()
         return found
 
-    def alike(self, track: int, count: int) -> int:
-        """How many of its first sweeps a run over ``count`` steps shares with the longest one of the track."""
-        found = self._alike.get((track, count))
+    def swept(self, track: int, count: int) -> tuple[tuple[Sweep, ...], int]:
+        """Sweeps of a run over ``count`` steps of a track; how many of the first it shares with the longest one."""
+        found = self._swept.get((track, count))
         if found is None:
             sweeps = leg_sweeps(self.site, track, count)
             pairs = zip(sweeps, self.longest(track), strict=False)
-            found = next((n for n, (one, other) in enumerate(pairs) if one != other), len(sweeps))
-            self._alike[track, count] = found
+            alike = next((n for n, (one, other) in enumerate(pairs) if one != other), len(sweeps))
+            found = self._swept[track, count] = sweeps, alike
         return found
 
     def shortest_us(self, origin: Segment, goal: Segment) -> int:
@@ -168,6 +182,16 @@ class Roads:
         for index, rest_us in ways.get(origin.track, ()):
             least_us = min(least_us, durations[abs(origin.index - index)] + rest_us)
         return least_us
+
+    def ways_us(self, goals: frozenset[Segment]) -> "WaysToGoals":
+        """Least times to any of ``goals`` from everywhere, kept for the goals that were asked for last."""
+        found = self._ways_us.pop(goals, None)
+        if found is None:
+            found = WaysToGoals(self, goals)
+            if len(self._ways_us) >= _MAX_WAYS:
+                del self._ways_us[next(iter(self._ways_us))]
+        self._ways_us[goals] = found
+        return found
 
     def _ways_to(self, goals: frozenset[Segment]) -> "_Ways":
         """Goals and junctions by track, with the least time from each to a goal (Dijkstra 1959, against the moves)."""
@@ -197,6 +221,21 @@ class Roads:
         return self._junctions.get(here.track, ())
 
 
+class WaysToGoals:
+    """Least times from positions to any of some goals, as in ``Roads.nearest_us``, worked out when asked for."""
+
+    def __init__(self, roads: Roads, goals: frozenset[Segment]) -> None:
+        self._roads, self._goals = roads, goals
+        self._from: dict[Segment, int] = {}
+
+    def to_us(self, origin: Segment) -> int:
+        """Least time from a position in microseconds; FOREVER without a way."""
+        found = self._from.get(origin)
+        if found is None:
+            found = self._from[origin] = self._roads.nearest_us(origin, self._goals)
+        return found
+
+
 class DirectedRoads(Roads):
     """Roads of a site with one-way tracks: other sites need not ask for the direction of each run."""
 
@@ -207,9 +246,9 @@ class DirectedRoads(Roads):
         ahead = [(index, rest_us) for index, rest_us in ways if track.goes(origin.index, index)]
         return min((durations[abs(origin.index - index)] + rest_us for index, rest_us in ahead), default=FOREVER)
 
-    def _runs(self, here: Segment) -> Iterator[Move]:
+    def _find_runs(self, here: Segment, step: int) -> Iterator[Move]:
         track = self.site.tracks[here.track]
-        return (run for run in super()._runs(here) if track.goes(here.index, run.destination.index))
+        return (run for run in super()._find_runs(here, step) if track.goes(here.index, run.destination.index))
 
     def _junctions_before(self, here: Segment) -> Collection[Segment]:
         track = self.site.tracks[here.track]
@@ -220,6 +259,7 @@ def _build(site: WaySite) -> Roads:
     return DirectedRoads(site) if any(track.one_way for track in site.tracks.values()) else Roads(site)
 
 
+_Run = tuple[Move, int]
 #: By track: index and time from there to a goal.
 _Ways = dict[int, list[tuple[int, int]]]
 

@@ -8,9 +8,9 @@ refuge that is safe for ever.
 Lifts are moves too: a platform has safe intervals for each floor, and a ride is possible within one gap of the others'
 uses.
 
-Best first by (end of the last visit, arrival in a refuge, effort), bounds as long as they lie ahead. A move is
-queued under a bound from the first segments that it sweeps, and the rest is looked at only when its turn comes (lazy
-evaluation of edges; Cohen, Phillips and Likhachev 2014): most never do.
+Best first by (end of the last visit, arrival in a refuge, effort), bounds as long as they lie ahead. A move is looked
+at whole only where its bound promises an earlier arrival, or an equal one with less effort, than the best known (lazy
+evaluation of edges; Cohen, Phillips and Likhachev 2014); states and edges are kept for the next search.
 """
 
 from collections.abc import Mapping
@@ -19,12 +19,11 @@ from typing import NamedTuple
 
 from onboard.contract.codes import LegAction
 from onboard.core.site import Segment
-from onboard.ways.departures import Departures
+from onboard.ways.edges import NO_EDGE, SAFE, Edge, Edges, State, edges_of
 from onboard.ways.kinematics import ceil_ms
-from onboard.ways.reservations import FOREVER, Interval, Reservations
-from onboard.ways.roads import Move, Roads, roads_of
+from onboard.ways.reservations import FOREVER, Reservations
+from onboard.ways.roads import Roads, roads_of
 from onboard.ways.site import WaySite
-from onboard.ways.stops import Stops
 
 
 class Visit(NamedTuple):
@@ -51,7 +50,7 @@ class RouteLeg(NamedTuple):
 
 
 class Route(NamedTuple):
-    """A plan: its legs, when each visit ends, when the last one ends, and what the search cost.
+    """A plan: its legs, when each visit ends, when the last one ends, and what the search cost: states and queue.
 
     Without visits ``finish_us`` is when the route ends in a refuge.
     """
@@ -60,6 +59,7 @@ class Route(NamedTuple):
     visit_ends_us: tuple[int, ...]
     finish_us: int
     expansions: int
+    pops: int
 
 
 class NoRoute(NamedTuple):
@@ -67,6 +67,7 @@ class NoRoute(NamedTuple):
 
     reason: str
     expansions: int
+    pops: int = 0
 
 
 def free_flow_us(site: WaySite, start: Segment, start_us: int, visits: tuple[Visit, ...]) -> int:
@@ -114,49 +115,41 @@ def plan_route(
     floors = dict(lift_floors or {}) | (dict((aboard,)) if aboard is not None else {})
     if not roads.knows(start) or free_flow_us(site, start, start_us, visits) >= FOREVER:
         return NoRoute("a visit is out of reach of the start", 0)
-    departures = Departures(roads, reservations, owner, start_us, floors)
-    interval = departures.standing_at(start, start_us)
-    if interval is None:
+    edges = edges_of(roads, reservations, owner, start_us, floors)
+    state = edges.state_at(start, start_us)
+    if state is None:
         return NoRoute(f"the start {start} is reserved by another machine", 0)
-    root = _Node(0, start, interval, start_us, None, LegAction.STAND, start_us, (), _Effort(0, 0, 0))
-    return _IntervalSearch(roads, departures, visits, refuges).run(root, max_expansions)
+    root = _Node(0, state, start_us, None, LegAction.STAND, start_us, (), (0, 0, 0))
+    return _IntervalSearch(roads, edges, visits, refuges).run(root, max_expansions)
+
+
+#: What breaks ties: time standing or riding on platforms, which others may want, then distance, then moves.
+_Effort = tuple[int, int, int]
 
 
 class _Node(NamedTuple):
     """A state reached at ``time_us`` from ``parent`` by a leg that began at ``begin_us``."""
 
     phase: int
-    segment: Segment
-    interval: Interval
+    state: State
     time_us: int
     parent: "_Node | None"
     action: LegAction
     begin_us: int
     visit_ends_us: tuple[int, ...]
-    effort: "_Effort"
+    effort: _Effort
+
+    @property
+    def label(self) -> "_Label":
+        """Of those of a state the least is how it is reached."""
+        return self.time_us, *self.effort, -self.begin_us
 
 
-class _Effort(NamedTuple):
-    """What breaks ties: time standing or riding on platforms, which others may want, then distance, then moves."""
-
-    aboard_us: int
-    travel_mm: int
-    moves: int
-
-
-class _Untried(NamedTuple):
-    """A move to a safe interval of its destination, not before ``arrival_us``, with departures to choose from."""
-
-    move: Move
-    interval: Interval
-    arrival_us: int
-    choice: list[Interval]
-
-
-#: (end of the last visit, arrival in a refuge, effort, minus the last move's beginning, order of discovery).
-_Key = tuple[int, int, _Effort, int, int]
-#: In a key, of a move that is still to be tried: it comes before all states that are as good.
-_UNTRIED = -FOREVER
+#: Arrival, effort, minus the last move's beginning.
+_Label = tuple[int, int, int, int, int]
+#: (End of the last visit, arrival in a refuge), (effort, minus the last move's beginning), order of discovery, node.
+#: That is the order of the states that it comes from, then of runs by index, then of hops: nothing kept changes it.
+_Entry = tuple[tuple[int, int], tuple[int, int, int, int], tuple[int, bool, Segment, int], _Node]
 
 
 class _IntervalSearch:
@@ -166,94 +159,98 @@ class _IntervalSearch:
     max(t + work, floor) with nobody in the way.
     """
 
-    def __init__(
-        self,
-        roads: Roads,
-        departures: Departures,
-        visits: tuple[Visit, ...],
-        refuges: frozenset[Segment],
-    ) -> None:
+    def __init__(self, roads: Roads, edges: Edges, visits: tuple[Visit, ...], refuges: frozenset[Segment]) -> None:
         self.roads = roads
-        self.departures = departures
+        self.edges = edges
         self.visits = visits
         self.refuges = refuges
-        targets = [frozenset((visit.segment,)) for visit in visits]
-        self._stops = [Stops(roads, departures, goals) for goals in (*targets, refuges)]
-        self._targets = (*targets, refuges)
-        self._way_us: list[dict[Segment, int]] = [{} for _ in self._targets]
+        self._targets = (*(frozenset((visit.segment,)) for visit in visits), refuges)
+        self._ways_us = [roads.ways_us(goals) for goals in self._targets]
         self._tails = _tails(roads, visits)
-        self._queue: list[tuple[_Key, _Node, _Untried | None]] = []
-        self._pushed = 0
-        #: By phase, segment and begin of the interval: later arrivals than this are of no use.
-        self._useful_us: list[dict[Segment, dict[int, int]]] = [{} for _ in self._targets]
+        self._queue: list[_Entry] = []
+        self.expansions = 0
+        self._goal_tracks = [{goal.track for goal in goals} for goals in self._targets]
+        #: By phase: the best label of each state.
+        self._best: list[dict[int, _Label]] = [{} for _ in self._targets]
+        #: By phase: intervals of its visit that are not reached yet. When there are none the phase is over.
+        self._open = [{state for state in edges.states(visit.segment) if _fits(state, visit)} for visit in visits]
+        #: End of the last visit and arrival in a refuge of the best route found.
+        self._found = FOREVER, FOREVER
 
     def run(self, root: _Node, max_expansions: int) -> Route | NoRoute:
-        """Search from ``root``; see ``plan_route``. The queue holds nodes, and nodes with a move still to be tried."""
+        """Search from ``root``; see ``plan_route``."""
         self._push(root)
-        expansions = 0
+        pops = 0
         while self._queue:
-            _, node, untried = heappop(self._queue)
-            if untried is not None:
-                self._try(node, untried)
+            *_, node = heappop(self._queue)
+            pops += 1
+            phase, state = node.phase, node.state
+            if self._best[phase][state.number] != node.label or self._is_over(phase):
                 continue
-            if not self._is_useful(node):
-                continue
-            if self._is_goal(node):
+            if self._is_goal(phase, state):
                 finish_us = node.visit_ends_us[-1] if node.visit_ends_us else node.time_us
-                return Route(tuple(_legs(self.roads, node)), node.visit_ends_us, finish_us, expansions)
-            if expansions >= max_expansions:
-                return NoRoute("the search's bound of expansions is reached", expansions)
-            expansions += 1
-            # From now on one has to be earlier; until now it was enough to be as early.
-            self._useful_us[node.phase][node.segment][node.interval.from_us] = node.time_us - 1
+                return Route(tuple(_legs(self.roads, node)), node.visit_ends_us, finish_us, self.expansions, pops)
+            if self.expansions >= max_expansions:
+                return NoRoute("the search's bound of expansions is reached", self.expansions, pops)
+            self.expansions += 1
+            # From now on one has to be earlier; until now it was enough to be as early, with less effort. A state can
+            # come up again earlier after the last visit only: by a route that ends that visit later.
+            self._best[phase][state.number] = node.time_us, -1, 0, 0, 0
             self._expand(node)
-        return NoRoute("no order of waits and moves leads to the goal and a refuge", expansions)
+        return NoRoute("no order of waits and moves leads to the goal and a refuge", self.expansions, pops)
 
-    def _is_useful(self, node: _Node) -> bool:
-        """Whether a state was not reached earlier, nor left before at the same time or earlier.
+    def _is_goal(self, phase: int, state: State) -> bool:
+        return phase == len(self.visits) and state.segment in self.refuges and state.to_us >= FOREVER
 
-        A state can come up again earlier after the last visit only: by a route that ends that visit later.
-        """
-        return node.time_us <= self._useful_us[node.phase].get(node.segment, {}).get(node.interval.from_us, FOREVER)
-
-    def _is_goal(self, node: _Node) -> bool:
-        return node.phase == len(self.visits) and node.segment in self.refuges and node.interval.to_us >= FOREVER
+    def _is_over(self, phase: int) -> bool:
+        """Whether each interval of a phase's visit has been reached as early as it can be."""
+        return phase < len(self.visits) and not self._open[phase]
 
     def _expand(self, node: _Node) -> None:
-        """Queue the dwell of the next visit, if it is here, and every move under the least time that it takes."""
-        if node.phase < len(self.visits) and self.visits[node.phase].segment == node.segment:
-            self._push_dwell(node, self.visits[node.phase])
-        within = Interval(node.time_us, node.interval.to_us)
-        all_useful_us = self._useful_us[node.phase]
-        moves = self._stops[node.phase].moves(node.segment, node.time_us)
-        for move, choice in self.departures.moves(node.segment, moves, within):
-            first_us, last_us = choice[0].from_us + move.duration_us, choice[-1].to_us + move.duration_us
-            useful_us = all_useful_us.get(move.destination, {})
-            for interval in self.departures.standing(move.destination):
-                if interval.from_us >= last_us:
-                    break
-                arrival_us = max(first_us, interval.from_us)
-                if arrival_us < interval.to_us and arrival_us <= useful_us.get(interval.from_us, FOREVER):
-                    self._queue_move(node, _Untried(move, interval, arrival_us, choice))
+        """Queue the dwell of the next visit, if it is here, and every move that leads to its state best."""
+        phase, state, time_us = node.phase, node.state, node.time_us
+        if phase < len(self.visits) and self.visits[phase].segment == state.segment:
+            self._push_dwell(node, self.visits[phase])
+        edges = self.edges.edges(state, time_us)
+        if state.segment.track in self._goal_tracks[phase]:
+            self._push_moves(node, self.edges.to_goals(state, self._targets[phase]))
+        self._push_moves(node, edges)
 
-    def _queue_move(self, node: _Node, untried: "_Untried") -> None:
-        ends = self._ends_us(node, untried.move.destination, untried.arrival_us)
-        if max(ends) < FOREVER:
-            self._pushed += 1
-            heappush(self._queue, ((*ends, node.effort, _UNTRIED, self._pushed), node, untried))
+    def _push_moves(self, node: _Node, edges: list[Edge]) -> None:
+        """Queue each move's earliest arrival in its state, where none that is as good is known.
 
-    def _effort(self, node: _Node, move: Move, arrival_us: int) -> _Effort:
-        aboard_us, travel_mm, moves = node.effort
-        if self.roads.lift_at(node.segment) is not None:
-            aboard_us += arrival_us - node.time_us
-            if move.lift_track is None:
-                aboard_us -= move.duration_us
-        return _Effort(aboard_us, travel_mm + move.distance_mm, moves + 1)
+        A bound that promises one is looked at, and what it comes to meets its turn in this very loop.
+        """
+        phase, state, time_us, _, _, _, visit_ends_us, (aboard_us, travel_mm, moves) = node
+        best, is_aboard = self._best[phase], self.roads.lift_at(state.segment) is not None
+        is_last, is_any_over = phase == len(self.visits), False
+        for place, (first_us, last_us, until_us, duration_us, number, distance_mm, clear_us) in enumerate(edges):
+            depart_us = max(first_us, time_us)
+            if depart_us >= last_us or until_us <= time_us:
+                continue
+            arrival_us = depart_us + duration_us
+            known = best.get(number)
+            if (known is not None and arrival_us > known[0]) or (is_last and arrival_us > self._found[1]):
+                continue
+            waited_us = ((depart_us if distance_mm else arrival_us) - time_us) if is_aboard else 0
+            effort = aboard_us + waited_us, travel_mm + distance_mm, moves + 1
+            if known is not None and (arrival_us, *effort, -depart_us) >= known:
+                continue
+            if clear_us != SAFE:
+                edges += self.edges.looked_at(state, edges[place])
+                edges[place] = NO_EDGE
+                is_any_over = True
+                continue
+            leg, there = LegAction.TRAVEL if distance_mm else LegAction.RIDE, self.edges.numbered[number]
+            self._push(_Node(phase, there, arrival_us, node, leg, depart_us, visit_ends_us, effort))
+        if is_any_over:
+            edges[:] = [edge for edge in edges if edge is not NO_EDGE]
 
     def _push_dwell(self, node: _Node, visit: Visit) -> None:
         begin_us = max(node.time_us, ceil_ms(visit.not_before_us))
         end_us = begin_us + ceil_ms(visit.dwell_us)
-        if end_us <= node.interval.to_us:
+        self._open[node.phase].discard(node.state)
+        if end_us <= node.state.to_us:
             self._push(
                 node._replace(
                     phase=node.phase + 1,
@@ -265,51 +262,29 @@ class _IntervalSearch:
                 )
             )
 
-    def _try(self, node: _Node, untried: "_Untried") -> None:
-        """Queue the earliest arrival of a move in a safe interval of its destination."""
-        move, interval = untried.move, untried.interval
-        useful_us = self._useful_us[node.phase].get(move.destination, {})
-        if untried.arrival_us > useful_us.get(interval.from_us, FOREVER):
-            return
-        depart_us = self.departures.first(node.segment, move, untried.choice, interval)
-        if depart_us is None:
-            return
-        self._push(
-            _Node(
-                node.phase,
-                move.destination,
-                interval,
-                depart_us + move.duration_us,
-                node,
-                LegAction.TRAVEL if move.lift_track is None else LegAction.RIDE,
-                depart_us,
-                node.visit_ends_us,
-                self._effort(node, move, depart_us + move.duration_us),
-            )
-        )
-
     def _push(self, node: _Node) -> None:
-        ends = self._ends_us(node, node.segment, node.time_us)
-        if self._is_useful(node) and max(ends) < FOREVER:
-            self._pushed += 1
-            useful_us = self._useful_us[node.phase].setdefault(node.segment, {})
-            useful_us[node.interval.from_us] = min(node.time_us, useful_us.get(node.interval.from_us, FOREVER))
-            heappush(self._queue, ((*ends, node.effort, -node.begin_us, self._pushed), node, None))
+        """Queue a node whose label is better than the best of its state."""
+        phase, state = node.phase, node.state
+        way_us = self._ways_us[phase].to_us(state.segment)
+        if phase < len(self.visits):
+            work_us, floor_us = self._tails[phase]
+            # Before the last visit is over the second is the time itself: the same end leads to the same refuge.
+            ends_us = max(node.time_us + way_us + work_us, floor_us), node.time_us
+        else:
+            # Without visits all ends are equal.
+            ends_us = node.visit_ends_us[-1] if node.visit_ends_us else 0, node.time_us + way_us
+        label, known = node.label, self._best[phase].get(state.number)
+        if max(ends_us) < FOREVER and ends_us <= self._found and (known is None or label < known):
+            self._best[phase][state.number] = label
+            if self._is_goal(phase, state):
+                self._found = ends_us
+            here = state.segment if node.parent is None else node.parent.state.segment
+            order = self.expansions, state.segment.track != here.track, state.segment, state.from_us
+            heappush(self._queue, (ends_us, label[1:], order, node))
 
-    def _ends_us(self, node: _Node, segment: Segment, time_us: int) -> tuple[int, int]:
-        """Earliest end of the last visit, and then arrival in a refuge, from standing at ``segment`` at ``time_us``.
 
-        Before the last visit is over the second is the time itself: the same end leads to the same refuge. Without
-        visits all ends are equal.
-        """
-        ways = self._way_us[node.phase]
-        way_us = ways.get(segment)
-        if way_us is None:
-            way_us = ways[segment] = self.roads.nearest_us(segment, self._targets[node.phase])
-        if node.phase == len(self.visits):
-            return (node.visit_ends_us[-1] if node.visit_ends_us else 0), time_us + way_us
-        work_us, floor_us = self._tails[node.phase]
-        return max(time_us + way_us + work_us, floor_us), time_us
+def _fits(state: State, visit: Visit) -> bool:
+    return max(state.from_us, ceil_ms(visit.not_before_us)) + ceil_ms(visit.dwell_us) <= state.to_us
 
 
 def _tails(roads: Roads, visits: tuple[Visit, ...]) -> list[tuple[int, int]]:
@@ -334,7 +309,7 @@ def _legs(roads: Roads, node: _Node) -> list[RouteLeg]:
     legs: list[RouteLeg] = []
     while node.parent is not None:
         before = node.parent
-        here, there = before.segment, node.segment
+        here, there = before.state.segment, node.state.segment
         hops = here.track != there.track
         if node.action is LegAction.RIDE:
             legs.append(_ride(roads, node, here))
@@ -348,7 +323,7 @@ def _legs(roads: Roads, node: _Node) -> list[RouteLeg]:
 
 
 def _ride(roads: Roads, node: _Node, here: Segment) -> RouteLeg:
-    stops = roads.lift_at(here), roads.lift_at(node.segment)
+    stops = roads.lift_at(here), roads.lift_at(node.state.segment)
     if stops[0] is None or stops[1] is None:
-        raise AssertionError(f"a ride from {here} to {node.segment}, which are no platforms")
+        raise AssertionError(f"a ride from {here} to {node.state.segment}, which are no platforms")
     return RouteLeg(LegAction.RIDE, stops[0][0], stops[0][1], stops[1][1], node.begin_us, node.time_us)

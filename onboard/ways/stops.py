@@ -8,51 +8,27 @@ every run goes the same way, so it passes what is held at the same times. (Up to
 milliseconds.)
 """
 
-from onboard.core.site import Segment
 from onboard.ways.departures import Departures
 from onboard.ways.occupancy import body_mm
 from onboard.ways.reservations import FOREVER
-from onboard.ways.roads import Move, Roads
+from onboard.ways.roads import Roads
 
 
-class Stops:
-    """Moves that a search has to try, for one set of ``goals``: positions at which a visit or the route can end."""
+def paying_until_us(departures: Departures, track: int) -> dict[int, int]:
+    """Until when stopping at each position of a track (by index) may pay; 0 for never, FOREVER at junctions.
 
-    def __init__(self, roads: Roads, departures: Departures, goals: frozenset[Segment]) -> None:
-        self._roads = roads
-        self._departures = departures
-        self._goals = goals
-        self._until_us: dict[int, dict[Segment, int]] = {}
-        self._moves: dict[Segment, list[tuple[Move, int]]] = {}
-
-    def moves(self, here: Segment, from_us: int) -> list[Move]:
-        """Those of the roads' moves from a position that may pay with a departure from ``from_us`` on, in order."""
-        found = self._moves.get(here)
-        if found is None:
-            until = self._until(here.track)
-            moves = self._roads.moves(here)
-            # Who changes the track comes to a junction, where stopping always may pay.
-            found = [(move, until.get(move.destination, FOREVER)) for move in moves]
-            found = self._moves[here] = [(move, until_us) for move, until_us in found if until_us]
-        return [move for move, until_us in found if until_us > from_us]
-
-    def _until(self, track: int) -> dict[Segment, int]:
-        """Until when stopping at each position of a track may pay; 0 for never."""
-        found = self._until_us.get(track)
-        if found is None:
-            positions = list(self._roads.positions(track))
-            far = settling_segments(self._roads, track)
-            found = dict.fromkeys(positions, 0)
-            for middle in positions:
-                held_us = self._departures.held_until_us(middle)
-                for one in positions if held_us else ():
-                    if abs(one.index - middle.index) <= far:
-                        found[one] = max(found[one], held_us)
-            for always in (*self._roads.junctions(track), *self._goals):
-                if always in found:
-                    found[always] = FOREVER
-            self._until_us[track] = found
-        return found
+    For a goal it always pays, which is for the caller to add.
+    """
+    roads = departures.roads
+    found = {position.index: 0 for position in roads.positions(track)}
+    far = settling_segments(roads, track)
+    for middle in roads.positions(track):
+        held_us = departures.held_until_us(middle)
+        for index in range(middle.index - far, middle.index + far + 1) if held_us else ():
+            if index in found and found[index] < held_us:
+                found[index] = held_us
+    found.update((one.index, FOREVER) for one in roads.junctions(track) if one.index in found)
+    return found
 
 
 def settling_segments(roads: Roads, track: int) -> int:

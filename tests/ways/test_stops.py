@@ -64,6 +64,7 @@ def test_every_plan_ends_as_early_as_with_stops_everywhere(chunk: int, monkeypat
         pruned = plan_route(site, reservations, 11, start, 0, visits, refuges, BOUND)
         with monkeypatch.context() as patch:
             patch.setattr(stops, "settling_segments", lambda roads, track: LENGTH + 2)
+            reservations.kept.clear()
             whole = plan_route(site, reservations, 11, start, 0, visits, refuges, BOUND)
         shorter += pruned.expansions < whole.expansions
         if isinstance(whole, Route):

@@ -1,0 +1,303 @@
+"""The states of a route search and the moves between them: worked out when first asked for, kept while plans last.
+
+A state is a safe interval of a position. An edge is a move to one of the safe intervals of its destination; its first
+departure is a bound until somebody asks for it, for most edges are never the best way to where they lead.
+
+Runs in one direction sweep their first segments alike, however far they go: so these are taken one after the other, and
+where they leave no departure all longer runs are out of the question too.
+"""
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+
+from onboard.core.site import Segment
+from onboard.ways.departures import Departures, Held
+from onboard.ways.kinematics import ceil_ms
+from onboard.ways.lifts import platform
+from onboard.ways.occupancy import Sweep, junction_segments
+from onboard.ways.reservations import FOREVER, Reservations
+from onboard.ways.roads import Roads
+from onboard.ways.stops import paying_until_us
+
+_MS = 1_000
+#: Sets of goals for which a state keeps its edges.
+_MAX_GOAL_SETS = 4
+#: Searches from different times, or of different machines, whose edges are kept.
+_MAX_KEPT = 4
+
+
+class State:
+    """A safe interval ``[from_us, to_us)`` for standing at a position; its number is its place among all states."""
+
+    __slots__ = ("edges", "from_us", "number", "segment", "since_us", "to_goals", "to_us")
+
+    def __init__(self, number: int, segment: Segment, from_us: int, to_us: int) -> None:
+        self.number = number
+        self.segment = segment
+        self.from_us = from_us
+        self.to_us = to_us
+        #: Edges hold for whoever stands here at ``since_us`` or later; those to goals by the goals' own set.
+        self.since_us = FOREVER
+        self.edges: list[Edge] = []
+        self.to_goals: dict[frozenset[Segment], list[Edge]] = {}
+
+
+#: A move that leads from one state to another if it departs during ``[first, last)``: first, last, until, duration, the
+#: number of the state that it leads to, what the carrier drives in mm (nothing on a lift), clear. It pays to make it
+#: only while one stands here before ``until``. Departures are bounds, some may be safe at most, unless clear is
+#: ``SAFE``: until ``clear`` those sweeps are clear that a run shares with all longer ones. A plain tuple of integers:
+#: thousands are kept, and what refers to nothing else the collector of garbage leaves alone.
+Edge = tuple[int, int, int, int, int, int, int]
+SAFE = -1
+#: What is left of a bound that was looked at.
+NO_EDGE: Edge = (0, 0, 0, 0, 0, 0, SAFE)
+_NEVER_CLEAR = 0
+
+#: Begins and ends of the windows that others hold of a segment, and when the move enters and leaves it.
+_Check = tuple[Sequence[int], Sequence[int], int, int]
+
+
+def _first_safe(checks: list[_Check], depart_us: int, last_us: int) -> tuple[int, int]:
+    """The first of the departures in ``[depart, last)`` that are safe; FOREVER for none, and the last one behind it.
+
+    It gets later whenever a check meets what is held, until all of them are clear. A whole millisecond.
+    """
+    until_us, count = FOREVER, len(checks)
+    place = clear = 0
+    while clear < count:
+        begins, ends, enter_us, leave_us = checks[place]
+        meets = bisect_right(ends, depart_us + enter_us)
+        if meets < len(ends):
+            clear_us = begins[meets] - leave_us
+            if clear_us < depart_us:
+                depart_us = -((enter_us - ends[meets]) // _MS) * _MS
+                if depart_us >= last_us:
+                    return FOREVER, FOREVER
+                clear, until_us = 0, FOREVER
+                continue
+            until_us = min(until_us, clear_us)
+        clear += 1
+        place = place + 1 if place + 1 < count else 0
+    return depart_us, until_us
+
+
+class _Shared:
+    """What runs in one direction share: the ``known`` first sweeps, and the departures ``[from, to)`` that these leave.
+
+    The first departures are clear of them until ``clear_us``.
+    """
+
+    __slots__ = ("_held", "_index", "_longest", "_step", "clear_us", "from_us", "known", "to_us")
+
+    def __init__(
+        self, longest: tuple[Sweep, ...], held: dict[int, Held], index: int, step: int, from_us: int, to_us: int
+    ) -> None:
+        self._longest, self._held, self._index, self._step = longest, held, index, step
+        self.from_us, self.to_us = from_us, to_us
+        self.clear_us, self.known = FOREVER, 0
+
+    def take(self, count: int) -> None:
+        """Take the first ``count`` sweeps into account."""
+        from_us, clear_us, known = self.from_us, self.clear_us, self.known
+        held, index, step = self._held, self._index, self._step
+        while known < count and from_us < self.to_us:
+            offset, enter_us, leave_us = self._longest[known]
+            known += 1
+            windows = held.get(index + step * offset)
+            if windows is None:
+                continue
+            begins, ends = windows
+            meets = bisect_right(ends, from_us + enter_us)
+            if meets == len(ends):
+                continue
+            if begins[meets] - leave_us < from_us:
+                from_us = -((enter_us - ends[meets]) // _MS) * _MS
+                known, clear_us = 0, FOREVER
+            else:
+                clear_us = min(clear_us, begins[meets] - leave_us)
+                self._end(windows, enter_us, leave_us)
+        self.from_us, self.clear_us, self.known = from_us, clear_us, known
+
+    def _end(self, windows: Held, enter_us: int, leave_us: int) -> None:
+        """The last departure is found as the first one is, from the other side."""
+        begins, ends = windows
+        meets = bisect_right(ends, self.to_us - 1 + enter_us)
+        while meets < len(ends) and begins[meets] - leave_us < self.to_us - 1:
+            self.to_us = begins[meets] - leave_us + 1
+            meets = bisect_right(ends, self.to_us - 1 + enter_us)
+
+
+class Edges:
+    """States and edges around the reservations of ``departures``."""
+
+    def __init__(self, departures: Departures) -> None:
+        self.departures = departures
+        self._roads: Roads = departures.roads
+        #: All states that were asked for, by their numbers.
+        self.numbered: list[State] = []
+        self._states: dict[Segment, list[State]] = {}
+        self._until_us: dict[int, dict[int, int]] = {}
+
+    def states(self, segment: Segment) -> list[State]:
+        """The safe intervals for standing at a position, in order."""
+        found = self._states.get(segment)
+        if found is None:
+            safe = self.departures.standing(segment)
+            numbers = enumerate(safe, start=len(self.numbered))
+            found = self._states[segment] = [
+                State(number, segment, from_us, to_us) for number, (from_us, to_us) in numbers
+            ]
+            self.numbered += found
+        return found
+
+    def state_at(self, segment: Segment, time_us: int) -> State | None:
+        """The state of standing at a segment at a time, or None."""
+        for state in self.states(segment):
+            if state.from_us <= time_us < state.to_us:
+                return state
+        return None
+
+    def edges(self, state: State, from_us: int) -> list[Edge]:
+        """Moves from a state to where stopping may pay, for departures from ``from_us`` on, in the roads' order."""
+        if from_us < state.since_us:
+            state.since_us = from_us
+            state.to_goals.clear()
+            state.edges = self._runs(state, from_us, self._paying_until(state.segment.track))
+            if self._roads.hops(state.segment):
+                state.edges += self._hops(state, from_us)
+        return state.edges
+
+    def to_goals(self, state: State, goals: frozenset[Segment]) -> list[Edge]:
+        """Runs to those of ``goals`` on the same track at which stopping does not always pay, the earliest first.
+
+        For departures from when ``edges`` was asked for on.
+        """
+        found = state.to_goals.get(goals)
+        if found is None:
+            track = state.segment.track
+            until_us = self._paying_until(track)
+            on_track = {
+                one.index: FOREVER for one in goals if one.track == track and until_us.get(one.index, FOREVER) < FOREVER
+            }
+            if len(state.to_goals) >= _MAX_GOAL_SETS:
+                state.to_goals.clear()
+            found = state.to_goals[goals] = self._runs(state, state.since_us, on_track) if on_track else []
+            found.sort(key=_arrival_us)
+        return found
+
+    def _paying_until(self, track: int) -> dict[int, int]:
+        found = self._until_us.get(track)
+        if found is None:
+            found = self._until_us[track] = paying_until_us(self.departures, track)
+        return found
+
+    def _runs(self, state: State, from_us: int, until_us: dict[int, int]) -> list[Edge]:
+        """Runs along the track to indices of ``until_us`` that is later than ``from_us``, by growing index."""
+        return self._runs_towards(state, from_us, -1, until_us)[::-1] + self._runs_towards(state, from_us, 1, until_us)
+
+    def _runs_towards(self, state: State, from_us: int, step: int, until_us: dict[int, int]) -> list[Edge]:
+        """Runs in one direction, the nearest first."""
+        found: list[Edge] = []
+        here = state.segment
+        held = self.departures.held_on(here.track)
+        shared = _Shared(self._roads.longest(here.track), held, here.index, step, from_us, state.to_us)
+        for (there, duration_us, distance_mm, _), alike in self._roads.runs(here, step):
+            pays_us = until_us.get(there.index, 0)
+            if pays_us <= from_us:
+                continue
+            if shared.known < alike:
+                shared.take(alike)
+                if shared.from_us >= shared.to_us:
+                    break
+            depart_us, to_us = shared.from_us, shared.to_us
+            for one in self.states(there):
+                last_us = one.to_us - duration_us
+                if depart_us >= last_us:
+                    continue
+                first_us = max(depart_us, -((duration_us - one.from_us) // _MS) * _MS)
+                if first_us >= to_us:
+                    break
+                last_us = min(last_us, to_us)
+                if first_us < last_us:
+                    found.append((first_us, last_us, pays_us, duration_us, one.number, distance_mm, shared.clear_us))
+        return found
+
+    def _hops(self, state: State, from_us: int) -> list[Edge]:
+        """Hops to other tracks and rides on a lift."""
+        return [
+            (first_us, last_us, FOREVER, duration_us, one.number, distance_mm, _NEVER_CLEAR)
+            for there, duration_us, distance_mm, _ in self._roads.hops(state.segment)
+            for one in self.states(there)
+            if (first_us := max(from_us, ceil_ms(one.from_us - duration_us)))
+            < (last_us := min(one.to_us - duration_us, state.to_us))
+        ]
+
+    def looked_at(self, here: State, edge: Edge) -> list[Edge]:
+        """What a bound comes to: the first departures that are safe, if any, and a bound behind them."""
+        _, last_us, until_us, duration_us, number, distance_mm, _ = edge
+        safe_us, clear_us = self._safe(here.segment, edge)
+        if safe_us >= FOREVER:
+            return []
+        behind_us = ceil_ms(clear_us + 1)
+        found = [(safe_us, min(behind_us, last_us), until_us, duration_us, number, distance_mm, SAFE)]
+        if behind_us < last_us:
+            found.append((behind_us, last_us, until_us, duration_us, number, distance_mm, _NEVER_CLEAR))
+        return found
+
+    def _safe(self, here: Segment, edge: Edge) -> tuple[int, int]:
+        """The first departure of an edge that is safe, in whole milliseconds, and the last one behind it.
+
+        FOREVER for none.
+        """
+        first_us, last_us, _, duration_us, number, distance_mm, clear_us = edge
+        there = self.numbered[number].segment
+        if here.track != there.track:
+            return _first_safe(self._hop_checks(here, there, duration_us, distance_mm), first_us, last_us)
+        if first_us <= clear_us:
+            depart_us, until_us = _first_safe(self._run_checks(here, there, True), first_us, last_us)
+            if depart_us <= clear_us or depart_us >= FOREVER:
+                return depart_us, min(until_us, clear_us)
+            first_us = depart_us
+        return _first_safe(self._run_checks(here, there, False), first_us, last_us)
+
+    def _hop_checks(self, here: Segment, there: Segment, duration_us: int, distance_mm: int) -> list[_Check]:
+        lift = None if distance_mm else self._roads.lift_at(here)
+        taken = junction_segments(self._roads.site, here, there) if lift is None else [platform(lift[0])]
+        return [(*self.departures.held(segment), 0, duration_us) for segment in taken]
+
+    def _run_checks(self, here: Segment, there: Segment, is_begun: bool) -> list[_Check]:
+        """What a run sweeps that others hold; if it is begun, without what it shares with all longer runs.
+
+        From or to a platform it crosses the lift's sill while the platform is there.
+        """
+        roads, index, held = self._roads, here.index, self.departures.held_on(here.track)
+        step = 1 if there.index > index else -1
+        sweeps, alike = roads.swept(here.track, abs(there.index - index))
+        found = [
+            (*held[index + step * offset], enter_us, leave_us)
+            for offset, enter_us, leave_us in (sweeps[alike:] if is_begun else sweeps)
+            if index + step * offset in held
+        ]
+        reach = -sweeps[0].offset
+        for position, sweep in ((here, sweeps[reach]), (there, sweeps[-1 - reach])):
+            if roads.lift_at(position) is not None:
+                found.append((*self.departures.held(position), sweep.enter_us, sweep.leave_us))
+        return found
+
+
+def _arrival_us(edge: Edge) -> int:
+    return edge[0] + edge[3]
+
+
+def edges_of(
+    roads: Roads, reservations: Reservations, owner: int, start_us: int, lift_floors: Mapping[int, int]
+) -> Edges:
+    """The states and edges of what all but ``owner`` hold from ``start_us`` on, kept while they do."""
+    key = owner, (start_us, tuple(sorted(lift_floors.items())))
+    found = reservations.kept.get(key)
+    if not isinstance(found, Edges):
+        found = Edges(Departures(roads, reservations, owner, start_us, lift_floors))
+        while len(reservations.kept) >= _MAX_KEPT:
+            del reservations.kept[next(iter(reservations.kept))]
+        reservations.kept[key] = found
+    return found
