@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
-from onboard.contract.base import FrameCode
+from onboard.contract.base import FrameCode, SetFrame
 from onboard.contract.codes import Grade, Reason
 from onboard.contract.messages import (
     Call,
@@ -30,7 +30,7 @@ _NODE_MASK = 0xFF
 #: What a call says where no car is meant (dbc/fleet.dbc); no site takes cars so short.
 NO_WHEELBASE_MM = 1500
 #: Decoded frames kept for the other receivers of the same frame: a simulated fleet decodes each frame once.
-_MEMORY = 4096
+_MEMORY = 1024
 #: Frames of the two contracts of all.
 _FLEET = (*presence.FRAMES, *rights.FRAMES, *calls.FRAMES, *plans.FRAMES)
 _DEVICE = device.FRAMES
@@ -76,6 +76,11 @@ class Codec:
         if frame.is_error or frame.is_remote or not frame.is_extended:
             return Reason.UNKNOWN_IDENTIFIER
         return self._known(frame.arbitration_id, frame.data)
+
+    def whole(self, arbitration_id: int, data: bytes) -> Message | None:
+        """The message of a classic data frame with a 29-bit identifier; None for a part of a set and what is none."""
+        found = self._known(arbitration_id, data)
+        return found if isinstance(found, Message) and not isinstance(found, SetFrame) else None
 
     def name_of(self, frame: Frame) -> str | None:
         """The DBC name of a frame's message, or None."""
@@ -133,6 +138,11 @@ _SETS: dict[type[Message], Callable[[Any], tuple[Message, ...]]] = {
     CallForProposals: _parts_of_call,
     Itinerary: _parts_of_itinerary,
 }
+
+
+def is_one_frame(message: Message) -> bool:
+    """Whether a message of either bus is one frame, not a set."""
+    return type(message) not in _SETS
 
 
 def _wheelbase_mm(call: CallForProposals) -> int:
