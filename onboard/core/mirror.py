@@ -5,6 +5,7 @@ occupies, and what else is believed of the site's things, a system's own mirror 
 costs time, never safety: what moves is guarded by tokens.
 """
 
+from binascii import crc_hqx
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -50,13 +51,7 @@ class Obstacle(NamedTuple):
 
 def _crc16(values: list[int]) -> int:
     """CRC-16/CCITT-FALSE over the values as 32-bit big-endian words: short, and the same in any language."""
-    crc = 0xFFFF
-    for value in values:
-        for byte in (value & 0xFFFFFFFF).to_bytes(4, "big"):
-            crc ^= byte << 8
-            for _ in range(8):
-                crc = (crc << 1 ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
-    return crc
+    return crc_hqx(b"".join((value & 0xFFFFFFFF).to_bytes(4, "big") for value in values), 0xFFFF)
 
 
 @dataclass
@@ -65,6 +60,8 @@ class Mirror:
 
     #: Messages that only who has its rights may say, beside those of the core.
     vouching: ClassVar[tuple[type[Message], ...]] = ()
+    #: Messages that change the digest of all who hear them.
+    digested: ClassVar[tuple[type[Message], ...]] = (Itinerary,)
 
     site: Site
     node_id: int
@@ -88,7 +85,8 @@ class Mirror:
             return False
         fresh = known is None or known.boot != beat.boot or starts
         if fresh:
-            self._forget_plan(beat.sender)
+            if known is not None or beat.state is MachineState.STARTING:
+                self._forget_plan(beat.sender)
             self.boots_before[beat.sender] = known.boot if known is not None else 0
         since_us = now_us if known is None or fresh else known.since_us
         self.peers[beat.sender] = Peer(

@@ -186,6 +186,8 @@ class Holon:
             self.drops[self.presence.foreign[message.sender][0]] += 1
             return []
         effects = self._awake(now_us)
+        if self.presence.is_back(message.sender, now_us):
+            self.fixed.on_return(now_us + self.witness.slot_us, now_us)
         self.mirror.hear(message, now_us)
         self.presence.heard(message.sender, now_us)
         handler = self._handlers.get(type(message))
@@ -435,6 +437,8 @@ class Holon:
         else:
             if self.part.begins:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
+        is_starting = self.behaviour.state is MachineState.STARTING
+        self.fixed.tell_soon(effects, now_us, is_news=self.witness.heed(now_us), is_starting=is_starting)
         return self._approve(effects)
 
     def _approve(self, effects: list[Effect]) -> list[Effect]:

@@ -5,7 +5,6 @@ from me says so, and so does who saw it taken. What is known better elsewhere ta
 until a person has decided (docs/contract-2.md, Restart).
 """
 
-from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -29,8 +28,8 @@ from onboard.core.effects import Effect, Send
 from onboard.core.mirror import Mirror
 from onboard.core.serial import is_newer
 
-#: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
-DIGEST_PATIENCE = 2
+#: A digest that a peer tells was mine at most so long ago where nothing was missed, us: frames wait behind others.
+FRAMES_WAIT_US = 300_000
 #: Who asks within this time of an answer shares the next one, us: at power-up all ask all.
 ANSWER_PERIOD_US = 250_000
 #: Who is to be asked by any one of all: the first slot begins so long after the cause, us, when who was started with
@@ -72,8 +71,11 @@ class Witness:
     doubt: Doubt | None = None
     #: Machines that have answered since this one started: what they say later is no proof against its journal.
     answered: set[int] = field(default_factory=set)
-    #: How often in a row a peer's mirror has differed from mine.
-    mismatches: Counter[int] = field(default_factory=Counter)
+    #: My mirror's digest, and until when it was another.
+    digest: int | None = None
+    digests_before: dict[int, int] = field(default_factory=dict)
+    #: What a peer's digest and mine were when it was asked last: what it has to say does not make them equal.
+    _in_vain: dict[int, tuple[int, int]] = field(default_factory=dict)
     #: What machines that were started again held by their own word before, until they say so again.
     doubted: dict[int, dict[TokenKey, int]] = field(default_factory=dict)
     #: Machines that were started again and were not answered since.
@@ -89,7 +91,8 @@ class Witness:
     def __post_init__(self) -> None:
         self.site, self.node_id = self.tokens.site, self.tokens.node_id
         self._others = set(self.site.machines) - {self.node_id}
-        self._slot_us = FIRST_SLOT_US + sum(node < self.node_id for node in self._others) * SLOT_US
+        #: After what all heard, this machine speaks so much later, us.
+        self.slot_us = sum(node < self.node_id for node in self._others) * SLOT_US
 
     # --- asking ------------------------------------------------------------------------------------------------
 
@@ -108,18 +111,31 @@ class Witness:
         if is_fresh:
             self._was_started(beat.sender)
             return self._ask_newcomer(beat.sender, self.mirror.boots_before[beat.sender], now_us)
-        if beat.mirror_digest == self.mirror.digest():
-            del self.mismatches[beat.sender]
-            return []
-        self.mismatches[beat.sender] += 1
-        if self.mismatches[beat.sender] < DIGEST_PATIENCE:
-            return []
-        del self.mismatches[beat.sender]
-        return self.ask(beat.sender)
+        told = beat.mirror_digest, self.mirror.digest()
+        if not self.agrees(beat) and not self._was_mine(told[0], now_us) and self._in_vain.get(beat.sender) != told:
+            self._in_vain[beat.sender] = told
+            self._slots.setdefault(beat.sender, now_us + self.slot_us)
+        return []
 
     def agrees(self, beat: Heartbeat) -> bool:
-        """Whether a peer's mirror is as mine, and was so when it was heard last."""
-        return beat.mirror_digest == self.mirror.digest() and not self.mismatches[beat.sender]
+        """Whether a peer's mirror is as mine."""
+        return beat.mirror_digest == self.mirror.digest()
+
+    def heed(self, now_us: int) -> bool:
+        """Note my mirror's digest as it is now; True where it has changed."""
+        digest = self.mirror.digest()
+        if digest == self.digest:
+            return False
+        if self.digest is not None:
+            old = [one for one, until_us in self.digests_before.items() if until_us < now_us - FRAMES_WAIT_US]
+            for one in old:
+                del self.digests_before[one]
+            self.digests_before[self.digest] = now_us
+        self.digest = digest
+        return True
+
+    def _was_mine(self, digest: int, now_us: int) -> bool:
+        return self.digests_before.get(digest, now_us - FRAMES_WAIT_US - 1) >= now_us - FRAMES_WAIT_US
 
     def begin(self, now_us: int) -> list[Effect]:
         """What the journal says that I hold and gave away, for all to compare, and the question to all."""
@@ -146,6 +162,7 @@ class Witness:
             for peer in self.mirror.peers.values():
                 # Who has just come has no earlier life because the time was set.
                 peer.since_us += by_us
+            self.digests_before.clear()
 
     def slept(self, now_us: int) -> None:
         """I heard nothing for a while, or my clock has jumped: who has not answered has had no time to."""
@@ -161,8 +178,9 @@ class Witness:
         """Who knows an earlier life of it says so at once; what it vouches for it says to all, whoever asks."""
         if boot_before:
             return self.ask(node, boot_before)
-        self.tokens.asked.add(node)
-        self._slots.setdefault(node, now_us + self._slot_us)
+        if node not in self.answered:
+            self.tokens.asked.add(node)
+            self._slots.setdefault(node, now_us + FIRST_SLOT_US + self.slot_us)
         return []
 
     def on_done(self, word: SyncDone, now_us: int) -> list[Effect]:

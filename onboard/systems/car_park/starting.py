@@ -26,7 +26,7 @@ from onboard.ways.lift_uses import ride_us
 from onboard.ways.mirror import WayFleet
 
 #: From the first known position after a restart until plans are made: the others say meanwhile what they plan.
-SETTLING_US = 2_000_000
+SETTLING_US = 0
 #: Modes in which the shuttle has come to rest.
 AT_REST = (ShuttleMode.HOME, ShuttleMode.REACHED)
 
