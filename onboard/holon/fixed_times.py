@@ -16,6 +16,8 @@ from onboard.holon.timekeeper import Timekeeper
 
 #: Whoever changes what all believe tells its digest so long after, us: the words of one step go together.
 TELL_US = 100_000
+#: So long after its last sign of life at the least, us: what a bus may be asked for stays bounded.
+BEATS_APART_US = 300_000
 
 
 @dataclass
@@ -31,20 +33,18 @@ class FixedTimes:
     heartbeat_due_us: int | None = None
     _told: ToldDrops = field(default_factory=ToldDrops)
     _is_starting: bool = False
+    #: When the last sign of life was given.
+    _beat_us: int = 0
 
     def __post_init__(self) -> None:
         nodes, beat_us = sorted(self.fleet.site.machines), self.fleet.site.timing.heartbeat_us
         #: Each machine's beats have a place of their own in the period: who was away is heard of by somebody soon.
         self._phase_us = nodes.index(self.fleet.node_id) * beat_us // len(nodes)
 
-    def tell_soon(self, effects: list[Effect], now_us: int, *, is_news: bool, is_starting: bool) -> None:
-        """Whoever changes what all believe tells its digest soon after; who has started says so at once.
-
-        ``is_news``: the mirror's digest is another than at the event before.
-        """
-        digested = self.fleet.mirror.digested
-        if is_news and any(isinstance(effect, Send) and isinstance(effect.message, digested) for effect in effects):
-            self._beat_by(now_us + TELL_US)
+    def tell_soon(self, now_us: int, *, has_told: bool, is_starting: bool) -> None:
+        """Who ``has_told`` what changes the digest of all tells its own soon after; who has started says so at once."""
+        if has_told:
+            self._beat_by(max(now_us + TELL_US, self._beat_us + BEATS_APART_US))
         if self._is_starting and not is_starting:
             self._beat_by(now_us)
         self._is_starting = is_starting
@@ -69,7 +69,7 @@ class FixedTimes:
         effects: list[Effect] = []
         timing, node_id = self.fleet.site.timing, self.fleet.node_id
         if self.heartbeat_due_us is not None and self.heartbeat_due_us <= now_us:
-            beat_us = timing.heartbeat_us
+            self._beat_us, beat_us = now_us, timing.heartbeat_us
             self.heartbeat_due_us = now_us + beat_us - (now_us - self._phase_us) % beat_us
             self.presence.review(now_us)
             effects += self.holds.words() + self.fleet.mirror.forgotten()

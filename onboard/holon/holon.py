@@ -438,7 +438,7 @@ class Holon:
             if self.part.begins:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
         is_starting = self.behaviour.state is MachineState.STARTING
-        self.fixed.tell_soon(effects, now_us, is_news=self.witness.heed(now_us), is_starting=is_starting)
+        self.fixed.tell_soon(now_us, has_told=self.witness.heed(effects, now_us), is_starting=is_starting)
         return self._approve(effects)
 
     def _approve(self, effects: list[Effect]) -> list[Effect]:
