@@ -45,9 +45,9 @@ class Mode(NamedTuple):
 
 
 MODES = (
-    Mode("planned on the mirror, called after winning", RideCalls.AFTER, factory_for),
+    Mode("planned on the mirror, told by the itinerary", RideCalls.PLANNED, factory_for),
     Mode("called before the bid, as options", RideCalls.BEFORE, factory_for),
-    Mode("session lock, from call to leaving", RideCalls.AFTER, session_lock.factories),
+    Mode("session lock, from call to leaving", RideCalls.PLANNED, session_lock.factories),
 )
 
 

@@ -1,6 +1,9 @@
 """Sites for tests, as TOML text."""
 
+from dataclasses import replace
+
 from onboard.config.site import parse_site
+from onboard.core.site import Site
 from onboard.systems.car_park.site import CarPark, car_park
 
 ONE_FLOOR = """
@@ -25,3 +28,8 @@ def one_floor(robots: int = 1, positions: int = 12, extra: str = "") -> CarPark:
     for number in range(1, robots + 1):
         text += f'[[robots]]\nname = "MR{number}"\nnode = {10 + number}\nhome = "p(1,{positions + 1 - number})"\n'
     return car_park(parse_site(text + extra, "test.toml", crowded=True))
+
+
+def telling(site: Site) -> CarPark:
+    """The same car park, whose bids bring their itineraries as in the paper."""
+    return replace(car_park(site), tells_offers=True)

@@ -7,12 +7,17 @@ from onboard.systems.car_park.site import RideCalls
 from tests.sites import one_floor
 
 
-def test_rides_are_called_after_winning_unless_the_site_says_otherwise() -> None:
-    assert one_floor().rides is RideCalls.AFTER
+def test_rides_are_planned_unless_the_site_says_that_lifts_are_asked_before() -> None:
+    assert one_floor().rides is RideCalls.PLANNED
     assert one_floor().timing.sub_call_percent == 50
     site = one_floor(extra='[negotiation]\nrides = "before"\nsub_call_percent = 30\n')
     assert (site.rides, site.timing.sub_call_percent) == (RideCalls.BEFORE, 30)
     assert site.digest != one_floor().digest, "machines that ask at different times do not bid together"
+
+
+def test_bids_keep_their_itineraries_unless_the_site_says_otherwise() -> None:
+    assert not one_floor().tells_offers
+    assert one_floor(extra='[negotiation]\noffers = "told"\n').tells_offers
 
 
 @pytest.mark.parametrize(

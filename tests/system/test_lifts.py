@@ -1,4 +1,6 @@
-"""Several floors: steps 15 to 20 of Fig. 9, rides as calls, robots that share lifts (rows P02, P39, P49, P50)."""
+"""Several floors: steps 15 to 20 of Fig. 9, rides in plans and as calls, robots that share lifts (P02, P49, P50)."""
+
+import dataclasses
 
 import pytest
 
@@ -17,6 +19,7 @@ from onboard.contract.messages import (
     TokenGrant,
 )
 from onboard.core.authority import TokenKey, segment_token
+from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.ways.lifts import gate, platform
 from onboard.ways.site import way_site
 from tests.system.scene import Scene, play, stays
@@ -30,20 +33,27 @@ def entry() -> Scene:
     return scene
 
 
+@pytest.fixture(scope="module")
+def asked() -> Scene:
+    """The same where robots ask the lifts before they bid."""
+    site = dataclasses.replace(car_park(find_site("small")), rides=RideCalls.BEFORE)
+    scene = play(site, stays((0, None)), extra_s=200)
+    scene.assert_sound()
+    return scene
+
+
 def granted(scene: Scene, key: TokenKey, holder: int, after_us: int) -> int:
     return scene.first(
         TokenGrant, lambda m: (m.token_kind, m.token, m.holder) == (key.kind, key.number, holder), after_us
     )[0]
 
 
-def test_p50_steps_15_to_20_the_lift_is_asked_comes_takes_the_robot_and_lets_it_go(entry: Scene) -> None:
+def test_p50_steps_15_to_20_the_lift_is_told_comes_takes_the_robot_and_lets_it_go(entry: Scene) -> None:
     site = entry.simulation.site
     _, call = entry.first(CallForProposals, lambda m: m.operation is Operation.PARK)
     award_us, award = entry.first(Award, lambda m: m.task == call.task)
     robot = award.winner
-    asked_us, ride = entry.first(CallForProposals, lambda m: m.operation is Operation.RIDE)
-    assert ride.sender == robot and ride.kind is KindCode.LIFT and asked_us > award_us
-    _, plan = entry.first(Itinerary, lambda m: m.grade is Grade.FIRM and m.sender == robot and len(m.legs) > 2)
+    told_us, plan = entry.first(Itinerary, lambda m: m.grade is Grade.FIRM and m.sender == robot and len(m.legs) > 2)
     leg = next(leg for leg in plan.legs if leg.action is LegAction.RIDE)
     lift = site.stewards[leg.track]
     arrived_us, _ = entry.first(
@@ -58,19 +68,26 @@ def test_p50_steps_15_to_20_the_lift_is_asked_comes_takes_the_robot_and_lets_it_
     )
     leaves_us = granted(entry, segment_token(gate(leg.track)), robot, there_us)
     free_us = granted(entry, segment_token(platform(leg.track)), lift, leaves_us)
-    order = [award_us, arrived_us, boards_us, aboard_us, rides_us, there_us, leaves_us, free_us]
+    order = [award_us, told_us, arrived_us, boards_us, aboard_us, rides_us, there_us, leaves_us, free_us]
     assert order == sorted(order) and back_us < rides_us
     done_us, _ = entry.first(TaskReport, lambda m: m.task == call.task and m.phase is TaskPhase.DONE)
     assert free_us < done_us
 
 
-def test_p49_p02_lifts_compartments_and_robots_call_or_answer(entry: Scene) -> None:
-    kinds = {node: machine.kind for node, machine in entry.simulation.site.machines.items()}
-    assert {kinds[call.sender] for _, call in entry.all(CallForProposals)} == {KindCode.COMPARTMENT, KindCode.ROBOT}
-    assert {kinds[bid.sender] for _, bid in entry.all(Bid)} == {KindCode.ROBOT, KindCode.LIFT}
-    rides = [call for _, call in entry.all(CallForProposals) if call.operation is Operation.RIDE]
-    closed = {(a.sender, a.call): a.result for _, a in entry.all(Award)}
-    assert rides and all(closed[ride.sender, ride.call] is CallResult.AWARDED for ride in rides)
+def test_p49_p02_lifts_compartments_and_robots_call_or_answer(asked: Scene) -> None:
+    kinds = {node: machine.kind for node, machine in asked.simulation.site.machines.items()}
+    assert {kinds[call.sender] for _, call in asked.all(CallForProposals)} == {KindCode.COMPARTMENT, KindCode.ROBOT}
+    assert {kinds[bid.sender] for _, bid in asked.all(Bid)} == {KindCode.ROBOT, KindCode.LIFT}
+    _, won = asked.first(Award, lambda m: kinds[m.winner] is KindCode.ROBOT)
+    rides = {(m.sender, m.call) for _, m in asked.all(CallForProposals) if m.operation is Operation.RIDE}
+    taken = {(m.sender, m.call) for _, m in asked.all(Award) if m.result is CallResult.AWARDED} & rides
+    assert taken and {sender for sender, _ in taken} == {won.winner}
+
+
+def test_what_a_plan_tells_of_rides_nobody_calls_for(entry: Scene) -> None:
+    """The winner's firm itinerary moves the lift: a call for what it holds would be said in vain."""
+    assert any(leg.action is LegAction.RIDE for _, plan in entry.all(Itinerary) for leg in plan.legs)
+    assert {call.kind for _, call in entry.all(CallForProposals)} == {KindCode.ROBOT}
 
 
 def test_a_lift_never_moves_while_somebody_holds_its_gate(entry: Scene) -> None:

@@ -14,6 +14,7 @@ from onboard.core.site import Station
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.ways.mirror import way_mirror
 from tests.config.support import ROOT, changed
+from tests.sites import telling
 from tests.system.scene import Scene, play, stays
 
 SMALL = car_park(find_site("small"))
@@ -86,7 +87,7 @@ def aims(itinerary: Itinerary) -> Station | None:
 
 def test_p42_two_parkings_of_one_moment_never_come_to_one_place() -> None:
     """The bidder chooses the place: both bids aim at one, and the award that is first takes it."""
-    scene = play(narrow(), stays((2.9, None), (0, None)), extra_s=200)
+    scene = play(telling(narrow()), stays((2.9, None), (0, None)), extra_s=200)
     calls = [(t, call) for t, call in scene.all(CallForProposals) if call.operation is Operation.PARK]
     assert calls[1][0] < from_bus_ms(calls[0][1].deadline_ms, calls[0][0]), "both are open at once"
     wished = [aims(plan) for _, plan in scene.all(Itinerary) if plan.grade is Grade.TENTATIVE]

@@ -16,13 +16,12 @@ from onboard.core.site import Segment
 from onboard.systems.car_park.asking import TOLERANCE_US, AskingGeneration
 from onboard.systems.car_park.generation import CarParkGeneration, Solution
 from onboard.systems.car_park.lift_generation import LiftGeneration, Promise
-from onboard.systems.car_park.ride_calls import calls_after_winning, ride_terms, rides_of
+from onboard.systems.car_park.ride_calls import ride_terms, rides_of
 from onboard.systems.car_park.robot import ParkingRobotFactory
 from onboard.systems.car_park.site import CarPark, RideCalls, car_park
 from onboard.ways.lift_uses import GATE_US, ride_us, run_up_us
 from onboard.ways.mirror import WayMirror
 from onboard.ways.sipp import Route, Visit, plan_route
-from onboard.ways.site import way_site
 
 NOW_US = 100_000_000
 CAR = Reference(1, 7)
@@ -53,7 +52,7 @@ def robot(node: int, rides: RideCalls = RideCalls.BEFORE, mirror: Mirror | None 
 
 def firm(node: int, number: int = 1) -> Itinerary:
     """What a robot tells when it has won the call."""
-    generation = robot(node, RideCalls.AFTER)
+    generation = robot(node, RideCalls.PLANNED)
     solution, _ = generation.solve(park(number), NOW_US)
     assert solution is not None
     deadline_ms = park().deadline_ms
@@ -206,7 +205,7 @@ def test_p39_the_mirror_is_as_before_once_the_bid_is_made() -> None:
     assert [generation.mirror.reservations.uses(track, excluding=0) for track in generation.site.lifts] == before
 
 
-def test_p39_where_no_lift_answers_the_ride_is_called_after_winning() -> None:
+def test_p39_where_no_lift_answers_the_bid_rests_on_the_plan_alone() -> None:
     _, needs = asked()
     silence = answers_to(needs.parts, winner=0)
     again = needs.combine(silence, NOW_US + 400_000)
@@ -215,19 +214,7 @@ def test_p39_where_no_lift_answers_the_ride_is_called_after_winning() -> None:
     assert isinstance(bid, Proposal)
     assert bid.parts == ()
     (solution,) = bid.program
-    after = calls_after_winning(way_site(find_site("small")), park(), solution.steps)
-    assert [terms.operation for terms in after] == [Operation.RIDE] * len(rides_of(solution.steps))
-    assert {(terms.depth, terms.parent) for terms in after} == {(1, Reference(1, 1))}
-
-
-def test_p39_confirmed_rides_are_not_called_again() -> None:
-    _, needs = asked()
-    bid = needs.combine(answers_to(needs.parts), NOW_US + 400_000)
-    assert isinstance(bid, Proposal)
-    (solution,) = bid.program
-    assert calls_after_winning(way_site(find_site("small")), park(), solution.steps, answers_to(needs.parts)) == []
-    (rest,) = calls_after_winning(way_site(find_site("small")), park(), solution.steps, answers_to(needs.parts)[:1])
-    assert rest.part == 2
+    assert rides_of(solution.steps)
 
 
 def test_p39_what_was_promised_is_carried_out_while_it_holds() -> None:
@@ -246,7 +233,7 @@ def test_p39_what_was_promised_is_carried_out_while_it_holds() -> None:
 
 @pytest.mark.parametrize("locked", [False, True], ids=["planned on the mirror", "session lock"])
 def test_p39_a_session_begins_with_the_call_and_a_planned_ride_with_boarding(locked: bool) -> None:
-    mirror = WayMirror(site_with(RideCalls.AFTER), 12)
+    mirror = WayMirror(site_with(RideCalls.PLANNED), 12)
     if locked:
         mirror.reservations = SessionLocks(mirror)
     itinerary = firm(11)
@@ -263,7 +250,7 @@ def test_p39_a_session_begins_with_the_call_and_a_planned_ride_with_boarding(loc
 
 def test_p39_nobody_rides_in_between_a_call_and_its_ride_under_a_session_lock() -> None:
     """Robot 11 calls the left lift and waits a minute on its way; robot 12 could ride in that minute."""
-    site = site_with(RideCalls.AFTER)
+    site = site_with(RideCalls.PLANNED)
     legs = (
         _leg(LegAction.STAND, 2, 8, 8, 60_000),
         _leg(LegAction.TRAVEL, 2, 8, 0, 76_000),

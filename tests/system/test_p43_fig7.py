@@ -15,10 +15,11 @@ from onboard.config.site import parse_site
 from onboard.contract.codes import CONTRACT_VERSION, Grade, KindCode, LegAction, MachineState, Side
 from onboard.contract.messages import Bid, CallForProposals, Heartbeat, Itinerary, Leg, Message, Stamp
 from onboard.core.serial import from_bus_ms
-from onboard.systems.car_park.site import CarPark, car_park
+from onboard.systems.car_park.site import CarPark
 from onboard.ways.occupancy import itinerary_windows
 from onboard.ways.reservations import Reservations
 from onboard.wire.codec import fleet_codec
+from tests.sites import telling
 from tests.system.scene import Scene, play, stays
 
 LAMBDA, ALPHA = 11, 12
@@ -44,7 +45,7 @@ def park(clearance: int) -> CarPark:
         {{name = "MRalpha", node = {ALPHA}, home = "p(2,6)"}},
     ]
     """
-    return car_park(parse_site(text, "figure.toml", crowded=True))
+    return telling(parse_site(text, "figure.toml", crowded=True))
 
 
 def alpha_plan(deadline_ms: int) -> Itinerary:

@@ -24,10 +24,10 @@ from onboard.core.serial import from_bus_ms
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.robot import ParkingRobot
 from onboard.wire.codec import fleet_codec
-from tests.sites import one_floor
+from tests.sites import one_floor, telling
 from tests.system.scene import Scene, play, stays
 
-SITE = find_site("small")
+SITE = telling(find_site("small"))
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +91,14 @@ def test_p47_the_firm_itinerary_engages_the_way_that_the_tentative_one_pre_engag
 
 def _place(leg: ItineraryLeg) -> tuple[int, ...]:
     return leg.action, leg.track, leg.from_index, leg.to_index
+
+
+def test_a_plan_is_told_with_its_award_alone_unless_the_site_tells_offers() -> None:
+    scene = play(find_site("small"), stays((0, 400)))
+    scene.assert_sound()
+    assert {plan.grade for _, plan in scene.all(Itinerary)} == {Grade.FIRM}
+    robots = [bid for _, bid in scene.all(Bid) if SITE.machines[bid.sender].kind is KindCode.ROBOT]
+    assert len(robots) == 2 and {bid.itinerary_version for bid in robots} == {0}
 
 
 # --- outbid ----------------------------------------------------------------------------------------------------------
@@ -159,10 +167,9 @@ def test_p47_being_outbid_frees_what_was_pre_engaged(outbid: tuple[Scene, Rival]
     scene, rival = outbid
     assert rival.call is not None
     assert [list(kept) for kept in rival.kept] == [[rival.call], []]
-    bid_us, bid = scene.first(Bid, lambda m: m.sender == 11)
+    bid_us, _ = scene.first(Bid, lambda m: m.sender == 11)
     award_us, award = scene.first(Award, lambda m: (m.sender, m.call) == rival.call)
     assert (award.winner, award.result) == (200, CallResult.AWARDED) and award_us > bid_us
-    assert bid.itinerary_version
     assert not [t for t, m in scene.all(TaskReport) if m.sender == 11 and m.task == award.task]
 
 

@@ -18,6 +18,7 @@ from bus_sim.systems.car_park.day import ParkingDay
 from bus_sim.systems.car_park.summary import RunSummary
 from onboard.contract.codes import CallResult, Operation, TaskPhase
 from onboard.contract.messages import Award, Bid, CallForProposals, Progress, TaskReport
+from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.indicators import FleetIndicators, Indicators
 from onboard.wire.codec import fleet_codec
@@ -81,7 +82,7 @@ def test_p55_promises_are_compared_with_the_end_that_the_bus_saw(run: tuple[Scen
 
 def test_p55_any_log_of_the_fleet_bus_gives_the_same_figures(tmp_path: Path) -> None:
     trace = tmp_path / "trace.log"
-    site = find_site("small")
+    site = replace(car_park(find_site("small")), rides=RideCalls.BEFORE)
     day = ParkingDay(random_s=(120.0, 30.0), cars=3)
     summary = run_site(site, RunOptions(demand=day, limit_s=600, trace=trace, quiet=True))
     assert isinstance(summary, RunSummary)

@@ -1,5 +1,6 @@
 """The DBC is the common interface: every frame of a run is in it, and a bid means what it says (rows P16, P57)."""
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -12,6 +13,7 @@ from dbc import device_dbc_text, fleet_dbc_text
 from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, TaskPhase
 from onboard.contract.messages import Award, Bid, CallForProposals, TaskReport
 from onboard.core.frame import Frame
+from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.wire.dbc_file import fleet_layouts
 from onboard.wire.site_dbc import site_dbc
 from tests.system.scene import Scene, play, stays
@@ -113,9 +115,10 @@ def test_p16_unit_and_meaning_of_a_bid_are_defined_once_in_the_dbc() -> None:
     assert "Lower is better" in cost.comment
 
 
-def test_p16_robots_and_lifts_bid_in_the_same_unit_which_is_when_the_work_is_done(run: Heard) -> None:
+def test_p16_robots_and_lifts_bid_in_the_same_unit_which_is_when_the_work_is_done() -> None:
     """The winner's cost of each call, read as a date, is when its winner was done, early or late by little."""
-    scene = run.scene
+    scene = play(dataclasses.replace(car_park(SITE), rides=RideCalls.BEFORE), stays((0, 500), (60, 620), (120, None)))
+    scene.assert_sound()
     kinds = {node: machine.kind for node, machine in SITE.machines.items()}
     bidders = {kinds[bid.sender] for _, bid in scene.all(Bid)}
     assert bidders == {KindCode.ROBOT, KindCode.LIFT}

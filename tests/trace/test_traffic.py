@@ -1,10 +1,13 @@
 """What the machines may put on the bus, and whether a running site keeps to it and to the bounds that follow."""
 
+import dataclasses
+
 import pytest
 
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.response import Measured, measure
 from onboard.contract.codes import KindCode
+from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.systems.car_park.traffic import excess, operation, power_up, reasons
 from onboard.trace.response import ANYBODY, Stream, fifo_bounds
 from onboard.wire.dbc_file import fleet_layouts
@@ -17,9 +20,11 @@ NOT_IN_OPERATION = {
 
 
 def test_every_message_of_the_contract_has_its_stream_from_those_who_may_send_it() -> None:
-    site = find_site("standard")
+    planned = car_park(find_site("standard"))
+    site = dataclasses.replace(planned, rides=RideCalls.BEFORE)
     streams = operation(site)
     assert {stream.name for stream in streams} == {layout.name for layout in fleet_layouts()} - NOT_IN_OPERATION
+    assert {stream.name for stream in streams} - {stream.name for stream in operation(planned)} == {"CallParent"}
     senders = {layout.name: layout.senders for layout in fleet_layouts()}
     roles = {KindCode.ROBOT: "Robot", KindCode.LIFT: "Lift", KindCode.COMPARTMENT: "Compartment"}
     for stream in [*streams, *power_up(site)]:

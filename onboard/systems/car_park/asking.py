@@ -44,9 +44,8 @@ class AskingGeneration(CarParkGeneration):
         return super().renewed(call, promised, now_us)
 
     def _is_taken(self, call: CallForProposals, promised: Solution, now_us: int) -> bool:
-        itinerary = self.proposal(call, promised._replace(kept=0), []).itinerary
-        assert itinerary is not None
-        windows = itinerary_windows(self.site, itinerary, now_us, promised.start_us)
+        offer = self._offer(call, promised._replace(kept=0))
+        windows = itinerary_windows(self.site, offer, now_us, promised.start_us)
         return bool(self.mirror.reservations.conflicts(self.machine.node_id, windows))
 
     # --- questions ---------------------------------------------------------------------------------------------

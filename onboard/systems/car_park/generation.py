@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.contract.codes import Criterion, Grade, LegAction, Operation
-from onboard.contract.messages import CallForProposals, Stamp
+from onboard.contract.messages import CallForProposals, Itinerary, Stamp
 from onboard.core.negotiation import NeededAnswers, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine, Segment, Station
@@ -123,7 +123,7 @@ class CarParkGeneration:
         return to_bus_ms(least_us) if least_us < FOREVER else None
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
-        """First request: the best solution as a bid with a tentative itinerary, or None: silence (row P45)."""
+        """First request: the best solution as a bid, or None: silence (row P45)."""
         solution, alternatives = self.solve(call, now_us)
         return None if solution is None else self.proposal(call, solution, alternatives)
 
@@ -133,14 +133,16 @@ class CarParkGeneration:
         return promised if solution is None else solution
 
     def proposal(self, call: CallForProposals, solution: Solution, alternatives: list[Alternative]) -> Proposal:
-        """A solution as a bid."""
-        deadline_ms = call.deadline_ms
-        stamp = Stamp(deadline_ms, call.sender, call.call & 0xFF)
+        """A solution as a bid; its itinerary is told with the award, and with the bid only where the site says so."""
+        itinerary = self._offer(call, solution) if self.site.tells_offers else None
+        return Proposal(to_bus_ms(solution.finish_us), itinerary, (solution,), tuple(alternatives))
+
+    def _offer(self, call: CallForProposals, solution: Solution) -> Itinerary:
+        stamp = Stamp(call.deadline_ms, call.sender, call.call & 0xFF)
         # Legs name only the version: a tentative set must never complete a firm one.
         version = (self.program.version + 128) & 0xFF or 1
         steps = [*self.program.remaining[: solution.kept], *solution.steps]
-        itinerary = to_itinerary(self.machine.node_id, version, Grade.TENTATIVE, stamp, steps)
-        return Proposal(to_bus_ms(solution.finish_us), itinerary, (solution,), tuple(alternatives))
+        return to_itinerary(self.machine.node_id, version, Grade.TENTATIVE, stamp, steps)
 
     # --- the search --------------------------------------------------------------------------------------------
 

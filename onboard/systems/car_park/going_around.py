@@ -285,8 +285,7 @@ class GoingAround:
         kept, origin, start_us = self._turning((), now_us)
         if kept or other in mirror.obstacles.machines:
             return []
-        # Rights that it has beyond me it cannot use: it grants them to whoever passes before it.
-        slots = mirror.obstacles.slots_of(machine, mirror.progress.get(other), lambda slot: NOBODY)
+        slots = mirror.slots_of(machine, self.fleet.tokens.holder_of)
         works = self.program.works()
         mirror.set_aside(other, slots, Reason.NOT_AUTHORISED, now_us)
         steps = self.generation.reroute(origin, start_us, works, now_us)

@@ -1,13 +1,13 @@
 """The lift's task-generation function: when would a ride be over, in the schedule that the robots' plans make.
 
-A call after winning names a ride that stands in the caller's itinerary already: the answer is its end there. A call
-before the bid is answered from the schedule: the others' rides, and the options that this lift has given.
+A call before a bid is answered from the schedule: the others' rides, and the options that this lift has given. A ride
+that stands in a firm itinerary needs no call.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import Criterion, LegAction, Operation
+from onboard.contract.codes import Criterion, Operation
 from onboard.contract.messages import CallForProposals, Reference
 from onboard.core.negotiation import CallKey, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
@@ -47,39 +47,20 @@ class LiftGeneration:
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         """The end of the ride in the schedule (bus ms), or None where it is not a ride of mine."""
-        if call.operation is not Operation.RIDE or call.criterion is not Criterion.FINISH_TIME:
-            return None
-        indices = self._indices(call)
-        if indices is None:
-            return None
-        if call.hold_ms:
-            use = self._earliest(call, indices, now_us)
-            return None if use is None else to_bus_ms(use.to_us - self._leaving_us(indices[1]))
-        return self._planned(call, indices)
+        indices, use = self._use(call, now_us)
+        return None if use is None else to_bus_ms(use.to_us - self._leaving_us(indices[1]))
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
-        """The same as the bound; an option carries the use of the platform that it stands for."""
+        """The same as the bound; the option carries the use of the platform that it stands for."""
         cost = self.lower_bound(call, now_us)
-        if cost is None or not call.hold_ms:
-            return None if cost is None else Proposal(cost, None, (), ())
-        indices = self._indices(call)
-        assert indices is not None
-        use = self._earliest(call, indices, now_us)
-        assert use is not None
-        return Proposal(cost, None, (Promise(use, call.parent),), ())
+        _, use = self._use(call, now_us)
+        return None if cost is None or use is None else Proposal(cost, None, (Promise(use, call.parent),), ())
 
-    # --- a ride in the caller's itinerary ----------------------------------------------------------------------
-
-    def _planned(self, call: CallForProposals, indices: tuple[int, int]) -> int | None:
-        """The end of the ride as the caller planned it around everybody's."""
-        itinerary = self.mirror.itineraries.get(call.sender)
-        if itinerary is None:
-            return None
-        for leg in itinerary.legs:
-            mine = leg.action is LegAction.RIDE and leg.track == self.machine.home.track
-            if mine and (leg.from_index, leg.to_index) == indices:
-                return leg.end_ms
-        return None
+    def _use(self, call: CallForProposals, now_us: int) -> tuple[tuple[int, int], Use | None]:
+        """From where to where a call goes, and the first use of the platform for it; None where it is not mine."""
+        is_ride = call.operation is Operation.RIDE and call.criterion is Criterion.FINISH_TIME and call.hold_ms
+        indices = self._indices(call) if is_ride else None
+        return ((0, 0), None) if indices is None else (indices, self._earliest(call, indices, now_us))
 
     # --- a ride in a gap of the schedule -----------------------------------------------------------------------
 

@@ -29,7 +29,6 @@ from onboard.core.negotiation import (
     NegotiationEvent,
     PreAssigned,
     Released,
-    SubCallAnswer,
 )
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park import custody
@@ -41,7 +40,6 @@ from onboard.systems.car_park.handling import ShuttleWork, handle
 from onboard.systems.car_park.holding import RobotHold
 from onboard.systems.car_park.program import MAX_STEPS, CarHandling, CarStep, HandlingPhase, Program, StationWork
 from onboard.systems.car_park.recovery import JournalRecovery, award_record, floor_record, handled_record, ride_record
-from onboard.systems.car_park.ride_calls import call_lifts
 from onboard.systems.car_park.riding import Riding
 from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.systems.car_park.starting import RobotDevices, Starting, StartStage
@@ -215,8 +213,7 @@ class ParkingRobot:
         planned = [step.work for step in rest]
         self.program.replace(rest, self.program.stamp, [work for work in works if work not in planned])
         effects: list[Effect] = [Report("goes around: " + "; ".join(str(step) for step in steps))]
-        effects += self._publish(now_us)
-        return effects + (call_lifts(self.fleet, works[0].call, tuple(steps), now_us) if works else [])
+        return effects + self._publish(now_us)
 
     def _reroute(self, sender: int, now_us: int) -> list[Effect]:
         """Do the same work by another way, under the same stamp; where there is none, come behind on the old one."""
@@ -231,13 +228,11 @@ class ParkingRobot:
             steps = self.generation.reroute(origin, start_us, works, now_us)
         if steps is None:
             return self._publish(now_us) if self.giving_way.fall_back(sender, now_us) is YieldDecision.LATER else []
-        calls = [work.call for work in works]
         if not kept:
             self._begun = False
         self.program.replace([*self.program.remaining[:kept], *steps], self.program.stamp, unplanned)
         effects: list[Effect] = [Report(f"gives way to node {sender}: " + "; ".join(str(step) for step in steps))]
-        effects += self._publish(now_us)
-        return effects + (call_lifts(self.fleet, calls[0], steps, now_us) if calls else [])
+        return effects + self._publish(now_us)
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """Pre-assignment keeps a tentative solution, being outbid drops it, an award makes it firm (row P47)."""
@@ -249,7 +244,7 @@ class ParkingRobot:
             case Released(call_key=key):
                 self.generation.tentative.pop(key, None)
                 return []
-            case Awarded(call_key=key, call=call, proposal=proposal, award=award, parts=parts):
+            case Awarded(call_key=key, call=call, proposal=proposal, award=award):
                 self.generation.tentative.pop(key, None)
                 (solution,) = proposal.program
                 version = 1 if award is None else award.task_version
@@ -259,7 +254,7 @@ class ParkingRobot:
                     return self.going_around.forfeit(call.task, why, now_us)
                 again = call.task in self.going_around.untouched()
                 dropped = self.going_around.drop([call.task], now_us) if again else []
-                return dropped + self._take_on(call, solution, parts, version, now_us)
+                return dropped + self._take_on(call, solution, version, now_us)
             case AwardedAgain(call=call):
                 return [self._tell_again(call.task)]
         return []
@@ -369,8 +364,8 @@ class ParkingRobot:
                 mine = [self._report(task, TaskPhase.DONE, station), *mine]
         return mine
 
-    def _started(self, planned: tuple[CarStep, ...] | None, calls: list[CallForProposals], now_us: int) -> list[Effect]:
-        """The start is over, and the program taken up: tell the plan, and call for rides in what was planned now."""
+    def _started(self, planned: tuple[CarStep, ...] | None, now_us: int) -> list[Effect]:
+        """The start is over, and the program taken up: tell the plan."""
         # What a restart has left in hand is the first step, and was begun before.
         self._begun = len(planned or ()) < len(self.program.steps)
         effects: list[Effect] = []
@@ -379,13 +374,13 @@ class ParkingRobot:
         if planned is None:
             # Somebody is in the way, of work or to a refuge: it is tried again, and what was not touched is given back.
             self.going_around.turn_later(now_us)
-        effects += self._publish(now_us)
-        return effects + (call_lifts(self.fleet, calls[0], planned or (), now_us) if calls else [])
+        return effects + self._publish(now_us)
 
-    def _take_on(
-        self, call: CallForProposals, promised: Solution, parts: tuple[SubCallAnswer, ...], version: int, now_us: int
-    ) -> list[Effect]:
-        """Second request of the task-generation function: the operating sequence that is really carried out."""
+    def _take_on(self, call: CallForProposals, promised: Solution, version: int, now_us: int) -> list[Effect]:
+        """Second request of the task-generation function: the operating sequence that is really carried out.
+
+        Its firm itinerary is all that a lift needs to know of a ride: nobody calls for what that holds already.
+        """
         solution = self.generation.renewed(call, promised, now_us)
         kept = self.program.remaining[: solution.kept]
         if not kept:
@@ -397,7 +392,7 @@ class ParkingRobot:
         ]
         effects += self._publish(now_us)
         effects.append(self._report(call.task, TaskPhase.AWARDED, solution.place.number))
-        return effects + call_lifts(self.fleet, call, solution.steps, now_us, parts)
+        return effects
 
     def _begin(self, step: CarStep, now_us: int) -> list[Effect]:
         if step.action is LegAction.TRAVEL:

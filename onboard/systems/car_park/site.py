@@ -61,12 +61,13 @@ def class_of_end(station: int) -> int | None:
 
 
 class RideCalls(Enum):
-    """When a robot asks lifts for the rides of a task (row P39).
+    """How a robot comes by the rides of a task (row P39).
 
-    AFTER winning it, when everybody's itineraries have told enough before; BEFORE its bid, by sub-calls as options.
+    PLANNED around everybody's itineraries and told in its own; or asked of the lifts BEFORE its bid, by sub-calls as
+    options. Nobody calls for a ride that a firm itinerary tells.
     """
 
-    AFTER = "after"
+    PLANNED = "planned"
     BEFORE = "before"
 
 
@@ -86,7 +87,9 @@ class CarPark(WaySite):
     shuttle: Axis
     shuttle_reach_mm: int
     cars: CarLimits
-    rides: RideCalls = RideCalls.AFTER
+    rides: RideCalls = RideCalls.PLANNED
+    #: Whether a bid brings its tentative itinerary: to be seen, as in the paper; nobody plans around it.
+    tells_offers: bool = False
     #: In the order in which a car is tried against them; numbers are from 1.
     classes: tuple[SizeClass, ...] = ()
     #: Number of a place's class by its station's number; who is not named takes every car of the site.

@@ -12,7 +12,7 @@ from enum import Enum, auto
 from typing import Final, NamedTuple
 
 from onboard.contract.codes import DriveMode, LegAction, ShuttleMode
-from onboard.contract.messages import CallForProposals, Stamp
+from onboard.contract.messages import Stamp
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Segment
@@ -73,9 +73,9 @@ class RobotDevices(NamedTuple):
 
 @dataclass
 class Starting:
-    """One robot's start. ``announce()`` is called once it stands, ``started(planned, calls, now)`` once it is over.
+    """One robot's start. ``announce()`` is called once it stands, ``started(planned, now)`` once it is over.
 
-    ``planned`` are the steps behind what was in hand, None where there was no way; ``calls`` are those of the tasks.
+    ``planned`` are the steps behind what was in hand, None where there was no way.
     """
 
     fleet: WayFleet
@@ -83,7 +83,7 @@ class Starting:
     body: RobotDevices
     recovery: JournalRecovery
     announce: Callable[[], list[Effect]]
-    started: Callable[[tuple[CarStep, ...] | None, list[CallForProposals], int], list[Effect]]
+    started: Callable[[tuple[CarStep, ...] | None, int], list[Effect]]
     stage: StartStage = StartStage.UNPLACED
     place: Segment | None = field(default=None, init=False)
     _due_us: int | None = None
@@ -213,7 +213,7 @@ class Starting:
         stamp = Stamp(to_bus_ms(now_us), self.fleet.node_id, 0)
         if not self.recovery.is_restart:
             self.generation.program.begin(place, [], stamp)
-            return self.started((), [], now_us)
+            return self.started((), now_us)
         origin, start_us, ahead = place, now_us, works
         for step in in_hand:
             self._resume(step)
@@ -224,7 +224,7 @@ class Starting:
         if calls:
             stamp = Stamp(calls[0].deadline_ms, calls[0].sender, calls[0].call & 0xFF)
         self.generation.program.begin(place, [*in_hand, *(more or ())], stamp, ahead if more is None else ())
-        return self.started(more, calls, now_us)
+        return self.started(more, now_us)
 
     def _resume(self, step: CarStep) -> None:
         """The step in hand goes on from where the journal and the sensors say that it was."""

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from onboard.contract.codes import KindCode
 from onboard.core.site import Site
 from onboard.holon.fixed_times import BEATS_APART_US
+from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.trace.frame_length import longest_frame_bits
 from onboard.trace.response import ANYBODY, Stream
 from onboard.ways.site import way_site
@@ -25,8 +26,8 @@ _MOST_LEGS = 31
 _LOOKAHEAD_US = 3_000_000
 #: Beside segments ahead: a lift's platform and gate. A car and a place are asked for where no way is ahead.
 _OTHER_RIGHTS = 2
-#: Rides of one task: to the car and to its place, each by two lifts where another floor's alley is crossed.
-_RIDES = 4
+#: Rides that one bid may ask for: a part's number has 4 bits (dbc/fleet.dbc).
+_MOST_PARTS = 15
 #: A timer may be late by a journal write and what is decided before it, us.
 _TIMER_JITTER_US = 100_000
 
@@ -38,12 +39,16 @@ _STEWARDS = (KindCode.COMPARTMENT, KindCode.LIFT)
 
 
 class Numbers(NamedTuple):
-    """What bursts and periods are made of: machines by kind, rights that a robot asks for at once, times in us."""
+    """What bursts and periods are made of: machines by kind, rights that a robot asks for at once, times in us.
+
+    ``rides`` are those that all robots may call for within one call window.
+    """
 
     nodes: int
     robots: int
     compartments: int
     rights: int
+    rides: int
     token_repeat_us: int
     heartbeat_us: int
     bus_time_us: int
@@ -83,7 +88,7 @@ def _window(numbers: Numbers) -> int:
 
 
 def _rides(numbers: Numbers) -> int:
-    return _RIDES * numbers.compartments
+    return numbers.rides
 
 
 def _late(_: Numbers) -> int:
@@ -125,18 +130,18 @@ _OPERATION = (
         for part in ("Call", "CallTerms", "CallLoad")
         for row in (
             TrafficBound(part, _COMPARTMENT, _one, _window, "a desk has one call open at a time"),
-            TrafficBound(part, (), _rides, _window, "all rides of the tasks that desks call for"),
+            TrafficBound(part, (), _rides, _window, "rides that bidders ask for first"),
         )
     ),
     TrafficBound("CallParent", (), _rides, _window, "with each ride's call"),
     TrafficBound("Award", _COMPARTMENT, _two, _window, "one for each call, said again once"),
-    TrafficBound("Award", (), lambda n: 2 * _rides(n), _window, "one for each ride, said again once"),
+    TrafficBound("Award", (), lambda n: 2 * _rides(n), _window, "one for each ride asked for, said again once"),
     TrafficBound("ManualOrder", (), _one, _second, "a person holds one machine at a time; said again until it answers"),
     TrafficBound("ManualState", (), _two, _second, "it answers, and comes to rest"),
     TrafficBound("Bid", _ROBOT, lambda n: n.compartments, _window, "one for each desk's call"),
-    TrafficBound("Bid", (), _rides, _window, "one for each ride called for"),
+    TrafficBound("Bid", (), _rides, _window, "one for each ride asked for"),
     TrafficBound(
-        "ItineraryHead", _ROBOT, _two, _window, "tentative with a bid, firm with its award, and a delay", _window
+        "ItineraryHead", _ROBOT, _two, _window, "with an award, a delay, and a bid where offers are told", _window
     ),
     TrafficBound(
         "ItineraryLeg", _ROBOT, lambda _: _MOST_LEGS, _window, "the most legs, of all these together", _window
@@ -185,6 +190,7 @@ def numbers_of(site: Site) -> Numbers:
     """A site's numbers; the lookahead is that of the shortest segments."""
     ways = way_site(site)
     kinds = [machine.kind for machine in site.machines.values()]
+    asks = car_park(site).rides is RideCalls.BEFORE
     carrier = ways.carrier
     braking_mm = carrier.speed_mm_s**2 // (2 * carrier.acceleration_mm_s2)
     ahead_mm = braking_mm + carrier.speed_mm_s * _LOOKAHEAD_US // _SECOND_US
@@ -194,6 +200,7 @@ def numbers_of(site: Site) -> Numbers:
         kinds.count(KindCode.ROBOT),
         kinds.count(KindCode.COMPARTMENT),
         2 + -(-ahead_mm // shortest_mm) + _OTHER_RIGHTS,
+        _MOST_PARTS * kinds.count(KindCode.ROBOT) * kinds.count(KindCode.COMPARTMENT) if asks else 0,
         site.timing.token_repeat_us,
         site.timing.heartbeat_us,
         site.timing.bus_time_us,
@@ -220,6 +227,8 @@ def _streams(site: Site, rows: Iterable[TrafficBound]) -> Iterator[Stream]:
     layouts = {layout.name: layout for layout in fleet_layouts()}
     numbers = numbers_of(site)
     for row in rows:
+        if not row.burst(numbers):
+            continue
         senders = [m.node_id for m in site.machines.values() if m.kind in row.kinds] if row.kinds else [ANYBODY]
         for node in senders:
             yield _stream(row, node, layouts[row.message], numbers)

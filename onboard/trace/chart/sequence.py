@@ -14,6 +14,7 @@ from onboard.contract.codes import (
     DeskText,
     DoorPosition,
     DriveMode,
+    LegAction,
     LightColour,
     Operation,
     ShuttleMode,
@@ -84,6 +85,8 @@ class _Story:
         self.calls: set[tuple[int, int]] = set()
         self._history = History(site, is_bounded=False)
         self.offers: set[tuple[int, int]] = set()
+        #: Lifts that the owner's itineraries ride with.
+        self.lifts: set[int] = set()
         self._lifts = {site.stewards[track]: track for track in ways.lifts}
         self._platforms = set(ways.platforms)
         self._words = words
@@ -122,6 +125,7 @@ class _Story:
                 yield ALL, f"tentative itinerary, {len(plan.legs)} legs", self._park(9)
             case PlanTold(plan=plan) as fact if fact.is_firm and self._is_ours(plan):
                 yield ALL, f"itinerary {plan.version}, {len(plan.legs)} legs", self._once("plan", self._park(11))
+                yield from self._rides(plan)
             case TaskTold(report=report) if report.task == self.task:
                 yield from self._report(report)
             case LoadTold(word=word) if word.car == self.car and self._changed("car", word.station):
@@ -150,6 +154,18 @@ class _Story:
     def _is_ours(self, plan: Itinerary) -> bool:
         key = (plan.stamp.initiator, plan.stamp.call)
         return plan.sender == self.owner and any((who, call & 0xFF) == key for who, call in self.calls)
+
+    def _rides(self, plan: Itinerary) -> Iterator[tuple[int, str, int]]:
+        """What an itinerary asks of lifts (step 15): it is the word for its rides, unless they were called for."""
+        for lift, track in self._lifts.items():
+            floors = [
+                f"{leg.from_index} to {leg.to_index}"
+                for leg in plan.legs
+                if (leg.action, leg.track) == (LegAction.RIDE, track)
+            ]
+            if floors and self._changed(("rides", lift), floors):
+                self.lifts.add(lift)
+                yield lift, f"rides from floor {', '.join(floors)}", self._park(15)
 
     def _report(self, report: TaskReport) -> Iterator[tuple[int, str, int]]:
         if not self._changed((report.sender, report.station), report.phase):
@@ -246,7 +262,7 @@ def chart(site: Site, logged: Iterable[LoggedMessage], task: Reference) -> Seque
     arrows = [one for one in arrows if one.time_us >= (came_us[-1] if came_us else begun_us)]
     relevant = {task.origin, story.owner, *(sender for sender, _ in story.offers)}
     winners = {one.receiver for one in arrows if one.text.startswith("call ")}
-    relevant = {node for node in relevant | winners if node}
+    relevant = {node for node in relevant | winners | story.lifts if node}
     arrows = [one for one in arrows if one.sender in relevant]
     return SequenceChart(f"task {words.reference(task)}", sorted(relevant), arrows)
 

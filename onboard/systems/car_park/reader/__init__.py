@@ -31,7 +31,8 @@ def read(root: TomlTable, common: Common) -> CarPark:
     robots = sum(1 for machine in fleet.by_node.values() if machine.kind is KindCode.ROBOT)
     timing = read_timing(root.table("timing"), robots, len(fleet.by_node), bitrate)
     negotiation = root.table("negotiation")
-    rides = RideCalls(negotiation.choice("rides", [one.value for one in RideCalls], "after"))
+    rides = RideCalls(negotiation.choice("rides", [one.value for one in RideCalls], "planned"))
+    tells_offers = negotiation.choice("offers", ["kept", "told"], "kept") == "told"
     timing = replace(timing, sub_call_percent=negotiation.integer("sub_call_percent", 20, 80, 50))
     _check_whole(root, layout, fleet, uses)
     root.check_unknown()
@@ -55,6 +56,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
         cars=constants.cars,
         timing=timing,
         rides=rides,
+        tells_offers=tells_offers,
         bay_uses=uses,
         classes=classes,
         place_class=place_class,
