@@ -42,11 +42,11 @@ class FixedTimes:
         self._phase_us = nodes.index(self.fleet.node_id) * beat_us // len(nodes)
 
     def tell_soon(self, now_us: int, *, has_told: bool, is_starting: bool) -> None:
-        """Who ``has_told`` what changes the digest of all tells its own soon after; who has started says so at once."""
+        """Who ``has_told`` what changes the digest of all tells its own soon after; who has started says so."""
         if has_told:
             self._beat_by(max(now_us + TELL_US, self._beat_us + BEATS_APART_US))
         if self._is_starting and not is_starting:
-            self._beat_by(now_us)
+            self._beat_by(now_us + TELL_US)
         self._is_starting = is_starting
 
     def on_return(self, beat_us: int, now_us: int) -> None:

@@ -175,7 +175,7 @@ class Witness:
         """What the journal says that I hold and gave away, for all to compare, and the question to all."""
         self.tokens.is_synced = False
         self._since_us = now_us
-        self._ask_at_us = now_us + self.site.timing.heartbeat_us + self.slot_us
+        self._ask_at_us = now_us + self.site.timing.heartbeat_us
         self.tokens.asked = set(self._others)
         # Who comes back after a hold asks anew: what was answered before that is old.
         self.answered.clear()
