@@ -14,10 +14,10 @@ from bus_sim.cli import main
 
 #: Options of `bus-sim run`, and the first 64 bits of SHA-256 over the log that it writes.
 RUNS = {
-    "level1 --random 40 15 --cars 3": "964a3c5792e853b2",
-    "small --random 40 15 --cars 3 --fault crash:target=MR1,at_s=80,restart_s=5": "25af2232d87ff239",
-    "standard --random 30 15 --cars 3": "33f91f0bdfefeefd",
-    "large --random 30 15 --cars 2": "5770aaec396f2d78",
+    "level1 --random 40 15 --cars 3": "b004f78469199b21",
+    "small --random 40 15 --cars 3 --fault crash:target=MR1,at_s=80,restart_s=5": "e8d7161745aad17a",
+    "standard --random 30 15 --cars 3": "95c617dd34572ee9",
+    "large --random 30 15 --cars 2": "e128ccc1c02b9e76",
     "graph --for 150": "9e5c5272f61b6b74",
     "terminal --for 150": "af60aa363ff26824",
 }
