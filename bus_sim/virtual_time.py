@@ -147,7 +147,8 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
 
     def at_us(self, when_us: int, callback: Callable[[int], None]) -> None:
         """Call ``callback(when_us)`` at a virtual time; about twice as fast as ``call_at``."""
-        heapq.heappush(self._timers, (max(when_us, self._now_us), next(self._sequence), None, callback))
+        due_us = when_us if when_us > self._now_us else self._now_us
+        heapq.heappush(self._timers, (due_us, next(self._sequence), None, callback))
 
     def call_at(
         self,

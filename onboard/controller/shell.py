@@ -8,6 +8,7 @@ import asyncio
 from collections import Counter, deque
 from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import ParamSpec
 
 from onboard.contract.codes import MachineState, Reason
@@ -70,8 +71,8 @@ class Controller:
         """Join both buses and let the holon begin. To be called on the running loop."""
         self._loop = asyncio.get_running_loop()
         self.stopped = self._loop.create_future()
-        self.ports.fleet_bus.subscribe(self._on_fleet_frame)
-        self.ports.device_bus.subscribe(self._on_device_frame)
+        self.ports.fleet_bus.subscribe(partial(self._post, self._fleet_frame))
+        self.ports.device_bus.subscribe(partial(self._post, self._device_frame))
         self._outbox.extend(self.holon.start(self._now_us()))
         self.ports.watchdog.ready()
         self._carry_out()
@@ -120,17 +121,16 @@ class Controller:
 
     # --- events in ---------------------------------------------------------------------------------------------
 
-    def _on_fleet_frame(self, frame: Frame, time_us: int) -> None:
-        self._post(self._fleet_frame, frame, time_us)
-
-    def _on_device_frame(self, frame: Frame, time_us: int) -> None:
-        self._post(self._device_frame, frame, time_us)
-
     def _post(self, handle: Callable[[Frame, int], list[Effect]], frame: Frame, time_us: int) -> None:
         if self._writing is None and not self._inbox:
-            self._guarded(handle, frame, time_us)
+            try:
+                effects = handle(frame, time_us)
+                if effects:
+                    self._outbox.extend(effects)
+            except Exception as error:  # noqa: BLE001  # as in ``_guarded``, without its call: this is for every frame
+                self._give_up(error)
             # Where nothing is to be said and nothing can have fallen due, all is as it was when this was done last.
-            if self._outbox or not self.holon.is_due_known:
+            if self._outbox or not self.holon.schedule.is_asked:
                 self._carry_out()
         elif len(self._inbox) < INBOX_LIMIT:
             self._inbox.append((handle, frame, time_us))
@@ -176,8 +176,11 @@ class Controller:
         try:
             self._outbox.extend(decide(*given, **named))
         except Exception as error:  # noqa: BLE001  # whatever it is, going on with a broken belief would be worse
-            self._outbox.clear()
-            self._halt(f"{type(error).__name__}: {error}", Reason.INVARIANT_BROKEN)
+            self._give_up(error)
+
+    def _give_up(self, error: Exception) -> None:
+        self._outbox.clear()
+        self._halt(f"{type(error).__name__}: {error}", Reason.INVARIANT_BROKEN)
 
     def _carry_out(self) -> None:
         """Carry out effects and waiting events in order, as far as no journal write stands in between."""

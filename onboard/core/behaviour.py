@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Protocol, runtime_checkable
 
 from onboard.contract.codes import KindCode, MachineState, Reason
-from onboard.contract.messages import Message
+from onboard.contract.messages import Message, Progress, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.effects import Effect
 from onboard.core.journal_records import Entry
@@ -100,12 +100,25 @@ class Behaviour(Protocol):
         """Say again what this node vouches for: its itinerary, and what is in its custody."""
 
 
+#: Words about others' rights and places: all hear them, and they concern one or two.
+OverheardWord = Progress | TokenGrant | TokenHeld | TokenRefusal | TokenRequest
+#: From when on a behaviour looks at all that happens, where it never does so by itself: bus us beyond any time.
+NEVER_US = 1 << 63
+
+
 @runtime_checkable
 class Attentive(Protocol):
-    """A behaviour that takes nothing from heartbeats, and need not be called at each: it knows when it only waits."""
+    """A behaviour that need not be called after every event: it knows what it waits for.
 
-    def watches(self, now_us: int) -> bool:
-        """Whether time alone may have left ``advance`` something to do for which ``next_wake`` does not call."""
+    It is called when it is due, and after each event that changed a right of its machine, or of which nothing here is
+    said. What it leaves out is proved by runs in which all is called always (``Holon.sweeps``).
+    """
+
+    def looks_from(self) -> int:
+        """From when on ``advance`` is to see every event, bus us: 0 for now, ``NEVER_US`` where it only waits."""
+
+    def heeds(self, message: OverheardWord) -> bool:
+        """Whether ``advance`` reads what this word changed in what is believed of others."""
 
 
 class BehaviourFactory(Protocol):

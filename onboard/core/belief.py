@@ -35,6 +35,8 @@ class Beliefs:
     first_holder: Callable[[Key], int]
     verified: dict[Key, Belief] = field(default_factory=dict)
     hints: dict[Key, Belief] = field(default_factory=dict)
+    #: Grows with every change of the tables above.
+    changes: int = 0
 
     def of(self, key: Key) -> Belief:
         """The newest belief that was verified; before the token first moves, version 0 and its first holder."""
@@ -46,6 +48,7 @@ class Beliefs:
 
     def take_up(self, key: Key, version: int, holder: int, *, confirmed: bool = False, giver: int = NOBODY) -> None:
         """What counts from now on; hints that are no newer end."""
+        self.changes += 1
         self.verified[key] = Belief(version, holder, confirmed, giver)
         hint = self.hints.get(key)
         if hint is not None and hint.version <= version:
@@ -54,9 +57,11 @@ class Beliefs:
     def hint(self, key: Key, version: int, holder: int) -> None:
         """What somebody said who is not believed to know."""
         if version > self.latest(key).version:
+            self.changes += 1
             self.hints[key] = Belief(version, holder)
 
     def forget(self, key: Key) -> None:
         """Nothing is known of the token any more."""
+        self.changes += 1
         self.verified.pop(key, None)
         self.hints.pop(key, None)

@@ -33,6 +33,9 @@ class Petitions:
     open: dict[TokenKey, dict[int, Petition]] = field(default_factory=dict)
     _prune_at_us: int = 0
 
+    def __post_init__(self) -> None:
+        self._backoff = BackOff(self.repeat_us)
+
     def hear(self, key: TokenKey, request: TokenRequest, now_us: int) -> None:
         """Take up a request, whoever holds the token: it may come to me."""
         self._prune(now_us)
@@ -99,7 +102,7 @@ class Petitions:
 
     def _is_over(self, node: int, petition: Petition, now_us: int) -> bool:
         is_ordered = petition.itinerary_version != UNORDERED
-        lapses_us = BackOff(self.repeat_us).lapses_us(is_ordered=is_ordered)
+        lapses_us = self._backoff.lapses_us(is_ordered=is_ordered)
         # Who asks for a whole set repeats one of it at a time.
         return petition.heard_us + lapses_us * (1 if is_ordered else self._set_of(node)) < now_us
 

@@ -92,6 +92,9 @@ class MachineHolds:
     _quiet_since_us: int = 0
     _heard_us: int | None = None
 
+    def __post_init__(self) -> None:
+        self._deaf_us = DEAF_BEATS * self.beat_us
+
     # --- what holds --------------------------------------------------------------------------------------------
 
     @property
@@ -147,7 +150,7 @@ class MachineHolds:
 
     def heard(self, now_us: int) -> None:
         """A frame of another machine: my silence counts only while I hear the bus."""
-        if self._is_deaf(now_us):
+        if self._heard_us is None or now_us - self._heard_us > self._deaf_us:
             self._quiet_since_us = now_us
         self._heard_us = now_us
 
@@ -169,13 +172,15 @@ class MachineHolds:
 
     def wake(self, now_us: int, *, acknowledged: bool = True) -> HoldResponse:
         """Let stops grow old and silence count; ``acknowledged``: the bus has taken my own frames meanwhile."""
-        for stopper in [node for node, heard_us in self.stops.items() if now_us - heard_us >= STOP_LASTS_US]:
-            del self.stops[stopper]
+        if self.stops:
+            self.stops = {node: heard_us for node, heard_us in self.stops.items() if now_us - heard_us < STOP_LASTS_US}
         if not acknowledged or self._is_deaf(now_us):
             self._quiet_since_us = now_us
         if self.hold is HoldState.OWN_NUMBER and self._is_quiet(now_us):
             return self._fire(HoldEvent.QUIET)
-        return HoldResponse.NOTHING if self.stops else self._fire(HoldEvent.STOP_OVER)
+        # Of a machine that acts no stop can be over.
+        is_over = not self.stops and self.hold is not HoldState.ACTING
+        return self._fire(HoldEvent.STOP_OVER) if is_over else HoldResponse.NOTHING
 
     def next_wake(self) -> int | None:
         """When ``wake`` has something to do, bus time in us."""
@@ -224,7 +229,7 @@ class MachineHolds:
         return outcome
 
     def _is_deaf(self, now_us: int) -> bool:
-        return self._heard_us is None or now_us - self._heard_us > DEAF_BEATS * self.beat_us
+        return self._heard_us is None or now_us - self._heard_us > self._deaf_us
 
     def _is_quiet(self, now_us: int) -> bool:
         return now_us - self._quiet_since_us >= QUIET_BEATS * self.beat_us

@@ -30,7 +30,7 @@ from onboard.contract.messages import (
     TokenHeld,
 )
 from onboard.core.authority import TokenBook, TokenKey
-from onboard.core.behaviour import Attentive, Behaviour, BehaviourFactory
+from onboard.core.behaviour import Behaviour, BehaviourFactory
 from onboard.core.bus_time import BUS_TIME_MODULUS
 from onboard.core.effects import Effect, Halt, Record, Renew, Report, Send
 from onboard.core.journal_records import Entry, records_in
@@ -46,6 +46,7 @@ from onboard.holon.own_number import OwnNumber
 from onboard.holon.presence import Presence
 from onboard.holon.regeneration import Regenerating
 from onboard.holon.rights import RightsTalk
+from onboard.holon.schedule import Schedule
 from onboard.holon.taking_part import TakingPart
 from onboard.holon.timekeeper import TimeHeard, Timekeeper
 from onboard.holon.witness import Doubt, Witness
@@ -100,7 +101,6 @@ class Holon:
         self.negotiation = negotiation_of(site, machine, estimator, boot, is_obstacle)
         self.fleet = factory.fleet_type(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
-        self._attentive = self.behaviour if isinstance(self.behaviour, Attentive) else None
         self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
         self.rights = RightsTalk(self.fleet, self._may_grant, self.witness)
         self.regeneration = Regenerating(self.tokens, self.mirror, self._statements, self._thaw)
@@ -112,12 +112,8 @@ class Holon:
         if self.holding.why.reason in RIGHTS_LOST:
             self.fleet.has_no_rights, self.witness.doubt = True, Doubt(self.holding.why.reason, NOBODY, journal.why)
         self.fixed = FixedTimes(self.time, self.presence, self.holds, self.fleet, self._all_drops)
-        #: When ``wake`` is due, bus time in us; not known after any event but a heartbeat that says nothing new.
-        self._due_us: int | None = None
-        self.is_due_known = False
-        #: The same of all but what is said at fixed times.
-        self._work_due_us: int | None = None
-        self._bus_time_lost = False
+        #: When ``wake`` is due, and what of it is kept after an event.
+        self.schedule = Schedule(self.part, self.fleet, self.rights, self.fixed, self.behaviour)
         self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
         self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
@@ -168,23 +164,39 @@ class Holon:
         """A message of the fleet bus, received at ``local_us``."""
         local_us = self.time.steady(local_us)
         now_us = self.clock.bus_us(local_us)
-        if isinstance(message, Heartbeat) and self._only_waits(now_us) and self.part.lives_on(message, now_us):
+        if isinstance(message, Heartbeat) and self.schedule.lives_on(message, now_us):
             return []
-        self.is_due_known = False
+        before = self.schedule.before(message, now_us)
         if message.sender == self.node_id:
+            self.schedule.changed()
             return self.holds.on_own_number(message, now_us)
         why = self.admission.why_not(message)
         if why is not Reason.NONE:
             self.drops[why] += 1
+            self.schedule.changed()
             return self.admission.passed_over(message, why) if self.halted is None else []
         self.holding.heard(now_us)
         if isinstance(message, BusTime):
             return self._on_bus_time(message, local_us)
-        if self.holding.is_apart and not isinstance(message, _WHILE_APART):
+        if self._is_unheard(message):
             return []
+        effects = self._take_up(message, now_us)
+        if not effects and self.schedule.is_overheard(message, before):
+            return effects
+        self.schedule.changed()
+        return self._settle(effects, now_us)
+
+    def _is_unheard(self, message: Message) -> bool:
+        """Whether nothing is taken in now, or not of this sender: of another contract or site it is counted."""
+        if self.holding.is_apart and not isinstance(message, _WHILE_APART):
+            return True
         if message.sender in self.presence.foreign and not isinstance(message, _HEARD_FROM_STRANGERS):
             self.drops[self.presence.foreign[message.sender][0]] += 1
-            return []
+            return True
+        return False
+
+    def _take_up(self, message: Message, now_us: int) -> list[Effect]:
+        """Tell every part of a message: first what all believe, then what this machine does with it."""
         effects = self._awake(now_us)
         if self.presence.is_back(message.sender, now_us):
             self.fixed.on_return(now_us + self.witness.slot_us, now_us)
@@ -197,15 +209,17 @@ class Holon:
         effects = effects + self.behaviour.hear(message, now_us)
         if isinstance(message, (TokenGrant, TokenHeld)):
             proven = self.mirror.settle(TokenKey(message.token_kind, message.token))
-            effects += self.behaviour.hear(proven, now_us) if proven is not None else []
-        return self._settle(effects, now_us)
+            if proven is not None:
+                self.schedule.changed()
+                effects += self.behaviour.hear(proven, now_us)
+        return effects
 
     def sense(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the machine's own device bus."""
         if self.journal.is_foreign:
             return []
         local_us = self.time.steady(local_us)
-        self.is_due_known = False
+        self.schedule.changed()
         if not self.clock.is_set:
             # Plans made before bus time is known would be told in a time of one's own.
             self._sensed_early[type(message)] = message
@@ -216,9 +230,9 @@ class Holon:
     def wake(self, local_us: int) -> list[Effect]:
         """Do what has fallen due."""
         local_us = self.time.steady(local_us)
-        if self._only_speaks(local_us):
+        if self.schedule.only_speaks(local_us):
             return self._speak(local_us)
-        self.is_due_known = False
+        self.schedule.changed()
         # Who has slept counts nobody as silent, so that it does not take itself for the time source.
         effects = self._awake(self.clock.bus_us(local_us))
         self.time.elect(local_us)
@@ -229,13 +243,13 @@ class Holon:
             effects += self.witness.wake(now_us)
         if self.part.deals:
             effects += self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
-        self._bus_time_lost = self.clock.is_lost(local_us)
+        self.schedule.is_time_lost = self.clock.is_lost(local_us)
         if self.presence.is_admitted(now_us, in_time=self.clock.far_us is None):
             # What was planned before is old; the first word is that of a machine that takes part.
             self.fleet.admissions += 1
             self.fleet.winners.begin_anew(now_us)
             self.fixed.heartbeat_due_us = now_us
-        if not self._bus_time_lost and self.part.begins:
+        if not self.schedule.is_time_lost and self.part.begins:
             effects += self._carry_out(self.negotiation.wake(now_us), now_us)
         effects += self.fixed.words(now_us)
         return self._settle(effects, now_us)
@@ -244,51 +258,22 @@ class Holon:
         """Loop time in us at which ``wake`` is to be called, or None before ``start``."""
         if self.halted is not None:
             return None
-        if not self.is_due_known:
-            self._due_us, self.is_due_known = self._earliest_due(), True
-        return None if self._due_us is None else self.time.loop_us(self._due_us)
-
-    def _earliest_due(self) -> int | None:
-        """When the first of all parts has something to do, bus time in us: a matter of what they know, not of when."""
-        times = [self.holding.next_wake(), self.regeneration.next_wake(), self.presence.held_until_us]
-        if not self.holding.is_apart:
-            times.append(self.witness.next_wake())
-        if self.part.deals:
-            times += (self.tokens.next_wake(), self.rights.petition_due())
-        if self.part.begins:
-            times += (self._negotiation_due(), self.behaviour.next_wake())
-        self._work_due_us = min((time for time in times if time is not None), default=None)
-        return self.fixed.due_us(self._work_due_us)
-
-    def _only_speaks(self, local_us: int) -> bool:
-        """Whether nothing but a word that is said at fixed times is due, and nobody looks for anything."""
-        if self._attentive is None or not self.is_due_known or not self.part.begins:
-            return False
-        now_us = self.clock.bus_us(local_us)
-        if self._work_due_us is not None and self._work_due_us <= now_us:
-            return False
-        if self.clock.is_lost(local_us) != self._bus_time_lost or self.presence.slept(now_us):
-            return False
-        return not self._attentive.watches(now_us)
+        due_us = self.schedule.due_us()
+        return None if due_us is None else self.time.loop_us(due_us)
 
     def _speak(self, local_us: int) -> list[Effect]:
         """Say what is said at fixed times; go on with the work only where somebody fell silent, or came back."""
+        was_source = self.clock.is_source
         self.time.elect(local_us)
         now_us = self.clock.bus_us(local_us)
         self.presence.begins(now_us)
         aside = dict(self.mirror.aside)
         effects = self.fixed.words(now_us)
-        if aside != self.mirror.aside:
-            self.is_due_known = False
+        if aside != self.mirror.aside or self.clock.is_source is not was_source:
+            self.schedule.changed()
             return self._settle(effects, now_us)
-        self._due_us = self.fixed.due_us(self._work_due_us)
+        self.schedule.has_spoken()
         return self._approve(effects)
-
-    def _only_waits(self, now_us: int) -> bool:
-        """Whether nothing is to be done here unless something happens: nothing is due, and nobody looks for it."""
-        if self._attentive is None or not self.is_due_known or self._due_us is None or self._due_us <= now_us:
-            return False
-        return not self._attentive.watches(now_us)
 
     def _awake(self, now_us: int) -> list[Effect]:
         """Whoever finds that it has slept is an obstacle first, says so, and asks what it has missed."""
@@ -311,7 +296,12 @@ class Holon:
         heard = self.time.hear(message, local_us)
         now_us = self.clock.bus_us(local_us)
         self.witness.shift(now_us - before_us)
-        self._bus_time_lost &= heard in (TimeHeard.NOTHING, TimeHeard.REFUTED)
+        was_lost = self.schedule.is_time_lost
+        self.schedule.is_time_lost &= heard in (TimeHeard.NOTHING, TimeHeard.REFUTED)
+        if heard in (TimeHeard.NOTHING, TimeHeard.FOLLOWED) and self.schedule.is_time_lost is was_lost:
+            self.schedule.slewed()
+            return []
+        self.schedule.changed()
         match heard:
             case TimeHeard.REFUTED:
                 return [self.fixed.bus_time(now_us)]
@@ -335,11 +325,6 @@ class Holon:
         """Bus time was far off, and is set: what was read of plans meanwhile was read in the wrong time."""
         self.mirror.retime(now_us)
         return self._awake(now_us)
-
-    def _negotiation_due(self) -> int | None:
-        """Nothing is due in the negotiation while bus time is lost: its deadlines mean nothing then."""
-        # The last loop time is not known here; what ``wake`` found holds until the next time message.
-        return None if self._bus_time_lost else self.negotiation.next_wake()
 
     # --- handlers ----------------------------------------------------------------------------------------------
 
@@ -443,6 +428,9 @@ class Holon:
 
     def _approve(self, effects: list[Effect]) -> list[Effect]:
         """What of all effects may leave this machine: nothing moves without authority, nor is a right said without."""
+        if not effects:
+            self.fleet.motion.event += 1
+            return effects
         fault = self.fleet.motion.fault(effects, self.site.moved_by)
         if fault is not None:
             return self._halt(fault, Reason.NOT_AUTHORISED)
@@ -464,7 +452,7 @@ class Holon:
         self.fleet.entries = still_counting(OLD, self.fleet.entries)
         self.negotiation.estimator = estimator = self._factory.estimator(self.site, self.machine, self.mirror)
         self.behaviour = behaviour = self._factory.behaviour(self.fleet, estimator)
-        self._attentive = behaviour if isinstance(behaviour, Attentive) else None
+        self.schedule.begins_anew(behaviour)
         return [*self._first_entries(OLD), *self.behaviour.start(now_us)]
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
@@ -477,7 +465,8 @@ class Holon:
         return effects
 
     def _all_drops(self) -> Counter[Reason]:
-        return sum(self.wire_drops, Counter(self.drops))
+        counts = [one for one in (self.drops, *self.wire_drops) if one]
+        return sum(counts, Counter()) if counts else Counter()
 
     def _heartbeat(self) -> Heartbeat:
         return Heartbeat(

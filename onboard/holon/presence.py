@@ -10,7 +10,7 @@ more machines speak another contract or know another site than speak its own, it
 from dataclasses import dataclass, field, replace
 
 from onboard.contract.codes import MachineState, Reason
-from onboard.contract.constants import NOBODY, STILL
+from onboard.contract.constants import MOBILE_KINDS, NOBODY, STILL
 from onboard.contract.messages import Halted, Heartbeat
 from onboard.core.authority import TokenBook
 from onboard.core.mirror import MISSED_HEARTBEATS, Mirror
@@ -36,7 +36,8 @@ class Presence:
     held_until_us: int | None = None
     #: Last word of machines that say themselves that they do not act.
     halts: dict[int, Halted] = field(default_factory=dict)
-    _active_us: int | None = None
+    #: When it did anything last.
+    active_us: int | None = None
     _listening_since_us: int | None = None
 
     @property
@@ -51,7 +52,7 @@ class Presence:
 
     def begins(self, now_us: int) -> None:
         """I live from now on, in the time that is known now."""
-        self._active_us = now_us
+        self.active_us = now_us
 
     def awake(self, now_us: int) -> bool:
         """Note that this machine lives; True where it finds that it has slept. Before its first beat it tells nothing.
@@ -59,14 +60,14 @@ class Presence:
         It then waits until the others have said what they plan by now.
         """
         slept = self.slept(now_us)
-        self._active_us = now_us
+        self.active_us = now_us
         if slept:
             self.listen_anew(now_us)
         return slept
 
     def slept(self, now_us: int) -> bool:
         """Whether this machine has done nothing for so long that others may have missed its word."""
-        before_us = self._active_us
+        before_us = self.active_us
         return before_us is not None and now_us - before_us > SLEPT_BEATS * self.site.timing.heartbeat_us
 
     def lives_on(self, beat: Heartbeat, now_us: int) -> bool:
@@ -77,11 +78,11 @@ class Presence:
         peer = self.mirror.peers.get(beat.sender)
         if peer is None or peer.beat != beat or now_us - peer.heard_at_us >= self.patience_us:
             return False
-        if self._active_us is None or self.slept(now_us):
+        if self.active_us is None or self.slept(now_us):
             return False
         if beat.sender in self.mirror.aside or beat.sender in self.foreign or beat.sender in self.halts:
             return False
-        peer.heard_at_us = self._active_us = now_us
+        peer.heard_at_us = self.active_us = now_us
         return True
 
     def listen_anew(self, now_us: int) -> None:
@@ -133,6 +134,8 @@ class Presence:
     def halted_ones(self, now_us: int) -> list[Halted]:
         """What I say of machines that are silent, or stand laden, as the lowest live one that is no obstacle."""
         obstacles = self.mirror.aside
+        if not obstacles:
+            return []
         alive = self.mirror.alive(now_us)
         if self.is_held or min([node for node in alive if node not in obstacles], default=self.node_id) < self.node_id:
             return []
@@ -175,8 +178,15 @@ class Presence:
         """Look at all other machines of the site; once in a heartbeat period is often enough."""
         if self._listening_since_us is None:
             self._listening_since_us = now_us
-        for machine in self.site.machines.values():
-            if machine.node_id != self.node_id:
+        peers, stands, late_us = self.mirror.peers, self.mirror.stands, now_us - self.patience_us
+        in_question = {*self.mirror.aside, *self.halts, *self.foreign}
+        for node, machine in self.site.machines.items():
+            peer = peers.get(node)
+            # Most take part as they did, with nothing said or known against them.
+            if peer is None or peer.heard_at_us <= late_us or peer.state in STILL or node in in_question:
+                if node != self.node_id:
+                    self._judge(machine, now_us)
+            elif machine.kind in MOBILE_KINDS and stands(node, now_us):
                 self._judge(machine, now_us)
 
     def _begin_anew(self, now_us: int) -> None:

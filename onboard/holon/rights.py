@@ -6,6 +6,7 @@ own (design, section 5).
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache, partial
 from typing import Any
 
 from onboard.contract.codes import Reason
@@ -30,6 +31,8 @@ from onboard.holon.witness import Witness
 #: A machine whose view of the order differs from mine is asked to state its own at most this often, us: an answer has
 #: come by then.
 ASK_AGAIN_US = 1_000_000
+#: Tokens of which a machine remembers whether the site has them: more than a large site has.
+MOST_KNOWN = 4096
 
 
 @dataclass
@@ -45,6 +48,8 @@ class RightsTalk:
     #: Whether nothing is taken or given: rights are made anew.
     is_frozen: Callable[[], bool] = bool
     _asked_again_us: dict[int, int] = field(default_factory=dict)
+    #: Requests that were told since they were last heard that their order of passing is not the one seen here.
+    _told_behind: set[tuple[TokenKey, int]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.site, self.node_id, self.drops = self.fleet.site, self.fleet.node_id, self.fleet.drops
@@ -52,6 +57,8 @@ class RightsTalk:
         self.tokens.drops = self.drops
         self.mirror, self.petitions = self.fleet.mirror, self.fleet.petitions
         self.tokens.claim = self._claim
+        # The site never changes; whoever makes tokens up pushes out what was found before.
+        self._may_exist = lru_cache(maxsize=MOST_KNOWN)(partial(may_exist, self.site))
 
     def handlers(self) -> dict[type[Message], Callable[[Any, int], list[Effect]]]:
         """Handler by message class; each takes the class that it is listed under."""
@@ -74,7 +81,9 @@ class RightsTalk:
             return self.tokens.on_request(request, Reason.TOKEN_HELD_BY_OTHER, now_us)
         verdict = self.may_grant(key, request.sender, now_us)
         effects = self.tokens.on_request(request, verdict, now_us)
+        self._told_behind.discard((key, request.sender))
         if verdict is Reason.MIRROR_BEHIND:
+            self._told_behind.add((key, request.sender))
             effects += self._ask_again(key, request, now_us)
         return effects
 
@@ -104,8 +113,15 @@ class RightsTalk:
             for requester in self.petitions.due(key, now_us) if self.tokens.holds(key) else ():
                 if not self.tokens.holds(key) or not self._was_heard_of_late(requester, now_us):
                     continue
-                if self.may_grant(key, requester, now_us) is Reason.NONE:
+                verdict = self.may_grant(key, requester, now_us)
+                if verdict is Reason.NONE:
                     effects += self.tokens.give(key, requester, now_us)
+                elif verdict is Reason.MIRROR_BEHIND and (key, requester) not in self._told_behind:
+                    # It asks seldom, and only its next request can tell who of us is right.
+                    self._told_behind.add((key, requester))
+                    again = TokenRequest(requester, *key, 0, *self._claim(key, requester))
+                    effects += self.tokens.on_request(again, verdict, now_us)
+        self._told_behind = {(key, one) for key, one in self._told_behind if self.petitions.claim(key, one)}
         return effects
 
     def _was_heard_of_late(self, requester: int, now_us: int) -> bool:
@@ -119,6 +135,8 @@ class RightsTalk:
     def petition_due(self) -> int | None:
         """When the first request for a token held here is to be looked at again, bus time in us; None for never."""
         waiting = self.petitions.open.items()
+        if not waiting:
+            return None
         return min((one.due_us for key, by in waiting if self.tokens.holds(key) for one in by.values()), default=None)
 
     def _on_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
@@ -157,7 +175,7 @@ class RightsTalk:
 
     def _may_move(self, key: TokenKey, holder: int) -> bool:
         """Whether the site has such a token and such a holder, so that nobody fills the book with what cannot be."""
-        if may_exist(self.site, key) and holder in self.site.machines:
+        if self._may_exist(key) and holder in self.site.machines:
             return True
         self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
         return False

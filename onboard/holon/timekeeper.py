@@ -46,9 +46,12 @@ class Timekeeper:
 
     def steady(self, local_us: int) -> int:
         """A loop time that never goes back: where the clock does, time stands still for a moment instead."""
-        self._behind_us = max(self._behind_us, self._steady_us - local_us)
-        self._steady_us = local_us + self._behind_us
-        return self._steady_us
+        steady_us = local_us + self._behind_us
+        if steady_us < self._steady_us:
+            self._behind_us = self._steady_us - local_us
+            return self._steady_us
+        self._steady_us = steady_us
+        return steady_us
 
     def loop_us(self, bus_us: int) -> int:
         """When the machine's own clock will show a bus time, us of it."""

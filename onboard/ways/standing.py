@@ -9,7 +9,20 @@ from dataclasses import dataclass, field
 
 from onboard.contract.codes import Grade, LegAction, ManualMode
 from onboard.contract.constants import MOBILE_KINDS
-from onboard.contract.messages import Itinerary, Leg, ManualOrder, Message, Progress, TaskReport, TokenRequest, Waiting
+from onboard.contract.messages import (
+    Heartbeat,
+    Itinerary,
+    Leg,
+    ManualOrder,
+    Message,
+    Progress,
+    TaskReport,
+    TokenGrant,
+    TokenHeld,
+    TokenRefusal,
+    TokenRequest,
+    Waiting,
+)
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment
 from onboard.ways.occupancy import final_position, turned_in
@@ -24,6 +37,8 @@ WAITS_AFTER_US = 600_000_000
 
 #: Words about one's plan; who asks for a right waits for it.
 _SPEAKS = (Waiting, TaskReport, TokenRequest)
+#: Most of what is heard says nothing of anybody's plan.
+_SAYS_NOTHING = (Heartbeat, TokenGrant, TokenHeld, TokenRefusal)
 
 
 @dataclass
@@ -51,6 +66,8 @@ class Standing:
 
     def hear(self, message: Message, now_us: int) -> None:
         """A machine moves, or speaks of its plan."""
+        if type(message) in _SAYS_NOTHING:
+            return
         if isinstance(message, Progress):
             place = message.track, message.index, message.offset_mm
             known = self._seen.get(message.sender)

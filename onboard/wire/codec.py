@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
-from onboard.contract.base import FrameCode
+from onboard.contract.base import FrameCode, SetFrame
 from onboard.contract.codes import Grade, Reason
 from onboard.contract.messages import (
     Call,
@@ -30,7 +30,7 @@ _NODE_MASK = 0xFF
 #: What a call says where no car is meant (dbc/fleet.dbc); no site takes cars so short.
 NO_WHEELBASE_MM = 1500
 #: Decoded frames kept for the other receivers of the same frame: a simulated fleet decodes each frame once.
-_MEMORY = 4096
+_MEMORY = 1024
 #: Frames of the two contracts of all.
 _FLEET = (*presence.FRAMES, *rights.FRAMES, *calls.FRAMES, *plans.FRAMES)
 _DEVICE = device.FRAMES
@@ -45,9 +45,12 @@ class Codec:
         """``frames`` are all that are said on the bus, by whomever."""
         self._by_id = {one.identifier: one for one in frames}
         self._packs = {one.frame: (one.identifier, one.pack) for one in frames}
+        #: Messages of one frame; all others are put together of several.
+        self.wholes = frozenset(one.frame for one in frames if not issubclass(one.frame, SetFrame))
         #: Which kinds of machine may say what on the bus, by the DBC.
         self.speakers = speakers_of(frames)
-        self._known = lru_cache(maxsize=_MEMORY)(self._decode)
+        #: A whole message, a part of a set (``SetFrame``), or why the frame is none.
+        self.decode_part = lru_cache(maxsize=_MEMORY)(self._decode)
 
     # --- out ---------------------------------------------------------------------------------------------------
 
@@ -71,18 +74,20 @@ class Codec:
 
     # --- in ----------------------------------------------------------------------------------------------------
 
-    def decode_part(self, frame: Frame) -> Message | Reason:
-        """A whole message, a part of a set (``SetFrame``), or why the frame is none."""
-        if frame.is_error or frame.is_remote or not frame.is_extended:
-            return Reason.UNKNOWN_IDENTIFIER
-        return self._known(frame.arbitration_id, frame.data)
+    def whole(self, arbitration_id: int, data: bytes) -> Message | None:
+        """The message of a classic data frame with a 29-bit identifier; None for a part of a set and what is none."""
+        found = self.decode_part(Frame(arbitration_id, data))
+        return found if isinstance(found, Message) and type(found) in self.wholes else None
 
     def name_of(self, frame: Frame) -> str | None:
         """The DBC name of a frame's message, or None."""
         found = self._by_id.get(frame.arbitration_id & ~_NODE_MASK) if frame.is_extended else None
         return found.name if found is not None else None
 
-    def _decode(self, arbitration_id: int, data: bytes) -> Message | Reason:
+    def _decode(self, frame: Frame) -> Message | Reason:
+        arbitration_id, data, is_extended, is_remote, is_error, _ = frame
+        if is_error or is_remote or not is_extended:
+            return Reason.UNKNOWN_IDENTIFIER
         found = self._by_id.get(arbitration_id & ~_NODE_MASK)
         sender = arbitration_id & _NODE_MASK
         if found is None or sender == 0:
@@ -133,6 +138,11 @@ _SETS: dict[type[Message], Callable[[Any], tuple[Message, ...]]] = {
     CallForProposals: _parts_of_call,
     Itinerary: _parts_of_itinerary,
 }
+
+
+def is_one_frame(message: Message) -> bool:
+    """Whether a message of either bus is one frame, not a set."""
+    return type(message) not in _SETS
 
 
 def _wheelbase_mm(call: CallForProposals) -> int:

@@ -57,7 +57,11 @@ class Decoder:
 
     def feed(self, frame: Frame, now_us: int) -> Message | None:
         """The message that this frame completes, if any. Never raises, whatever the frame."""
-        message = self._put_together(frame, now_us)
+        part = self._codec.decode_part(frame)
+        if isinstance(part, Message) and type(part) in self._codec.wholes:
+            message: Message | None = part
+        else:
+            message = self._put_together(part, now_us)
         if message is None or self._machines is None:
             return message
         why = why_unheard(message, self._machines, self._codec.speakers)
@@ -66,13 +70,10 @@ class Decoder:
         self.drops[why] += 1
         return None
 
-    def _put_together(self, frame: Frame, now_us: int) -> Message | None:
-        part = self._codec.decode_part(frame)
+    def _put_together(self, part: Message | Reason, now_us: int) -> Message | None:
         if isinstance(part, Reason):
             self.drops[part] += 1
             return None
-        if not isinstance(part, SetFrame):
-            return part
         if self._sets or self._whole:
             self._expire(now_us)
         match part:
@@ -214,7 +215,7 @@ def _call(parts: dict[type[SetFrame] | int, SetFrame]) -> CallForProposals | Non
 def _itinerary(parts: dict[type[SetFrame] | int, SetFrame]) -> Itinerary | None:
     """The itinerary, where its head and all legs that it tells of are there."""
     head = parts.get(ItineraryHead)
-    if not isinstance(head, ItineraryHead):
+    if not isinstance(head, ItineraryHead) or len(parts) <= head.legs:
         return None
     told = [parts.get(number) for number in range(head.legs)]
     legs = tuple(_leg(leg, head.stamp.award_ms) for leg in told if isinstance(leg, ItineraryLeg))

@@ -1,4 +1,4 @@
-"""Heartbeats that say nothing new: a machine does nothing for them, and for every other it looks at all it knows."""
+"""Words that change nothing for a machine: it does nothing for them, and for every other it looks at all it knows."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -6,14 +6,16 @@ from dataclasses import dataclass, field, replace
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, Reason
-from onboard.contract.messages import Halted, Heartbeat, Message
-from onboard.core.behaviour import BehaviourFactory, Fleet
+from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, Reason, TokenKind
+from onboard.contract.messages import Halted, Heartbeat, Message, Progress, TokenGrant
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import NEVER_US, BehaviourFactory, Fleet, OverheardWord
 from onboard.core.effects import Effect
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.site import Machine, Site
 from onboard.holon.holon import Holon
+from onboard.holon.schedule import Schedule
 from onboard.work.plain import NoEstimator, Plain
 
 SITE = find_site("small")
@@ -26,14 +28,17 @@ class Still(Plain):
 
     asked: int = 0
     looks: bool = False
-    heard: list[Message] = field(default_factory=list)
+    heeded: list[Message] = field(default_factory=list)
 
     def advance(self, now_us: int) -> list[Effect]:
         self.asked += 1
         return []
 
-    def watches(self, now_us: int) -> bool:
-        return self.looks
+    def looks_from(self) -> int:
+        return 0 if self.looks else NEVER_US
+
+    def heeds(self, message: OverheardWord) -> bool:
+        return message in self.heeded
 
 
 class StillFactory(BehaviourFactory):
@@ -67,6 +72,21 @@ class Bench:
         self.holon.next_wake()
         return self.still.asked - asked
 
+    def looks(self) -> None:
+        """It begins to look for something."""
+        self.still.looks = True
+        self.marked()
+
+    def trusts(self) -> None:
+        """All have answered: its rights count."""
+        self.holon.tokens.trust()
+        self.marked()
+
+    def marked(self, _done: object = None) -> None:
+        """What was done to this machine's state was marked by the event that did it."""
+        self.holon.schedule.changed()
+        self.holon.next_wake()
+
 
 def test_a_heartbeat_that_says_nothing_new_asks_nobody_to_go_on_and_is_a_sign_of_life() -> None:
     bench = Bench()
@@ -80,18 +100,18 @@ CHANGES: dict[str, Callable[[Bench], object]] = {
     "another state": lambda bench: setattr(bench, "beat", replace(bench.beat, state=MachineState.WORKING)),
     "another life": lambda bench: setattr(bench, "beat", replace(bench.beat, boot=2)),
     "another mirror": lambda bench: setattr(bench, "beat", replace(bench.beat, mirror_digest=4711)),
-    "it was silent": lambda bench: bench.holon.mirror.peers.update(
-        {PEER: replace(bench.holon.mirror.peers[PEER], heard_at_us=-60_000_000)}
+    "it was silent": lambda bench: setattr(bench.holon.mirror.peers[PEER], "heard_at_us", -60_000_000),
+    "it is an obstacle": lambda bench: bench.marked(
+        bench.holon.mirror.set_aside(PEER, frozenset(), Reason.NODE_SILENT, 0)
     ),
-    "it is an obstacle": lambda bench: bench.holon.mirror.set_aside(PEER, frozenset(), Reason.NODE_SILENT, 0),
-    "it said that it halts": lambda bench: bench.holon.presence.halts.update(
-        {PEER: Halted(PEER, PEER, Reason.OPERATOR, 0, False, 1)}
+    "it said that it halts": lambda bench: bench.marked(
+        bench.holon.presence.halts.update({PEER: Halted(PEER, PEER, Reason.OPERATOR, 0, False, 1)})
     ),
     "something else was heard": lambda bench: bench.holon.receive(
         replace(bench.beat, sender=OTHER, kind=SITE.machines[OTHER].kind), bench.now_us
     ),
     "something is due": lambda bench: setattr(bench, "now_us", bench.now_us + SITE.timing.heartbeat_us),
-    "it looks for something": lambda bench: setattr(bench.still, "looks", True),
+    "it looks for something": lambda bench: bench.looks(),
 }
 
 
@@ -107,3 +127,49 @@ def test_rights_of_another_epoch_are_no_sign_of_life_of_one_that_takes_part() ->
     bench.hear(replace(bench.beat, epoch=1))
     bench.hear(replace(bench.beat, epoch=1))
     assert bench.holon.drops[Reason.OTHER_EPOCH] == 2
+
+
+# --- words about others' rights and places ---------------------------------------------------------------------------
+
+SLOT = next(iter(sorted(SITE.stewards)))
+AWAY = TokenGrant(PEER, TokenKind.SEGMENT, SLOT << 8 | 1, 1, OTHER)
+MINE = TokenGrant(PEER, TokenKind.SEGMENT, SLOT << 8 | 1, 1, ME)
+THERE = Progress(OTHER, 1, 0, SLOT, 1, 0, 0)
+
+
+@pytest.mark.parametrize("word", [AWAY, THERE], ids=["a right of others", "a place of another"])
+def test_what_is_none_of_its_business_asks_nobody_to_go_on_and_is_believed(word: Message) -> None:
+    bench = Bench()
+    bench.marked()
+    assert bench.hear(word) == 0
+    if word is AWAY:
+        assert bench.holon.tokens.beliefs.of(TokenKey(AWAY.token_kind, AWAY.token)).holder == OTHER
+    else:
+        assert bench.holon.mirror.progress[OTHER] == THERE
+
+
+HEEDED: dict[str, Callable[[Bench], object]] = {
+    "it reads that": lambda bench: bench.still.heeded.append(AWAY),
+    "it looks for something": lambda bench: bench.looks(),
+    "its sender is an obstacle": lambda bench: bench.marked(
+        bench.holon.mirror.set_aside(PEER, frozenset(), Reason.NODE_SILENT, 0)
+    ),
+    "it gets the right": lambda bench: bench.trusts(),
+    "something else was heard": CHANGES["something else was heard"],
+    "something is due": CHANGES["something is due"],
+}
+
+
+@pytest.mark.parametrize("reason", HEEDED)
+def test_whatever_it_may_be_about_asks_the_machine_to_go_on(reason: str) -> None:
+    bench = Bench()
+    bench.marked()
+    HEEDED[reason](bench)
+    assert bench.hear(MINE if reason == "it gets the right" else AWAY) > 0
+
+
+def test_a_machine_that_sweeps_goes_on_after_every_word(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Schedule, "sweeps", True)
+    bench = Bench()
+    bench.marked()
+    assert (bench.hear(bench.beat) > 0, bench.hear(AWAY) > 0, bench.hear(THERE) > 0) == (True, True, True)

@@ -307,7 +307,7 @@ def test_memory_is_bounded_and_the_oldest_sets_are_counted_as_they_go() -> None:
             for frame in fleet_codec().encode(a_call(sender, number)):
                 decoder.feed(frame, 0)
     assert len(decoder._sets) < MAX_SETS == len(decoder._whole)
-    memory = fleet_codec()._known.cache_info()
+    memory = fleet_codec().decode_part.cache_info()
     assert memory.maxsize is not None and memory.currsize <= memory.maxsize
 
 

@@ -111,6 +111,8 @@ class Winners:
 
     def stuck(self, now_us: int) -> list[int]:
         """Machines that keep a task, live and stand, until something of them changes."""
+        if not (self._kept or self._blamed):
+            return []
         self._kept = {task for task in self._kept if self.lost(task, now_us) is Reason.FALSE_STATEMENT}
         self._blamed = {
             node: since_us for node, since_us in self._blamed.items() if self._worked_us(node, since_us) <= since_us

@@ -38,6 +38,7 @@ from onboard.contract.messages import (
     TokenRequest,
 )
 from onboard.core.authority import TokenKey, station_token
+from onboard.core.behaviour import NEVER_US, OverheardWord
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, NegotiationEvent
 from onboard.core.serial import successor
@@ -112,9 +113,8 @@ class Compartment:
     @property
     def state(self) -> MachineState:
         """STARTING until bay and doors are known, then IDLE or WORKING, for heartbeats."""
-        if self.phase is BayPhase.STARTING:
-            return MachineState.STARTING
-        return MachineState.IDLE if self.phase is BayPhase.FREE else MachineState.WORKING
+        known = {BayPhase.STARTING: MachineState.STARTING, BayPhase.FREE: MachineState.IDLE}
+        return known.get(self.phase, MachineState.WORKING)
 
     @property
     def itinerary_version(self) -> int:
@@ -174,10 +174,10 @@ class Compartment:
         record = self.fleet.mirror.cars.get(job.car)
         if job.winner and sender == job.winner:
             return self._call_again(job, now_us)
-        if not job.winner and self._is_unheard(job, now_us) and record is not None and sender == record.custodian:
-            return self._call_again(job, now_us)
-        if not job.winner or record is None or sender != record.custodian:
+        if record is None or sender != record.custodian:
             return []
+        if not job.winner:
+            return self._call_again(job, now_us) if self._is_unheard(job, now_us) else []
         heard = job.winner not in self.fleet.mirror.obstacles.machines
         if heard and job.version != 1 and job.reminders < REMINDERS:
             # It has not heard of the newest award yet.
@@ -216,8 +216,7 @@ class Compartment:
         """Its winner gave the task back, or is lost: it is called anew under a raised version."""
         outcome = self.fleet.negotiation.abandon(job.task, Reason.NODE_SILENT, now_us)
         effects: list[Effect] = [item for item in outcome if not isinstance(item, EVENT_TYPES)]
-        job.winner, self._robot_waits = 0, False
-        job.version = successor(job.version, TASK_VERSION_BITS)
+        job.winner, job.version, self._robot_waits = 0, successor(job.version, TASK_VERSION_BITS), False
         effects += self.stewardship.won(job.car, 0, job.task, job.version)
         return effects + self._call_for(job, now_us)
 
@@ -244,9 +243,8 @@ class Compartment:
                 return Reason.DOOR_NOT_READY
             self.job.was_granted |= key.kind is TokenKind.STATION
             return Reason.NONE
-        if key == station_token(self.station):
-            return Reason.TOKEN_NOT_GRANTABLE_YET
-        return self.stewardship.may_grant(key, requester, now_us)
+        is_bay = key == station_token(self.station)
+        return Reason.TOKEN_NOT_GRANTABLE_YET if is_bay else self.stewardship.may_grant(key, requester, now_us)
 
     def advance(self, now_us: int) -> list[Effect]:
         """One step of the phase table, where its condition is met."""
@@ -259,12 +257,11 @@ class Compartment:
         """As custodian: winners that are lost; for my own task I call anew at once."""
         effects = self.stewardship.review(now_us)
         job = self.job
-        if job is not None and job.winner and effects and self.stewardship.is_given_back(job.car):
-            effects += self._call_again(job, now_us)
-        elif job is not None and not job.winner and self._is_unheard(job, now_us):
-            # Nobody has a right by the award that was not heard: its car is mine, and goes to the winner only.
-            effects += self._call_again(job, now_us)
-        return effects
+        if job is None:
+            return effects
+        # Nobody has a right by an award that was not heard: its car is mine, and goes to the winner only.
+        is_lost = effects and self.stewardship.is_given_back(job.car) if job.winner else self._is_unheard(job, now_us)
+        return effects + self._call_again(job, now_us) if is_lost else effects
 
     def _is_unheard(self, job: BayTask, now_us: int) -> bool:
         return custody.is_mine(self.fleet, job.car) and self.fleet.negotiation.silent_winner(job.task, now_us) != NOBODY
@@ -273,12 +270,15 @@ class Compartment:
         """When a refused call is made again, or a winner counts as lost."""
         waits = self.job is not None and self.phase in (BayPhase.AWAITING, BayPhase.HANDOVER)
         retry_us = self.job.retry_at_us if self.job is not None and waits else None
-        due = [time for time in (retry_us, self.stewardship.next_wake()) if time is not None]
-        return min(due, default=None)
+        return min([one for one in (retry_us, self.stewardship.next_wake()) if one is not None], default=None)
 
-    def watches(self, now_us: int) -> bool:
+    def looks_from(self) -> int:
         """It looks often whether an award of its own was never heard."""
-        return self.job is not None and not self.job.winner
+        return 0 if self.job is not None and not self.job.winner else NEVER_US
+
+    def heeds(self, message: OverheardWord) -> bool:
+        """Others' slots, cars and places are nothing to it."""
+        return False
 
     def statements(self, now_us: int) -> list[Effect]:
         """The cars in my custody and the tokens that I hold."""

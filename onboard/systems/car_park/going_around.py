@@ -61,7 +61,7 @@ class GoingAround:
     _retry_at_us: int | None = None
     #: Plans and cars heard, what was known when places were last looked at, and when to look again.
     _heard: int = 0
-    _places_seen: tuple[int, int] = (-1, -1)
+    _places_seen: tuple[int, ...] = ()
     _place_at_us: int | None = None
     #: Since when somebody stands in my way for ever, by its plan.
     _stands_since_us: int | None = None
@@ -132,6 +132,13 @@ class GoingAround:
         if steps is None:
             self.turn_later(now_us)
         return self.take_up(kept, steps or (), works, now_us)
+
+    def looks_from(self) -> int:
+        """From when on every event counts, bus us: while it waits for a slot, rides, or a drive has got stuck."""
+        step = self.program.step
+        if self.is_stuck or self.carriage.blocked is not None or (step is not None and step.action is LegAction.RIDE):
+            return 0
+        return min(self.carriage.stall.stuck_from_us, self.shuttle.stall.stuck_from_us)
 
     def drive_changes(self, now_us: int) -> bool:
         """Whether drive or shuttle have got stuck by now, or are so no more."""
@@ -224,7 +231,7 @@ class GoingAround:
 
     def _leave_elsewhere(self, now_us: int) -> list[Effect]:
         """A car whose place has become another's goes to a place that is free."""
-        changed = (self.fleet.tokens.changes, self._heard)
+        changed = (self.fleet.tokens.changes, self.fleet.tokens.beliefs.changes, self._heard)
         retries = self._place_at_us is not None and self._place_at_us <= now_us
         if changed == self._places_seen and not retries:
             return []
@@ -285,13 +292,17 @@ class GoingAround:
         kept, origin, start_us = self._turning((), now_us)
         if kept or other in mirror.obstacles.machines:
             return []
-        slots = mirror.slots_of(machine, self.fleet.tokens.holder_of)
+        # Rights that it has beyond me it cannot use: it grants them to me, who goes first then.
+        slots = mirror.obstacles.slots_of(machine, mirror.progress.get(other), lambda slot: NOBODY)
         works = self.program.works()
         mirror.set_aside(other, slots, Reason.NOT_AUTHORISED, now_us)
         steps = self.generation.reroute(origin, start_us, works, now_us)
         mirror.admit(other, now_us)
         self._seen = mirror.obstacles.changes
-        return [] if steps is None else self.take_up(0, steps, works, now_us)
+        if steps is None:
+            return []
+        self.standoff.turned(other, now_us)
+        return self.take_up(0, steps, works, now_us)
 
     def _is_trapped(self, now_us: int) -> bool:
         """Whether the ride in hand is with a lift that is an obstacle."""

@@ -20,6 +20,7 @@ from onboard.contract.messages import (
     TaskReport,
 )
 from onboard.core.authority import TokenKey, segment_token
+from onboard.core.behaviour import OverheardWord
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.journal_records import records_in
 from onboard.core.motion_authority import authorised
@@ -202,9 +203,16 @@ class Lift:
         due = [time for time in (self.link.due_us, self.stewardship.next_wake()) if time is not None]
         return min(due, default=None)
 
-    def watches(self, now_us: int) -> bool:
+    def looks_from(self) -> int:
         """It looks often whether its drive has got stuck, or goes again."""
-        return self.stall.is_stuck(now_us) is not self._is_stuck
+        return 0 if self._is_stuck else self.stall.stuck_from_us
+
+    def heeds(self, message: OverheardWord) -> bool:
+        """Where the robots are that are to ride, and who has the platform."""
+        if isinstance(message, Progress):
+            itinerary = self.fleet.mirror.itineraries.get(message.sender)
+            return itinerary is not None and self._ride_legs(itinerary)
+        return TokenKey(message.token_kind, message.token) == segment_token(platform(self.track))
 
     def statements(self, now_us: int) -> list[Effect]:
         """Where the platform is, and the tokens that this node holds."""

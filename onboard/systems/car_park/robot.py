@@ -19,7 +19,7 @@ from onboard.contract.messages import (
     TaskReport,
 )
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import BehaviourFactory, Fleet
+from onboard.core.behaviour import BehaviourFactory, Fleet, OverheardWord
 from onboard.core.effects import Effect, Halt, Report, Send
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import (
@@ -102,11 +102,11 @@ class ParkingRobot:
         self.carriage.is_clear = lambda: self.shuttle.is_home
         self.carriage.route_ahead = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
         self.riding = Riding(self.fleet)
-        self.giving_way = GivingWay(self.fleet, self.program)
         self.recovery = JournalRecovery.read(self.fleet.node_id, self.fleet.entries)
         custody.replay(self.fleet, self.recovery.cars.values())
         self.fleet.tokens.before_grant = partial(custody.before_grant, self.fleet)
         self.going_around = GoingAround(self.fleet, self.generation, self.carriage, self.shuttle, self._take_up)
+        self.giving_way = GivingWay(self.fleet, self.program, self.going_around.standoff)
         self.holding = RobotHold(self.fleet, self.generation, self.carriage, self.shuttle)
         machine = RobotDevices(self.carriage, self.shuttle, self.riding)
         self.starting = Starting(
@@ -216,7 +216,7 @@ class ParkingRobot:
         return effects + self._publish(now_us)
 
     def _reroute(self, sender: int, now_us: int) -> list[Effect]:
-        """Do the same work by another way, under the same stamp; where there is none, come behind on the old one."""
+        """Do the same work by another way; where there is none, come behind on the old one."""
         kept, origin, start_us = self.program.turning(now_us)
         works = [step.work for step in self.program.remaining[kept:] if step.work is not None]
         unplanned = self.program.unplanned
@@ -228,9 +228,9 @@ class ParkingRobot:
             steps = self.generation.reroute(origin, start_us, works, now_us)
         if steps is None:
             return self._publish(now_us) if self.giving_way.fall_back(sender, now_us) is YieldDecision.LATER else []
-        if not kept:
-            self._begun = False
-        self.program.replace([*self.program.remaining[:kept], *steps], self.program.stamp, unplanned)
+        self._begun = self._begun and bool(kept)
+        stamp = self.giving_way.stamp_for(sender, now_us)
+        self.program.replace([*self.program.remaining[:kept], *steps], stamp, unplanned)
         effects: list[Effect] = [Report(f"gives way to node {sender}: " + "; ".join(str(step) for step in steps))]
         return effects + self._publish(now_us)
 
@@ -327,14 +327,15 @@ class ParkingRobot:
         step = self.program.step
         if step is not None and self._begun:
             times.append(step.end_us if step.action is LegAction.STAND else step.end_us + OVERDUE_US)
-        due = [time for time in times if time is not None]
-        return min(due) if due else None
+        return min([time for time in times if time is not None], default=None)
 
-    def watches(self, now_us: int) -> bool:
+    def looks_from(self) -> int:
         """It looks often while it starts, waits for a slot or rides, and for a drive that got stuck, or goes again."""
-        step = self.program.step
-        waits = self.carriage.blocked is not None or (step is not None and step.action is LegAction.RIDE)
-        return waits or not self.starting.is_over or self.going_around.drive_changes(now_us)
+        return self.going_around.looks_from() if self.starting.is_over else 0
+
+    def heeds(self, message: OverheardWord) -> bool:
+        """Where lifts are, and who has a station or a car; of slots it knows what it has, and waits for."""
+        return self.riding.sill.heeds(message)
 
     def statements(self, now_us: int) -> list[Effect]:
         """My firm itinerary as I told it under its version, where I am in it, and the tokens that I hold."""
@@ -409,9 +410,8 @@ class ParkingRobot:
         return [] if step.work is None else self.shuttle.begin(step.work) + self._announce_start(step.work)
 
     def _announce_start(self, work: StationWork) -> list[Effect]:
-        if work.handling is CarHandling.LEAVE:
-            return []
-        return [self._report(work.call.task, TaskPhase.STARTED, work.station.number)]
+        is_left = work.handling is CarHandling.LEAVE
+        return [] if is_left else [self._report(work.call.task, TaskPhase.STARTED, work.station.number)]
 
     def _carry_on(self, step: CarStep, now_us: int) -> list[Effect]:
         if step.action is LegAction.RIDE:

@@ -7,9 +7,10 @@ back, the lift does not move. No time, no plan and no earlier word stands for it
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import Reason
+from onboard.contract.codes import KindCode, Reason, TokenKind
 from onboard.contract.messages import Progress, SyncRequest
 from onboard.core.authority import segment_token
+from onboard.core.behaviour import OverheardWord
 from onboard.core.effects import Effect, Send
 from onboard.core.site import Segment
 from onboard.ways.lifts import GATE_INDEX, gate, is_same_stop, lift_index_of, platform, says_standing
@@ -30,6 +31,13 @@ class SillProof:
     def word(self, lift_track: int) -> Progress | None:
         """The last word of a lift for where it is, of whatever time."""
         return self.fleet.mirror.progress.get(self.fleet.site.stewards[lift_track])
+
+    def heeds(self, message: OverheardWord) -> bool:
+        """Whether a word says where a lift is, or is about no slot: of slots I know what I have, and wait for."""
+        if isinstance(message, Progress):
+            machine = self.fleet.site.machines.get(message.sender)
+            return machine is not None and machine.kind is KindCode.LIFT
+        return message.token_kind is not TokenKind.SEGMENT
 
     def stands_at(self, lift_track: int) -> int | None:
         """The lift index at which the platform stands for as long as I hold its gate; None where that is not proved."""

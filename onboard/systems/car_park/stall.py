@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from onboard.core.behaviour import NEVER_US
+
 #: A drive that has orders and has not moved for so long is stuck, us: brakes and locks take less.
 STALL_US = 8_000_000
 
@@ -28,6 +30,11 @@ class Stall:
             self._since_us = now_us
         self._position_mm = position_mm
 
+    @property
+    def stuck_from_us(self) -> int:
+        """From when on the drive has not moved for too long though it was told to."""
+        return NEVER_US if self._since_us is None else self._since_us + STALL_US
+
     def is_stuck(self, now_us: int) -> bool:
-        """Whether the drive has not moved for too long though it was told to."""
+        """Whether it has not by now."""
         return self._since_us is not None and now_us - self._since_us >= STALL_US

@@ -55,6 +55,8 @@ class Carriage:
     _reported: Segment | None = None
     #: What ``advance`` looked at when it last found nothing to do.
     _settled: tuple[object, ...] | None = None
+    #: What permitted the last order.
+    _permit: Permit | None = None
     #: Where the carrier stood by the last word of its sensors, on which track and after which order.
     _stood: tuple[DriveState | None, tuple[int, int], Segment | None] | None = None
     #: Slots behind the goal up to the next refuge, for a way without an agreed order; the robot knows its next legs.
@@ -210,19 +212,25 @@ class Carriage:
 
     def advance(self, now_us: int) -> list[Effect]:
         """Ask for the segments ahead, extend the drive's target as far as they are held, and repeat its order."""
-        due_us = self.next_wake()
-        due = due_us is not None and due_us <= now_us
-        if not due and self._settled == self._outlook():
-            return []
+        asking_us, outlook = self._asks_at_us(), self._outlook()
+        if self._settled == outlook and (asking_us is None or now_us < asking_us):
+            return self._go_on_as_before(now_us)
         effects = self._go_on(now_us)
         self._settled = None if effects else self._outlook()
         return effects
 
+    def _go_on_as_before(self, now_us: int) -> list[Effect]:
+        """Nothing has changed since nothing was to be done: at most the order is repeated, while it is permitted."""
+        if self.refresh_at_us is None or now_us < self.refresh_at_us:
+            return []
+        permit = self._permit.again() if self._permit is not None else None
+        return self._order(permit, now_us) if permit else self._go_on(now_us)
+
     def _outlook(self) -> tuple[object, ...]:
         """All that decides what is to be done, but the time: each message on the bus asks, and few change anything."""
         words = [self.sill.word(lift) for lift in self.axis.lifts]
-        clear = self.is_clear()
-        return self.fleet.tokens.changes, self.sensed, self.goal, self.target, self.track, self.stopped, clear, *words
+        seen = self.fleet.tokens.changes, self.fleet.mirror.obstacles.changes, *words
+        return self.sensed, self.goal, self.target, self.track, self.stopped, self.is_clear(), *seen
 
     def _go_on(self, now_us: int) -> list[Effect]:
         if self.goal is None or self.sensed is None or self.arrived:
@@ -252,11 +260,17 @@ class Carriage:
 
     def next_wake(self) -> int | None:
         """When the drive's order is to be repeated, or something is to be done about missing tokens."""
-        asks = self.goal is not None and self.sensed is not None and not self.arrived and self.is_clear()
-        asking = [self.whole.due_us, self._patience_over_us(), self.sill.next_wake()]
-        times = [self.refresh_at_us, *(asking if asks else [])]
-        due = [time for time in times if time is not None]
-        return min(due) if due else None
+        asking_us = self._asks_at_us()
+        if asking_us is None or self.refresh_at_us is None:
+            return self.refresh_at_us if asking_us is None else asking_us
+        return min(asking_us, self.refresh_at_us)
+
+    def _asks_at_us(self) -> int | None:
+        """When something is to be done about missing tokens, while it is on its way."""
+        due = (self.whole.due_us, self._patience_over_us(), self.sill.next_wake())
+        if due == (None, None, None) or self.goal is None or self.sensed is None or self.arrived or not self.is_clear():
+            return None
+        return min(time for time in due if time is not None)
 
     def _ask(self, ahead: list[int], now_us: int) -> list[Effect]:
         """Ask for the segments ahead; all of them to the next refuge where the order of passing cannot be agreed."""
@@ -384,6 +398,7 @@ class Carriage:
 
     def _order(self, permit: Permit, now_us: int) -> list[Effect]:
         assert self.target is not None
+        self._permit = permit
         self._sent[self.sequence] = self.target
         self.stall.ordered(now_us)
         self.refresh_at_us = now_us + self.fleet.site.timing.drive_refresh_us

@@ -319,7 +319,8 @@ class CarParkWorld:
 
     def carrier_in_front(self, station: Station) -> bool:
         """Whether a carrier stands opposite a station."""
-        return any(self.standing_segment(node_id) == station.segment for node_id in self.robots)
+        here = [node_id for node_id, robot in self.robots.items() if robot.track == station.track]
+        return any(self.standing_segment(node_id) == station.segment for node_id in here)
 
     # --- what changes ------------------------------------------------------------------------------------------
 

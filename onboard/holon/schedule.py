@@ -1,0 +1,167 @@
+"""When a machine has something to do, and whose word changes nothing: kept, until something changes it.
+
+Every event either changes nothing here or lets all of this go (``changed``); it is worked out anew when it is asked for
+next. ``sweeps`` keeps nothing: every event is followed by every part, so that a test can see that both do the same.
+"""
+
+from dataclasses import dataclass, field
+from typing import ClassVar, get_args
+
+from onboard.contract.messages import BusTime, Heartbeat, Message
+from onboard.core.behaviour import Attentive, Behaviour, Fleet, OverheardWord
+from onboard.core.mirror import Peer
+from onboard.holon.fixed_times import FixedTimes
+from onboard.holon.presence import SLEPT_BEATS
+from onboard.holon.rights import RightsTalk
+from onboard.holon.taking_part import TakingPart
+
+_OVERHEARD = frozenset(get_args(OverheardWord))
+
+
+@dataclass
+class Schedule:
+    """One machine's. All times are bus time in us."""
+
+    #: Whether every event is followed by every part of the machine; for tests, before a machine is made.
+    sweeps: ClassVar[bool] = False
+
+    part: TakingPart
+    fleet: Fleet
+    rights: RightsTalk
+    fixed: FixedTimes
+    behaviour: Behaviour
+    #: Whether what is kept here holds, and until when nothing is to be done unless something happens.
+    is_known: bool = False
+    #: Whether somebody has asked when that is since it was another time.
+    is_asked: bool = False
+    waits_until_us: int = 0
+    #: Whether bus time was lost when this machine woke last.
+    is_time_lost: bool = False
+    _due_us: int | None = None
+    #: The same of all but what is said at fixed times.
+    _work_due_us: int | None = None
+    #: From when on the behaviour is to see every event.
+    _looks_from_us: int = 0
+    #: Who said last what changes nothing, by node.
+    _unchanged: dict[int, Peer] = field(default_factory=dict)
+    #: The mirror, the epoch of the rights, and whether I send bus time, as they were when that was found.
+    _ground: tuple[int, int, bool] | None = None
+    _attentive: Attentive | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.begins_anew(self.behaviour)
+        self._sleeps_after_us = SLEPT_BEATS * self.fleet.site.timing.heartbeat_us
+
+    def begins_anew(self, behaviour: Behaviour) -> None:
+        """Another behaviour from now on."""
+        self.behaviour = behaviour
+        self._attentive = behaviour if isinstance(behaviour, Attentive) and not self.sweeps else None
+        self.changed()
+
+    def changed(self) -> None:
+        """Something happened here that any part may have to do with."""
+        self.is_known, self.is_asked, self.waits_until_us = False, False, 0
+
+    def slewed(self) -> None:
+        """Bus time went on a little faster or slower: what is due stays due, at another time of my own clock."""
+        if self.part.witness.next_wake() is None:
+            self.is_asked = False
+        else:
+            self.changed()
+
+    # --- when --------------------------------------------------------------------------------------------------
+
+    def due_us(self) -> int | None:
+        """When the first of all parts has something to do: a matter of what they know, not of when that is asked."""
+        self.is_asked = True
+        if not self.is_known:
+            self._work_due_us, self.is_known = self._first_work_us(), True
+            self._looks_from_us = self._attentive.looks_from() if self._attentive is not None else 0
+            self._is_due_from()
+            self._keep_unchanged()
+        return self._due_us
+
+    def has_spoken(self) -> None:
+        """What is said at fixed times was said, and nothing else was done."""
+        self._is_due_from()
+
+    def _is_due_from(self) -> None:
+        self._due_us = due_us = self.fixed.due_us(self._work_due_us)
+        if due_us is not None:
+            self.waits_until_us = min(due_us, self._looks_from_us)
+
+    def _first_work_us(self) -> int | None:
+        part, is_apart = self.part, self.part.holding.is_apart
+        times = [part.holding.next_wake(), part.regeneration.next_wake(), part.presence.held_until_us]
+        if not is_apart:
+            times.append(part.witness.next_wake())
+        if not (is_apart or part.regeneration.is_frozen):
+            times += (self.fleet.tokens.next_wake(), self.rights.petition_due())
+        if part.begins:
+            # In the negotiation nothing is due while bus time is lost: its deadlines mean nothing then. What the last
+            # wake found holds until the next time message.
+            times += (None if self.is_time_lost else self.fleet.negotiation.next_wake(), self.behaviour.next_wake())
+        return min([time for time in times if time is not None], default=None)
+
+    def only_speaks(self, local_us: int) -> bool:
+        """Whether nothing but a word that is said at fixed times is due, and nobody looks for anything."""
+        if not self.is_known or not self.part.begins:
+            return False
+        now_us = self.part.time.clock.bus_us(local_us)
+        if self._work_due_us is not None and self._work_due_us <= now_us:
+            return False
+        if self.part.time.clock.is_lost(local_us) != self.is_time_lost or self.part.presence.slept(now_us):
+            return False
+        return now_us < self._looks_from_us
+
+    # --- who ---------------------------------------------------------------------------------------------------
+
+    def lives_on(self, beat: Heartbeat, now_us: int) -> bool:
+        """Note the time of a sign of life that says nothing new, and nothing else; False where it may be news."""
+        if now_us >= self.waits_until_us:
+            self._unchanged.pop(beat.sender, None)
+            return False
+        peer = self._unchanged.get(beat.sender)
+        if peer is None or peer.beat is not beat or now_us - peer.heard_at_us > self._sleeps_after_us:
+            return self._is_unchanged(beat, now_us)
+        # Who was heard so lately was neither silent nor heard by somebody who slept, or was deaf.
+        peer.heard_at_us = now_us
+        self.part.presence.active_us = now_us
+        self.part.holding.heard(now_us)
+        return True
+
+    def _is_unchanged(self, beat: Heartbeat, now_us: int) -> bool:
+        if not self.part.lives_on(beat, now_us):
+            self._unchanged.pop(beat.sender, None)
+            return False
+        peer = self._unchanged[beat.sender] = self.fleet.mirror.peers[beat.sender]
+        peer.beat = beat
+        return True
+
+    def _keep_unchanged(self) -> None:
+        """Let go of whose word said nothing new, unless all that this was judged by is as it was."""
+        part, mirror = self.part, self.fleet.mirror
+        is_usual = not (mirror.aside or part.presence.foreign or part.presence.halts) and part.deals
+        ground = mirror.digest(), part.regeneration.epoch, part.time.clock.is_source
+        if ground != self._ground or not is_usual:
+            self._unchanged.clear()
+        self._ground = ground
+
+    def before(self, message: Message, now_us: int) -> int | None:
+        """The state of my rights before a message that may be none of my business; None for what changes everything.
+
+        None of an obstacle is: that it is heard may end that. What bus time changes it says itself (``slewed``).
+        """
+        is_candidate = type(message) in _OVERHEARD and now_us < self.waits_until_us
+        if is_candidate and message.sender not in self.fleet.mirror.aside:
+            return self.fleet.tokens.changes
+        if type(message) is not BusTime:
+            self.changed()
+        return None
+
+    def is_overheard(self, message: Message, before: int | None) -> bool:
+        """Whether a message changed no right of mine, as they were ``before``, and nothing that anybody here reads."""
+        if before != self.fleet.tokens.changes or not self.is_known:
+            return False
+        attentive = self._attentive
+        return attentive is not None and isinstance(message, OverheardWord) and not attentive.heeds(message)
