@@ -22,11 +22,7 @@ FORBIDDEN = frozenset(
     for ending in ("", "s")
 )
 #: At most so many lines, all counted, of the protocol; and of what puts one machine together of it.
-<<<<<<< HEAD
-MOST_LINES = {CORE: 4_200, HOLON: 2_400}
-=======
 MOST_LINES = {CORE: 4_200, HOLON: 2_500}
->>>>>>> c20cf9321ca1e2d3ba07578ec268cef909ae01cc
 
 
 def files(folder: Path) -> list[Path]:
