@@ -34,7 +34,9 @@ class Measure(StrEnum):
     LOSS_NOTICED = "node loss noticed"
     #: Off the bus, and the cause is gone: until its next frame on the bus.
     BUS_OFF_WORKING = "bus-off to working"
-    #: Power comes back: until its first heartbeat as a machine that takes part.
+    #: Power comes back: until all that live have answered, and it may use its rights and begin anything.
+    RESTART_ANSWERED = "restart to all answered"
+    #: Power comes back: until its first heartbeat as a machine that takes part. What moves in it comes to rest first.
     RESTART_ADMITTED = "restart to admitted"
     #: The last fault is over and all machines run: until all mirrors have one digest.
     HEAL_DIGESTS = "heal to equal digests"
@@ -134,6 +136,15 @@ class RecoveryMeasure:
             self.healed_us = max(self.healed_us, now_us)
             self._is_healing = True
             self._at(now_us, self._look_at_digests)
+            self._at(now_us + LOOK_US, partial(self._look_at_answers, controller, now_us))
+
+    def _look_at_answers(self, controller: Controller, since_us: int) -> None:
+        if controller is not self._simulation.controllers.get(controller.holon.node_id):
+            return
+        if controller.holon.part.begins and controller.holon.tokens.is_synced:
+            self._note(Measure.RESTART_ANSWERED, self._now_us() - since_us)
+        else:
+            self._at(self._now_us() + LOOK_US, partial(self._look_at_answers, controller, since_us))
 
     def _on_crash(self, machine: Machine) -> None:
         self._starts.pop(machine.node_id, None)

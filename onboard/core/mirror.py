@@ -60,6 +60,8 @@ class Mirror:
 
     #: Messages that only who has its rights may say, beside those of the core.
     vouching: ClassVar[tuple[type[Message], ...]] = ()
+    #: Messages that change the digest of all who hear them.
+    digested: ClassVar[tuple[type[Message], ...]] = (Itinerary,)
 
     site: Site
     node_id: int
@@ -83,7 +85,8 @@ class Mirror:
             return False
         fresh = known is None or known.boot != beat.boot or starts
         if fresh:
-            self._forget_plan(beat.sender)
+            if known is not None or beat.state is MachineState.STARTING:
+                self._forget_plan(beat.sender)
             self.boots_before[beat.sender] = known.boot if known is not None else 0
         since_us = now_us if known is None or fresh else known.since_us
         self.peers[beat.sender] = Peer(

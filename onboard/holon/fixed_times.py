@@ -14,6 +14,11 @@ from onboard.holon.holds import Holds
 from onboard.holon.presence import Presence
 from onboard.holon.timekeeper import Timekeeper
 
+#: Whoever changes what all believe tells its digest so long after, us: the words of one step go together.
+TELL_US = 100_000
+#: So long after its last sign of life at the least, us: what a bus may be asked for stays bounded.
+BEATS_APART_US = 300_000
+
 
 @dataclass
 class FixedTimes:
@@ -27,6 +32,32 @@ class FixedTimes:
     #: None before the first word.
     heartbeat_due_us: int | None = None
     _told: ToldDrops = field(default_factory=ToldDrops)
+    _is_starting: bool = False
+    #: When the last sign of life was given.
+    _beat_us: int = 0
+
+    def __post_init__(self) -> None:
+        nodes, beat_us = sorted(self.fleet.site.machines), self.fleet.site.timing.heartbeat_us
+        #: Each machine's beats have a place of their own in the period: who was away is heard of by somebody soon.
+        self._phase_us = nodes.index(self.fleet.node_id) * beat_us // len(nodes)
+
+    def tell_soon(self, now_us: int, *, has_told: bool, is_starting: bool) -> None:
+        """Who ``has_told`` what changes the digest of all tells its own soon after; who has started says so."""
+        if has_told:
+            self._beat_by(max(now_us + TELL_US, self._beat_us + BEATS_APART_US))
+        if self._is_starting and not is_starting:
+            self._beat_by(now_us + TELL_US)
+        self._is_starting = is_starting
+
+    def on_return(self, beat_us: int, now_us: int) -> None:
+        """Somebody was silent for long: at ``beat_us`` all tell what they believe; what waits is said soon again."""
+        self._beat_by(beat_us)
+        self.fleet.tokens.begin_anew(now_us)
+        self.fleet.negotiation.begin_anew(now_us)
+
+    def _beat_by(self, when_us: int) -> None:
+        if self.heartbeat_due_us is not None:
+            self.heartbeat_due_us = min(self.heartbeat_due_us, when_us)
 
     def due_us(self, work_due_us: int | None) -> int | None:
         """The first of these words and of what is to be done otherwise; None where there is neither."""
@@ -38,7 +69,8 @@ class FixedTimes:
         effects: list[Effect] = []
         timing, node_id = self.fleet.site.timing, self.fleet.node_id
         if self.heartbeat_due_us is not None and self.heartbeat_due_us <= now_us:
-            self.heartbeat_due_us = now_us + timing.heartbeat_us
+            self._beat_us, beat_us = now_us, timing.heartbeat_us
+            self.heartbeat_due_us = now_us + beat_us - (now_us - self._phase_us) % beat_us
             self.presence.review(now_us)
             effects += self.holds.words() + self.fleet.mirror.forgotten()
             effects += self._told.words(node_id, self.drops())

@@ -198,6 +198,8 @@ class Holon:
     def _take_up(self, message: Message, now_us: int) -> list[Effect]:
         """Tell every part of a message: first what all believe, then what this machine does with it."""
         effects = self._awake(now_us)
+        if self.presence.is_back(message.sender, now_us):
+            self.fixed.on_return(now_us + self.witness.slot_us, now_us)
         self.mirror.hear(message, now_us)
         self.presence.heard(message.sender, now_us)
         handler = self._handlers.get(type(message))
@@ -420,6 +422,8 @@ class Holon:
         else:
             if self.part.begins:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
+        is_starting = self.behaviour.state is MachineState.STARTING
+        self.fixed.tell_soon(now_us, has_told=self.witness.heed(effects, now_us), is_starting=is_starting)
         return self._approve(effects)
 
     def _approve(self, effects: list[Effect]) -> list[Effect]:

@@ -161,6 +161,11 @@ class Presence:
             return Halted(self.node_id, node, Reason.NODE_SILENT, NOBODY, False, boot)
         return replace(word, sender=self.node_id)
 
+    def is_back(self, node: int, now_us: int) -> bool:
+        """Whether a sign of life now ends a silence: of the machine, or of all, as I was cut off."""
+        peer = self.mirror.peers.get(node)
+        return peer is not None and now_us - peer.heard_at_us >= self.patience_us
+
     def heard(self, node: int, now_us: int) -> None:
         """A sign of life; whoever was an obstacle may take part again."""
         peer = self.mirror.peers.get(node)

@@ -5,7 +5,6 @@ from me says so, and so does who saw it taken. What is known better elsewhere ta
 until a person has decided (docs/contract-2.md, Restart).
 """
 
-from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -29,14 +28,21 @@ from onboard.core.effects import Effect, Send
 from onboard.core.mirror import Mirror
 from onboard.core.serial import is_newer
 
-#: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
-DIGEST_PATIENCE = 2
+#: A digest that a peer tells was mine at most so long ago where nothing was missed, us: frames wait behind others.
+FRAMES_WAIT_US = 300_000
+#: A machine's digest may be heard so long before the word that made it, us: the word waits for the journal.
+WORDS_WAIT_US = 20_000
+#: Whoever has nothing to say that makes mirrors equal is asked at so many heartbeats, then at every so many.
+OFTEN = 3
+SELDOM = 8
 #: Who asks within this time of an answer shares the next one, us: at power-up all ask all.
 ANSWER_PERIOD_US = 250_000
 #: Who is to be asked by any one of all: the first slot begins so long after the cause, us, when who was started with
 #: all others has answered all; then each has its own, as long as a question and the first answer at 125 kbit/s.
 FIRST_SLOT_US = 400_000
 SLOT_US = 5_000
+#: From one question to who has not answered to the next, us: two shared answers.
+AGAIN_US = 500_000
 #: So many heartbeat periods after its start a machine has been compared with by all that live: the first word may be
 #: lost, and the next.
 COMPARING_BEATS = 4
@@ -72,8 +78,13 @@ class Witness:
     doubt: Doubt | None = None
     #: Machines that have answered since this one started: what they say later is no proof against its journal.
     answered: set[int] = field(default_factory=set)
-    #: How often in a row a peer's mirror has differed from mine.
-    mismatches: Counter[int] = field(default_factory=Counter)
+    #: My mirror's digest, and until when it was another.
+    digest: int | None = None
+    digests_before: dict[int, int] = field(default_factory=dict)
+    #: When words of mine last changed it.
+    _told_us: int = -FRAMES_WAIT_US
+    #: Whose digest is another than mine: both, and how often in a row it was told so.
+    _apart: dict[int, tuple[int, int, int]] = field(default_factory=dict)
     #: What machines that were started again held by their own word before, until they say so again.
     doubted: dict[int, dict[TokenKey, int]] = field(default_factory=dict)
     #: Machines that were started again and were not answered since.
@@ -89,7 +100,8 @@ class Witness:
     def __post_init__(self) -> None:
         self.site, self.node_id = self.tokens.site, self.tokens.node_id
         self._others = set(self.site.machines) - {self.node_id}
-        self._slot_us = FIRST_SLOT_US + sum(node < self.node_id for node in self._others) * SLOT_US
+        #: After what all heard, this machine speaks so much later, us.
+        self.slot_us = sum(node < self.node_id for node in self._others) * SLOT_US
 
     # --- asking ------------------------------------------------------------------------------------------------
 
@@ -108,18 +120,56 @@ class Witness:
         if is_fresh:
             self._was_started(beat.sender)
             return self._ask_newcomer(beat.sender, self.mirror.boots_before[beat.sender], now_us)
-        if beat.mirror_digest == self.mirror.digest():
-            del self.mismatches[beat.sender]
-            return []
-        self.mismatches[beat.sender] += 1
-        if self.mismatches[beat.sender] < DIGEST_PATIENCE:
-            return []
-        del self.mismatches[beat.sender]
-        return self.ask(beat.sender)
+        self._compare(beat, now_us)
+        return []
+
+    def _compare(self, beat: Heartbeat, now_us: int) -> None:
+        """Ask soon whose mirror is another than mine; seldom, where asking it has not made them equal."""
+        told, mine = beat.mirror_digest, self.mirror.digest()
+        if self._was_mine(told, now_us):
+            self._apart.pop(beat.sender, None)
+            return
+        if now_us - self._told_us < FRAMES_WAIT_US:
+            # Others hear one by one what I said in one step: what they believed in between I never did.
+            return
+        before = self._apart.get(beat.sender, (0, 0, 0))
+        times = before[2] + 1 if before[:2] == (told, mine) else 1
+        self._apart[beat.sender] = told, mine, times
+        if (times <= OFTEN or times % SELDOM == 0) and not self._has_just_begun(now_us):
+            self._slots.setdefault(beat.sender, now_us + WORDS_WAIT_US + self.slot_us)
+
+    def _has_just_begun(self, now_us: int) -> bool:
+        """Whether all are asked, and answer: what is missing then is asked for all the same."""
+        return self._since_us is not None and now_us < self._since_us + self.site.timing.heartbeat_us
+
+    def _is_made_up(self, node: int, now_us: int) -> bool:
+        """Whether what was only to be compared was equal meanwhile: words of a machine wait for its journal."""
+        return node not in self.tokens.asked and self._was_mine(self._apart.get(node, (-1,))[0], now_us)
 
     def agrees(self, beat: Heartbeat) -> bool:
-        """Whether a peer's mirror is as mine, and was so when it was heard last."""
-        return beat.mirror_digest == self.mirror.digest() and not self.mismatches[beat.sender]
+        """Whether a peer's mirror is as mine."""
+        return beat.mirror_digest == self.mirror.digest()
+
+    def heed(self, effects: list[Effect], now_us: int) -> bool:
+        """Note my mirror's digest as it is after an event; True where words of mine among ``effects`` changed it."""
+        digest = self.mirror.digest()
+        if digest == self.digest:
+            return False
+        if self.digest is not None:
+            old = [one for one, until_us in self.digests_before.items() if until_us < now_us - FRAMES_WAIT_US]
+            for one in old:
+                del self.digests_before[one]
+            self.digests_before[self.digest] = now_us
+        self.digest = digest
+        digested = self.mirror.digested
+        if not any(isinstance(effect, Send) and isinstance(effect.message, digested) for effect in effects):
+            return False
+        self._told_us = now_us
+        return True
+
+    def _was_mine(self, digest: int, now_us: int) -> bool:
+        past_us = now_us - FRAMES_WAIT_US
+        return digest == self.mirror.digest() or self.digests_before.get(digest, past_us - 1) >= past_us
 
     def begin(self, now_us: int) -> list[Effect]:
         """What the journal says that I hold and gave away, for all to compare, and the question to all."""
@@ -146,6 +196,8 @@ class Witness:
             for peer in self.mirror.peers.values():
                 # Who has just come has no earlier life because the time was set.
                 peer.since_us += by_us
+            self.digests_before.clear()
+            self._told_us += by_us
 
     def slept(self, now_us: int) -> None:
         """I heard nothing for a while, or my clock has jumped: who has not answered has had no time to."""
@@ -161,8 +213,9 @@ class Witness:
         """Who knows an earlier life of it says so at once; what it vouches for it says to all, whoever asks."""
         if boot_before:
             return self.ask(node, boot_before)
-        self.tokens.asked.add(node)
-        self._slots.setdefault(node, now_us + self._slot_us)
+        if node not in self.answered:
+            self.tokens.asked.add(node)
+            self._slots.setdefault(node, now_us + FIRST_SLOT_US + self.slot_us)
         return []
 
     def on_done(self, word: SyncDone, now_us: int) -> list[Effect]:
@@ -180,7 +233,7 @@ class Witness:
         """The rights are mine once all that live have answered; without a past, all there are, or all as new as I."""
         if self.is_over or self.doubt is not None or self._since_us is None:
             return
-        if now_us >= self._since_us + self.site.timing.heartbeat_us and not self._missing(now_us):
+        if not self._has_just_begun(now_us) and not self._missing(now_us):
             self.tokens.trust()
 
     def _missing(self, now_us: int) -> set[int]:
@@ -199,7 +252,7 @@ class Witness:
         effects: list[Effect] = []
         self._review(now_us)
         if not self.is_over and self.doubt is None and self._ask_at_us is not None and self._ask_at_us <= now_us:
-            self._ask_at_us = now_us + self.site.timing.heartbeat_us
+            self._ask_at_us = now_us + AGAIN_US
             missing, live = self._missing(now_us), self._live(now_us)
             for node in sorted(missing & live):
                 effects += self.ask(node)
@@ -207,7 +260,7 @@ class Witness:
                 effects.append(Send(Halted(self.node_id, self.node_id, Reason.JOURNAL_LOST, node, False, self.boot)))
         for node in sorted(node for node, due_us in self._slots.items() if due_us <= now_us):
             del self._slots[node]
-            effects += self.ask(node)
+            effects += [] if self._is_made_up(node, now_us) else self.ask(node)
         if self._answer_at_us is not None and self._answer_at_us <= now_us:
             effects += self._answer(now_us)
         return effects

@@ -31,6 +31,7 @@ class CarMirror(Mirror):
     """The mirror of a site where machines pass things on: these by custodian."""
 
     vouching: ClassVar[tuple[type[Message], ...]] = (CarAt,)
+    digested: ClassVar[tuple[type[Message], ...]] = (*Mirror.digested, CarAt)
 
     cars: dict[Reference, KnownCar] = field(default_factory=dict)
     #: Where cars stand whose custody came to this machine as rights were made anew, by who remembers it.

@@ -31,6 +31,8 @@ from onboard.ways.tokens import tokens_of
 class WayMirror(CarMirror):
     """What one machine believes of the others' ways."""
 
+    digested: ClassVar[tuple[type[Message], ...]] = (*CarMirror.digested, Blocked, Clear)
+
     site: WaySite
 
     #: Plans with when their first legs began, and what each replaced: the order of passing comes from there.

@@ -2,11 +2,13 @@
 
 import pytest
 
-from onboard.contract.codes import KindCode, MachineState, Reason
+from onboard.contract.codes import Grade, KindCode, MachineState, Reason
 from onboard.contract.messages import (
     Halted,
     Heartbeat,
+    Itinerary,
     Message,
+    Stamp,
     SyncDone,
     SyncRequest,
     TokenDispute,
@@ -253,6 +255,32 @@ def test_who_is_new_is_asked_by_one_of_all_who_want_to_know() -> None:
     assert alice.wake(first_us) == [SyncRequest(ALICE, STEWARD)]
     bob.hear(done(STEWARD, ALICE), first_us + 1)
     assert bob.witness.next_wake() is None, "what the steward told Alice, Bob has heard"
+
+
+def differs(machine: Machine, digest: int, now_us: int) -> list[SyncRequest]:
+    """What a machine asks soon after a peer's heartbeat with this digest."""
+    beat = Heartbeat(STEWARD, 0, 0, digest, 1, KindCode.COMPARTMENT, MachineState.IDLE)
+    machine.witness.on_heartbeat(beat, now_us, is_fresh=False)
+    return [word for word in machine.wake(now_us + 100_000) if isinstance(word, SyncRequest)]
+
+
+def test_one_heartbeat_tells_that_a_word_was_missed_and_its_sender_is_asked() -> None:
+    alice = Machine(ALICE)
+    alice.witness.heed([], START_US)
+    assert differs(alice, alice.mirror.digest(), START_US) == []
+    assert differs(alice, 77, START_US) == [SyncRequest(ALICE, STEWARD)]
+    asked = [differs(alice, 77, START_US + number * BEAT_US) for number in range(1, 10)]
+    assert sum(map(len, asked)) == 3, "whose answer does not make them equal is asked seldom"
+
+
+def test_a_digest_that_was_mine_a_moment_ago_is_only_late() -> None:
+    alice = Machine(ALICE)
+    alice.witness.heed([], START_US)
+    before = alice.mirror.digest()
+    alice.mirror.on_itinerary(Itinerary(BOB, 1, Grade.FIRM, Stamp(0, BOB, 0), ()), START_US)
+    alice.witness.heed([], START_US)
+    assert differs(alice, before, START_US + 200_000) == []
+    assert differs(alice, before, START_US + BEAT_US) == [SyncRequest(ALICE, STEWARD)]
 
 
 def test_what_a_silent_machine_holds_is_told_by_who_knows() -> None:

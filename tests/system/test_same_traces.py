@@ -14,12 +14,12 @@ from bus_sim.cli import main
 
 #: Options of `bus-sim run`, and the first 64 bits of SHA-256 over the log that it writes.
 RUNS = {
-    "level1 --random 40 15 --cars 3": "f00196e4fa89bc74",
-    "small --random 40 15 --cars 3 --fault crash:target=MR1,at_s=80,restart_s=5": "1c4733eb61e0a798",
-    "standard --random 30 15 --cars 3": "c1bf7d1ff3a87423",
-    "large --random 30 15 --cars 2": "7e70da62f0114499",
-    "graph --for 150": "ff5b763e3cc6d2bd",
-    "terminal --for 150": "88a5b90e8f9ce6b9",
+    "level1 --random 40 15 --cars 3": "d7d879a2ca1318c1",
+    "small --random 40 15 --cars 3 --fault crash:target=MR1,at_s=80,restart_s=5": "c38bfed848bb1687",
+    "standard --random 30 15 --cars 3": "f41e53d40c97bbd3",
+    "large --random 30 15 --cars 2": "c5f11037bf3e8fdc",
+    "graph --for 150": "9e5c5272f61b6b74",
+    "terminal --for 150": "c5e07d5830ac3ff0",
 }
 
 

@@ -25,8 +25,9 @@ from onboard.systems.car_park.travel import Carriage
 from onboard.ways.lift_uses import ride_us
 from onboard.ways.mirror import WayFleet
 
-#: From the first known position after a restart until plans are made: the others say meanwhile what they plan.
-SETTLING_US = 2_000_000
+#: From the first known position after a restart until plans are made: whom it is in the way of says meanwhile what it
+#: plans now. What all planned before they have told with their answers.
+SETTLING_US = 500_000
 #: Modes in which the shuttle has come to rest.
 AT_REST = (ShuttleMode.HOME, ShuttleMode.REACHED)
 

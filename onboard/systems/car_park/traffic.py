@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from onboard.contract.codes import KindCode
 from onboard.core.site import Site
+from onboard.holon.fixed_times import BEATS_APART_US
 from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.trace.frame_length import longest_frame_bits
 from onboard.trace.response import ANYBODY, Stream
@@ -113,7 +114,14 @@ _OPERATION = (
     TrafficBound("TokenGrant", (), lambda n: 2 * n.robots * n.rights, _second, "all rights of all robots come and go"),
     TrafficBound("TokenHeld", (), lambda n: 2 * n.robots * n.rights, _second, "one for each grant"),
     TrafficBound("BusTime", (), _one, lambda n: n.bus_time_us, "its period; one machine sends it", _late),
-    TrafficBound("Heartbeat", _ALL, _one, lambda n: n.heartbeat_us, "its period", _late),
+    TrafficBound(
+        "Heartbeat",
+        _ALL,
+        lambda n: 1 + -(-n.heartbeat_us // BEATS_APART_US),
+        lambda n: n.heartbeat_us,
+        "its period, and after its own words, so far apart",
+        _late,
+    ),
     TrafficBound(
         "Diagnostic", _ALL, _two, lambda n: n.heartbeat_us, "with a heartbeat, for each reason that grew", _late
     ),
@@ -167,7 +175,12 @@ _POWER_UP = (
         "BusTime", (), lambda n: 3 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks, by two for a moment"
     ),
     TrafficBound(
-        "Heartbeat", _ALL, _two, lambda n: n.heartbeat_us, "at once, when bus time is heard, then its period", _late
+        "Heartbeat",
+        _ALL,
+        lambda n: 4 + -(-n.heartbeat_us // BEATS_APART_US),
+        lambda n: n.heartbeat_us,
+        "at once, when bus time is heard and when it has started, then as in operation",
+        _late,
     ),
     TrafficBound("Diagnostic", _ALL, _two, lambda n: n.heartbeat_us, "as in operation", _late),
 )
