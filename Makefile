@@ -84,7 +84,7 @@ $(VENV)/.run: pyproject.toml | $(VENV)/.made
 
 $(VENV)/.test: pyproject.toml | $(VENV)/.made
 	@echo "installing into $(VENV): the program and what make test needs"
-	@$(call install,.[sim$(comma)web$(comma)mqtt$(comma)test])
+	@$(call install,.[sim$(comma)web$(comma)mqtt$(comma)parquet$(comma)test])
 	@touch $@ $(VENV)/.run
 
 $(VENV)/.made:

@@ -6,9 +6,9 @@ arbitration, exact frame lengths). Run from the checkout: ``python -m bench.nego
 nothing is written.
 
 Counted per call, from the call to the winner's firm itinerary: bids; messages (a call, a bid, an itinerary, an award
-are one message each); frames on the bus, where a call is three and an itinerary one more than its legs. "ms to winner"
-is from the call to the moment at which the winner knows; "in vain" are bids that were no better than one before them on
-the wire; "best" is how often the cheapest bidder, and nobody else, won.
+are one message each); frames on the bus, where a call is three and an itinerary, which comes with the award, one more
+than its legs. "ms to winner" is from the call to the moment at which the winner knows; "in vain" are bids that were no
+better than one before them on the wire; "best" is how often the cheapest bidder, and nobody else, won.
 """
 
 import asyncio
@@ -97,9 +97,11 @@ class IdleRobot:
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
         """Nobody is in the way, so the bound is the cost."""
         cost = self._cost(call, abs(self.position - (call.from_station & 0x7F)), now_us)
-        return Proposal(cost, self._itinerary(call, cost, Grade.TENTATIVE), (), ())
+        return Proposal(cost, None, (), ())
 
-    def _itinerary(self, call: CallForProposals, cost: int, grade: Grade) -> Itinerary:
+    def firm(self, won: Awarded) -> Itinerary:
+        """The plan that the winner announces."""
+        call, cost = won.call, won.proposal.cost
         take, leave = call.from_station & 0x7F, call.to_station & 0x7F
         ends = [call.deadline_ms + 1000 * number for number in range(1, 4)]
         legs = (
@@ -108,11 +110,7 @@ class IdleRobot:
             Leg(LegAction.TRAVEL, 1, take, leave, Side.NEAR, ends[2]),
             Leg(LegAction.WORK, 1, leave, leave, Side.NEAR, cost),
         )
-        return Itinerary(self.node_id, 1, grade, Stamp(call.deadline_ms, call.sender, call.call & 0xFF), legs)
-
-    def firm(self, won: Awarded) -> Itinerary:
-        """The plan that the winner announces."""
-        return self._itinerary(won.call, won.proposal.cost, Grade.FIRM)
+        return Itinerary(self.node_id, 1, Grade.FIRM, Stamp(call.deadline_ms, call.sender, call.call & 0xFF), legs)
 
 
 @dataclass

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.contract.codes import Reason
+from onboard.contract.codes import Reason, TokenKind
 from onboard.contract.constants import NOBODY, SEEN_VERSION_BITS
 from onboard.contract.messages import (
     Message,
@@ -35,7 +35,7 @@ __all__ = ["Claim", "TokenBook", "TokenKey", "genesis_holder", "may_exist", "seg
 
 #: Highest version of a token: 163 years of the busiest slot, so that it never wraps (28 bits in dbc/fleet.dbc).
 MAX_VERSION = (1 << 28) - 1
-#: Whoever was refused asks again after this many token repeats: the holder remembers the request.
+#: Whoever was refused asks again after so many token repeats, but seldom where the holder gives by itself (rule 10).
 REFUSED_REPEATS = 5
 #: A grant this young is still on its way and is not said again for a request, us: one journal write, and a burst.
 IN_FLIGHT_US = 20_000
@@ -189,6 +189,7 @@ class TokenBook:
             return False
         for table in (self.seen, self.held, self.given, self._genesis, self._disputed):
             table.pop(key, None)
+        self.gifts.discard(key)
         self.beliefs.forget(key)
         self._said_us = {said: due_us for said, due_us in self._said_us.items() if said[0] != key}
         self.changes += 1
@@ -213,7 +214,7 @@ class TokenBook:
     def begin_anew(self, now_us: int) -> None:
         """A machine has come back, or was started: what waits may wait for it, and is said soon again."""
         self.backoff.begin_anew()
-        soon_us = now_us + self.site.timing.token_repeat_us
+        soon_us = now_us + self.backoff.repeat_us
         self.wanted = {key: min(due_us, soon_us) for key, due_us in self.wanted.items()}
         self.leaving = {
             key: grant._replace(repeat_at_us=min(grant.repeat_at_us, soon_us)) for key, grant in self.leaving.items()
@@ -304,20 +305,22 @@ class TokenBook:
 
     def on_seen(self, word: TokenSeen) -> None:
         """Somebody tells the newest that it knows: a hint."""
-        key = TokenKey(word.token_kind, word.token)
-        self.beliefs.hint(key, word.version, word.holder)
+        self.beliefs.hint(TokenKey(word.token_kind, word.token), word.version, word.holder)
 
     def on_refusal(self, refusal: TokenRefusal, now_us: int) -> None:
         """Remember why the holder does not give a wanted token yet; as it remembers the request, ask less often."""
         key = TokenKey(refusal.token_kind, refusal.token)
         if refusal.requester == self.node_id and key in self.wanted:
             self.refused[key] = refusal.reason
-            if refusal.reason is Reason.MIRROR_BEHIND:
+            is_behind = refusal.reason is Reason.MIRROR_BEHIND
+            if is_behind:
                 self.behind_since_us.setdefault(key, now_us)
             else:
                 self.behind_since_us.pop(key, None)
-            asked_us = now_us + REFUSED_REPEATS * self.site.timing.token_repeat_us
-            self.wanted[key] = max(asked_us, 0 if refusal.reason is Reason.MIRROR_BEHIND else self.wanted[key])
+            is_soon = is_behind or key in self.unordered or not self.claim(key).itinerary_version
+            is_soon |= refusal.reason is Reason.TOKEN_NOT_GRANTABLE_YET and key.kind is not TokenKind.SEGMENT
+            rest_us = REFUSED_REPEATS * self.backoff.repeat_us if is_soon else self.backoff.longest_us
+            self.wanted[key] = max(now_us + rest_us, 0 if is_behind else self.wanted[key])
             self.changes += 1
 
     def newest(self, key: TokenKey) -> TokenSeen:
@@ -344,7 +347,7 @@ class TokenBook:
     def wake(self, now_us: int) -> list[Effect]:
         """Say again what has waited long enough: wanted tokens, and grants whose receiver was not heard."""
         effects: list[Effect] = []
-        if not self.is_synced or not (self.wanted or self.leaving):
+        if not self.is_synced:
             return effects
         waiting = len(self.wanted) + len(self.leaving)
         for key, due_us in self.wanted.items():
@@ -363,10 +366,8 @@ class TokenBook:
 
     def next_wake(self) -> int | None:
         """When something falls due to be said again, bus time in us."""
-        if not self.is_synced or not (self.wanted or self.leaving):
-            return None
         times = [*self.wanted.values(), *(grant.repeat_at_us for grant in self.leaving.values())]
-        return min(times)
+        return min(times, default=None) if self.is_synced else None
 
     def is_news(self, key: TokenKey, version: int) -> bool:
         """Whether ``version`` of a token is newer than all that is known of it, hints too."""
@@ -378,10 +379,9 @@ class TokenBook:
         return key not in self.seen and self._first_holder(key) == self.node_id
 
     def _first_holder(self, key: Key) -> int:
-        found = self._genesis.get(key)
-        if found is None:
-            found = self._genesis[key] = genesis_holder(self.site, TokenKey(*key))
-        return found
+        if key not in self._genesis:
+            self._genesis[key] = genesis_holder(self.site, TokenKey(*key))
+        return self._genesis[key]
 
     def _hold(self, key: TokenKey, version: int) -> None:
         self.held[key] = self.seen[key] = version

@@ -26,7 +26,7 @@ def is_task(call: CallForProposals) -> bool:
     return call.depth == 0 and call.operation not in _NO_TASKS
 
 
-@dataclass
+@dataclass(slots=True)
 class CallHistory:
     """One call; times in us of the log. ``finished_us`` None: not yet, or the fleet bus does not tell."""
 
@@ -137,8 +137,8 @@ class Calls:
         self.by_key[key] = call
         if self._most is None:
             self.all.append(call)
-        else:
-            drop_oldest(self.by_key, self._most, lambda one: one.end is not None)
+        elif (dropped := drop_oldest(self.by_key, self._most, lambda one: one.end is not None)) is not None:
+            self._offers = {offer: one for offer, one in self._offers.items() if one is not dropped}
         self._going = [one for one in self._going if not one.is_over]
         self._going.append(call)
         return CallOpened(call)

@@ -42,7 +42,7 @@ from onboard.history.tasks import TaskFold, TaskTold
 
 #: Calls and tasks that are kept, so that a picture may stay open for ever: those that are over go first, the oldest of
 #: them. A site of 24 machines has fewer than 20 open at a time, and what is asked about was lately.
-CALL_LIMIT, TASK_LIMIT = 512, 512
+CALL_LIMIT, TASK_LIMIT = 256, 256
 #: A heartbeat in each so many us is what a site file says that says nothing of it (onboard/config).
 UNKNOWN_BEAT_US = 2_000_000
 #: What one message has told.

@@ -13,7 +13,7 @@ TASKS_OVER = (TaskPhase.DONE, TaskPhase.REFUSED)
 CALLS_OVER = (CallResult.REFUSED, CallResult.WITHDRAWN, CallResult.REJECTED)
 
 
-@dataclass
+@dataclass(slots=True)
 class TaskHistory:
     """One task: the last phase told, when each phase was first told (us of the log), and its calls."""
 

@@ -48,6 +48,8 @@ class RightsTalk:
     #: Whether nothing is taken or given: rights are made anew.
     is_frozen: Callable[[], bool] = bool
     _asked_again_us: dict[int, int] = field(default_factory=dict)
+    #: Requests that were told since they were last heard that their order of passing is not the one seen here.
+    _told_behind: set[tuple[TokenKey, int]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.site, self.node_id, self.drops = self.fleet.site, self.fleet.node_id, self.fleet.drops
@@ -79,7 +81,9 @@ class RightsTalk:
             return self.tokens.on_request(request, Reason.TOKEN_HELD_BY_OTHER, now_us)
         verdict = self.may_grant(key, request.sender, now_us)
         effects = self.tokens.on_request(request, verdict, now_us)
+        self._told_behind.discard((key, request.sender))
         if verdict is Reason.MIRROR_BEHIND:
+            self._told_behind.add((key, request.sender))
             effects += self._ask_again(key, request, now_us)
         return effects
 
@@ -109,8 +113,15 @@ class RightsTalk:
             for requester in self.petitions.due(key, now_us) if self.tokens.holds(key) else ():
                 if not self.tokens.holds(key) or not self._was_heard_of_late(requester, now_us):
                     continue
-                if self.may_grant(key, requester, now_us) is Reason.NONE:
+                verdict = self.may_grant(key, requester, now_us)
+                if verdict is Reason.NONE:
                     effects += self.tokens.give(key, requester, now_us)
+                elif verdict is Reason.MIRROR_BEHIND and (key, requester) not in self._told_behind:
+                    # It asks seldom, and only its next request can tell who of us is right.
+                    self._told_behind.add((key, requester))
+                    again = TokenRequest(requester, *key, 0, *self._claim(key, requester))
+                    effects += self.tokens.on_request(again, verdict, now_us)
+        self._told_behind = {(key, one) for key, one in self._told_behind if self.petitions.claim(key, one)}
         return effects
 
     def _was_heard_of_late(self, requester: int, now_us: int) -> bool:

@@ -31,10 +31,12 @@ from onboard.core.serial import is_newer
 
 #: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
 DIGEST_PATIENCE = 2
-#: While machines start, who asks within this time of an answer shares the next one, us: at power-up all ask all.
+#: Who asks within this time of an answer shares the next one, us: at power-up all ask all.
 ANSWER_PERIOD_US = 250_000
-#: So many heartbeat periods after the last start seen all have asked; then everybody is answered at once.
-STARTING_BEATS = 2
+#: Who is to be asked by any one of all: the first slot begins so long after the cause, us, when who was started with
+#: all others has answered all; then each has its own, as long as a question and the first answer at 125 kbit/s.
+FIRST_SLOT_US = 400_000
+SLOT_US = 5_000
 #: So many heartbeat periods after its start a machine has been compared with by all that live: the first word may be
 #: lost, and the next.
 COMPARING_BEATS = 4
@@ -81,11 +83,13 @@ class Witness:
     _askers: set[int] = field(default_factory=set)
     _answer_at_us: int | None = None
     _quiet_until_us: int | None = None
-    _crowd_until_us: int | None = None
+    #: Whom to ask when, unless its answer to another is heard before.
+    _slots: dict[int, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.site, self.node_id = self.tokens.site, self.tokens.node_id
         self._others = set(self.site.machines) - {self.node_id}
+        self._slot_us = FIRST_SLOT_US + sum(node < self.node_id for node in self._others) * SLOT_US
 
     # --- asking ------------------------------------------------------------------------------------------------
 
@@ -102,8 +106,8 @@ class Witness:
     def on_heartbeat(self, beat: Heartbeat, now_us: int, *, is_fresh: bool) -> list[Effect]:
         """Ask who is new or was started again, and whose mirror has differed from mine for a while."""
         if is_fresh:
-            self._was_started(beat.sender, now_us)
-            return self.ask(beat.sender, self.mirror.boots_before[beat.sender])
+            self._was_started(beat.sender)
+            return self._ask_newcomer(beat.sender, self.mirror.boots_before[beat.sender], now_us)
         if beat.mirror_digest == self.mirror.digest():
             del self.mismatches[beat.sender]
             return []
@@ -128,7 +132,7 @@ class Witness:
         # All answer me now and ask me: what they say in it need not be told to them.
         self._quiet_until_us = now_us + ANSWER_PERIOD_US
         for node in self._others:
-            self._was_started(node, now_us)
+            self._was_started(node)
         return [*self.tokens.statements(), Send(SyncRequest(self.node_id, NOBODY))]
 
     def shift(self, by_us: int) -> None:
@@ -137,7 +141,7 @@ class Witness:
         self._ask_at_us = _later(self._ask_at_us, by_us)
         self._answer_at_us = _later(self._answer_at_us, by_us)
         self._quiet_until_us = _later(self._quiet_until_us, by_us)
-        self._crowd_until_us = _later(self._crowd_until_us, by_us)
+        self._slots = {node: due_us + by_us for node, due_us in self._slots.items()}
         if abs(by_us) > MAX_SLEW_US:
             for peer in self.mirror.peers.values():
                 # Who has just come has no earlier life because the time was set.
@@ -153,8 +157,17 @@ class Witness:
         self.tokens.asked.add(node)
         return [Send(SyncRequest(self.node_id, node, boot_before))]
 
+    def _ask_newcomer(self, node: int, boot_before: int, now_us: int) -> list[Effect]:
+        """Who knows an earlier life of it says so at once; what it vouches for it says to all, whoever asks."""
+        if boot_before:
+            return self.ask(node, boot_before)
+        self.tokens.asked.add(node)
+        self._slots.setdefault(node, now_us + self._slot_us)
+        return []
+
     def on_done(self, word: SyncDone, now_us: int) -> list[Effect]:
         """A machine has said all: of what it held before its restart and does not know of, it is told."""
+        self._slots.pop(word.sender, None)
         if word.whom not in (NOBODY, self.node_id) or word.sender not in self._others:
             return []
         self.tokens.asked.discard(word.sender)
@@ -192,6 +205,9 @@ class Witness:
                 effects += self.ask(node)
             for node in sorted(missing - live):
                 effects.append(Send(Halted(self.node_id, self.node_id, Reason.JOURNAL_LOST, node, False, self.boot)))
+        for node in sorted(node for node, due_us in self._slots.items() if due_us <= now_us):
+            del self._slots[node]
+            effects += self.ask(node)
         if self._answer_at_us is not None and self._answer_at_us <= now_us:
             effects += self._answer(now_us)
         return effects
@@ -199,15 +215,13 @@ class Witness:
     def next_wake(self) -> int | None:
         """When there is something to ask or to answer, bus time in us."""
         asking_us = None if self.is_over or self.doubt is not None else self._ask_at_us
-        if asking_us is None or self._answer_at_us is None:
-            return self._answer_at_us if asking_us is None else asking_us
-        return min(asking_us, self._answer_at_us)
+        times = (asking_us, self._answer_at_us, *self._slots.values())
+        return min((time_us for time_us in times if time_us is not None), default=None)
 
     # --- answering ---------------------------------------------------------------------------------------------
 
-    def _was_started(self, node: int, now_us: int) -> None:
+    def _was_started(self, node: int) -> None:
         """A machine was started again: what it held by its own word it has to say again, and what it gave me too."""
-        self._crowd_until_us = now_us + STARTING_BEATS * self.site.timing.heartbeat_us
         self.tokens.drop_disputed(node)
         if not self.starting:
             self.tokens.gifts = set(self.tokens.leaving)
@@ -244,8 +258,7 @@ class Witness:
             # All are asked at power-up only: I knew it before, even where its counter is the same again.
             effects = self.ask(request.sender, known.boot)
         self._askers.add(request.sender)
-        is_crowded = self._crowd_until_us is not None and now_us < self._crowd_until_us
-        if is_crowded and self._quiet_until_us is not None and now_us < self._quiet_until_us:
+        if self._quiet_until_us is not None and now_us < self._quiet_until_us:
             self._answer_at_us = self._quiet_until_us
             return effects
         return self._answer(now_us) + effects

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
-from onboard.trace.commands import charts, check, convert, dissector, dump, load, replay, story
+from onboard.trace.commands import charts, check, convert, dissector, dump, export, load, replay, story
 from onboard.trace.commands.common import Register, TraceError
 from onboard.trace.dump.filters import FilterError
 from onboard.trace.readers.open_log import LogOpenError
@@ -29,6 +29,7 @@ examples:
 _COMMANDS: tuple[Register, ...] = (
     dump.register,
     convert.register,
+    export.register,
     story.register_calls,
     story.register_why,
     check.register,

@@ -1,8 +1,9 @@
 """All messages of a log, whichever bus they were on: every channel is a listener of its own with both contracts."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from typing import Any, NamedTuple
 
 from onboard.contract.codes import Reason
 from onboard.contract.messages import Message
@@ -23,6 +24,10 @@ class LoggedFrame(NamedTuple):
     is_fleet: bool
 
 
+#: ``LoggedFrame`` from a tuple of all its fields: half the time of calling the class.
+_logged: Callable[[Any], LoggedFrame] = partial(tuple.__new__, LoggedFrame)
+
+
 class LoggedMessage(NamedTuple):
     """One whole message: time in us of the log, channel, and whether it was of the fleet bus's contract."""
 
@@ -37,12 +42,18 @@ class Listener:
 
     def __init__(self, codecs: Codecs) -> None:
         self.codecs = codecs
+        self._whole = codecs.fleet.whole
         self.drops: Counter[Reason] = Counter()
         self.others: Counter[str] = Counter()
         self._decoders: dict[str, tuple[Decoder, Decoder]] = {}
 
     def hear(self, frame: RawFrame) -> LoggedFrame:
         """Take up one frame. Never raises, whatever the frame."""
+        if frame.is_extended and not (frame.is_remote or frame.is_error) and frame.fd_flags is None:
+            # Most frames are whole messages, and no listener needs to remember anything for those.
+            message = self._whole(frame.can_id, frame.data)
+            if message is not None:
+                return _logged((frame, message, None, True))
         classic = frame.classic()
         if classic is None or classic.is_error or classic.is_remote:
             kind = "CAN FD frames" if classic is None else "error frames" if classic.is_error else "remote frames"

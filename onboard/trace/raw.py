@@ -1,6 +1,8 @@
 """One frame of any CAN log, of whatever bus: classic or FD, with its mark of direction. Nothing in it is judged."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
 
 from onboard.core.frame import CAN_EFF_MASK, Frame
 
@@ -10,6 +12,8 @@ CANFD_BRS, CANFD_ESI, CANFD_FDF = 0x1, 0x2, 0x4
 EFF_FLAG, RTR_FLAG, ERR_FLAG = 0x8000_0000, 0x4000_0000, 0x2000_0000
 #: Most data bytes of a CAN FD frame (ISO 11898-1).
 CANFD_MAX_LEN = 64
+#: ``Frame`` from a tuple of all its fields: half the time of calling the class.
+_frame_of: Callable[[Any], Frame] = partial(tuple.__new__, Frame)
 
 
 class RawFrame(NamedTuple):
@@ -51,4 +55,4 @@ class RawFrame(NamedTuple):
         """The frame as controllers know frames; None for CAN FD, which none of them speaks."""
         if self.fd_flags is not None:
             return None
-        return Frame(self.can_id, self.data, self.is_extended, self.is_remote, self.is_error, self.remote_dlc)
+        return _frame_of(self[2:8])

@@ -4,15 +4,17 @@ Units are the DBC's own; what a number means is known by the signal's name, whic
 system has words of its own for, ``onboard.systems.words`` tells.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import fields
 from enum import IntEnum
-from functools import cache
+from functools import cache, lru_cache, partial
+from operator import attrgetter
+from typing import Any
 
-from onboard.contract.codes import Criterion
+from onboard.contract.codes import Criterion, LegAction, Side, TokenKind
 from onboard.contract.messages import Bid, CallForProposals, Leg, Message, Reference, Stamp
 from onboard.core.site import Site
-from onboard.systems.words import plain, words_of
+from onboard.systems.words import SiteWords, plain, words_of
 
 _NODES = frozenset({"initiator", "winner", "holder", "predecessor", "requester", "blocker", "whom", "compartment"}) | {
     "machine",
@@ -29,6 +31,10 @@ _UNITS = (
 )
 #: Calls whose criterion is remembered, so that a bid's cost has its unit.
 _CALLS_KEPT = 4096
+#: Words that are remembered, of each field: more than the slots of a large site.
+_KEPT = 4096
+#: What takes a value out of a message, and what says it.
+_Phrase = tuple[Callable[[Message], Any], Callable[[Any], str]]
 
 
 class Words:
@@ -40,8 +46,11 @@ class Words:
         self.machine = self.system.machine
         self.cost = self.system.cost
         self.reference = self.system.reference
-        self._names: dict[type[Message], tuple[str, ...]] = {}
+        #: By class of message, how each thing that it says is taken out of it, and how that is said.
+        self._phrases: dict[type[Message], tuple[_Phrase, ...]] = {}
         self._criteria: dict[tuple[int, int], Criterion] = {}
+        self._is_forgetful = type(self.system).hear is SiteWords.hear
+        self._way = self._kept(self._way_of)
 
     def hear(self, message: Message) -> None:
         """Remember what later words need; ``message`` does so by itself."""
@@ -51,66 +60,98 @@ class Words:
             if len(self._criteria) > _CALLS_KEPT:
                 del self._criteria[next(iter(self._criteria))]
 
+    def is_fixed(self, message: Message) -> bool:
+        """Whether the same message is always said in the same words, whatever was said before."""
+        return self._is_forgetful and not isinstance(message, Bid | CallForProposals)
+
     def message(self, message: Message) -> str:
         """``MR1 Bid: initiator IOC1, call 1, cost 43.210 s, itinerary version 2``."""
         self.hear(message)
-        said = ", ".join(self._fields(message))
+        phrases = self._phrases.get(type(message))
+        if phrases is None:
+            phrases = self._phrases[type(message)] = tuple(self._phrases_of(message))
+        said = ", ".join([say(taken(message)) for taken, say in phrases])
         name = type(message).__name__
         return f"{self.machine(message.sender)} {name}" + (f": {said}" if said else "")
 
-    def _fields(self, message: Message) -> Iterable[str]:
-        names = self._names.get(type(message))
-        if names is None:
-            silent = {"sender", *self.system.silent}
-            names = tuple(field.name for field in fields(message) if field.name not in silent)
-            self._names[type(message)] = names
-        values = {name: getattr(message, name) for name in names}
-        if "token_kind" in values:
-            yield f"token {self.system.resource(values.pop('token_kind'), values.pop('token'))}"
-        if "track" in values and "index" in values:
-            yield f"at {self.system.slot(values.pop('track'), values.pop('index'))}"
-        for name, value in values.items():
+    def _phrases_of(self, message: Message) -> Iterable[_Phrase]:
+        """What a message of this class says; the values of a field are of one kind in all of them."""
+        silent = {"sender", *self.system.silent}
+        names = [field.name for field in fields(message) if field.name not in silent]
+        # A token and a place are each said by two fields, and before the others.
+        for first, second, say in (("token_kind", "token", self._token), ("track", "index", self._slot)):
+            if first in names and second in names:
+                names = [name for name in names if name not in (first, second)]
+                yield attrgetter(first, second), self._kept(say)
+        for name in names:
             if name == "cost" and isinstance(message, Bid):
-                yield f"cost {self.cost(value, self._criteria.get((message.initiator, message.call)))}"
-            elif name == "legs":
-                yield "legs " + ("; ".join(self._leg(leg) for leg in value) or "none")
-            elif isinstance(value, Reference) and name in ("car", self.system.noun):
-                yield f"{self.system.noun} {self.system.load(value)}"
+                yield attrgetter("cost", "initiator", "call"), self._cost
             else:
-                yield f"{name_in_words(name)} {self._value(name, value)}"
+                yield attrgetter(name), self._phrase(name, getattr(message, name))
 
-    def _value(self, name: str, value: object) -> str:
-        if isinstance(value, Reference):
-            return self.reference(value)
-        if isinstance(value, Stamp):
-            return f"{_seconds(value.award_ms)} by {self.machine(value.initiator)} call {value.call}"
-        if isinstance(value, IntEnum):
-            return plain(value.name)
-        if isinstance(value, bool):
-            return "yes" if value else "no"
-        if isinstance(value, int):
-            return self._number(name, value)
-        return str(value)
+    def _phrase(self, name: str, value: object) -> Callable[[Any], str]:
+        """How a field is said, by its name and the kind of its values."""
+        said = name_in_words(name)
+        match value:
+            case tuple() if name == "legs":
+                return self._legs
+            case Reference() if name in ("car", self.system.noun):
+                return lambda reference: f"{self.system.noun} {self.system.load(reference)}"
+            case Reference():
+                return lambda reference: f"{said} {self.reference(reference)}"
+            case Stamp():
+                return lambda stamp: f"{said} {self._stamp(stamp)}"
+            case IntEnum():
+                return {one: f"{said} {plain(one.name)}" for one in type(value)}.__getitem__
+            case bool():
+                return (f"{said} no", f"{said} yes").__getitem__
+            case int():
+                return self._kept(partial(self._number, name, said))
+        return lambda one: f"{said} {one}"
 
-    def _number(self, name: str, value: int) -> str:
+    def _kept(self, say: Callable[[Any], str]) -> Callable[[Any], str]:
+        """Remembers what was said of a value, where nothing that is heard changes it."""
+        return lru_cache(_KEPT)(say) if self._is_forgetful else say
+
+    def _token(self, token: tuple[TokenKind, int]) -> str:
+        return f"token {self.system.resource(*token)}"
+
+    def _slot(self, place: tuple[int, int]) -> str:
+        return f"at {self.system.slot(*place)}"
+
+    def _cost(self, bid: tuple[int, int, int]) -> str:
+        cost, initiator, call = bid
+        return f"cost {self.cost(cost, self._criteria.get((initiator, call)))}"
+
+    def _stamp(self, stamp: Stamp) -> str:
+        return f"{_seconds(stamp.award_ms)} by {self.machine(stamp.initiator)} call {stamp.call}"
+
+    def _number(self, name: str, said: str, value: int) -> str:
         own = self.system.signals.get(name)
         if own is not None:
-            return own(value)
+            return f"{said} {own(value)}"
         if name in _NODES:
-            return self.machine(value)
+            return f"{said} {self.machine(value)}"
         if name in _STATIONS:
-            return self.system.place(value)
+            return f"{said} {self.system.place(value)}"
         if name in _MOMENTS:
-            return _seconds(value)
+            return f"{said} {_seconds(value)}"
         if name.endswith("digest"):
-            return f"{value:04X}"
-        return f"{value}{unit_of(name)}"
+            return f"{said} {value:04X}"
+        return f"{said} {value}{unit_of(name)}"
+
+    def _legs(self, legs: tuple[Leg, ...]) -> str:
+        return "legs " + ("; ".join(map(self._leg, legs)) or "none")
 
     def _leg(self, leg: Leg) -> str:
-        start, end = (self.system.slot(leg.track, index) for index in (leg.from_index, leg.to_index))
-        way = start if start == end else f"{start}..{end}"
-        side = f" {leg.side.name.lower()}" if leg.action.name == "WORK" else ""
-        return f"{leg.action.name.lower()} {way}{side} until {_seconds(leg.end_ms)}"
+        action, track, first, last, side, end_ms = leg
+        return f"{self._way((action, track, first, last, side))} until {_seconds(end_ms)}"
+
+    def _way_of(self, way: tuple[LegAction, int, int, int, Side]) -> str:
+        action, track, first, last, side = way
+        start, end = self.system.slot(track, first), self.system.slot(track, last)
+        told = start if start == end else f"{start}..{end}"
+        return f"{action.name.lower()} {told}" + (f" {side.name.lower()}" if action is LegAction.WORK else "")
 
 
 @cache

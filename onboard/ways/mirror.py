@@ -179,14 +179,18 @@ class WayMirror(CarMirror):
                 found += [here, turned_in(self.site, here)]
         return [position for position in found if position is not None]
 
-    def lift_floors(self, now_us: int, at_us: int) -> dict[int, int]:
-        """Where each lift (by its track) stands at ``at_us``, by its own word and the rides planned until then."""
+    def lift_floors(self, now_us: int, at_us: int, planned: Reservations | None = None) -> dict[int, int]:
+        """Where each lift (by its track) stands at ``at_us``, by its own word and the rides ``planned`` until then.
+
+        By default those of all plans.
+        """
+        planned = self.reservations if planned is None else planned
         standing = {}
         uses = []
         for track in lift_tracks(self.site):
             seen = self.progress.get(self.site.stewards[track])
             standing[track] = min(max(seen.index, 1), self.site.tracks[track].length) if seen is not None else 1
-            uses += self.reservations.uses(track, excluding=0)
+            uses += planned.uses(track, excluding=0)
         return standing_after(uses, standing, now_us, at_us)
 
     def free_places(self) -> list[Station]:

@@ -10,17 +10,18 @@ A plan that is told anew drops the legs that are over, so a moving leg is known 
 All times are bus time in us. Pure: plans, progress and grants in, an order out.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.contract.codes import LegAction, Reason
 from onboard.contract.constants import NOBODY
-from onboard.contract.messages import Itinerary, Leg, Progress
-from onboard.core.serial import is_newer
+from onboard.contract.messages import Itinerary, Leg, Progress, Stamp
+from onboard.core.serial import is_newer, ranks_before
 from onboard.core.site import Segment
 from onboard.ways.occupancy import body_mm, leg_windows
 from onboard.ways.passing import TOLERANCE_US, BegunItinerary
+from onboard.ways.retreats import has_work, is_aged, moves, retreat_moves
 from onboard.ways.site import WaySite
 
 
@@ -49,13 +50,14 @@ class _Way:
     """One machine's plan: its turns, and how far it has come.
 
     ``in_hand`` is how many moving legs come behind leg number ``leg``, the one in hand; in that leg its body is at
-    index ``body`` and has left the segments ``left``.
+    index ``body`` and has left the segments ``left``. ``retreat`` moving legs come behind its last work.
     """
 
     itinerary: Itinerary
     turns: Turns
     moves: tuple[Leg, ...]
     in_hand: int
+    retreat: int
     leg: int = 0
     body: int | None = None
     left: set[Segment] = field(default_factory=set)
@@ -84,10 +86,9 @@ class PassingOrder:
 
     def on_plan(self, plan: BegunItinerary, now_us: int) -> None:
         """A firm plan under a new version, or a released one, which has no turns."""
-        node, itinerary = plan.itinerary.sender, plan.itinerary
+        node = plan.itinerary.sender
         known = self._ways.get(node)
-        way = _Way(itinerary, _turns(self.site, plan, now_us), _moves(itinerary), 0)
-        way.in_hand = way.to_come(0) if itinerary.legs else 0
+        way = self._way(plan, now_us)
         continued = known is not None and known.moves[len(known.moves) - len(way.moves) :] == way.moves
         if known is not None and continued and known.in_hand == way.in_hand:
             way.body, way.left = known.body, known.left
@@ -171,13 +172,71 @@ class PassingOrder:
             return []
         return [
             Meeting(segment, one, two, self._agreed_first(node, other, segment, one, two))
-            for segment in sorted(mine.turns.keys() & theirs.turns.keys())
-            for one in mine.open_turns(segment)
-            for two in theirs.open_turns(segment)
-            if _overlap_us(one, two) > TOLERANCE_US
+            for segment, one, two in sorted(_meet(mine, theirs), key=lambda met: met[0])
         ]
 
+    # --- plans made at the same time ---------------------------------------------------------------------------
+
+    def who_yields(self, node: int, other: int, meetings: Sequence[Meeting]) -> int:
+        """Of ``node`` and ``other``, who meet without an order, the one on its way back while the other works.
+
+        NOBODY where both do, or neither. A move that clears the way for work counts as that work.
+        """
+        mine, theirs = self._ways[node], self._ways[other]
+        pairs = [(meeting.mine, meeting.theirs) for meeting in meetings]
+        return {True: node, False: other, None: NOBODY}[self._first_yields(mine, theirs, pairs)]
+
+    def makes_way(self, plan: BegunItinerary, other: int, now_us: int) -> bool | None:
+        """Whether ``other`` would yield to a ``plan`` that is not told yet; None where they do not meet."""
+        theirs, new = self._ways.get(other), self._way(plan, now_us)
+        pairs = [] if theirs is None else [(one, two) for _, one, two in _meet(new, theirs)]
+        if theirs is None or not pairs:
+            return None
+        return self._first_yields(new, theirs, pairs) is False
+
+    def ranks_before(self, node: int, other: int) -> bool:
+        """Whether the plan of ``node`` keeps its windows before that of ``other``: by stamp, then work before room.
+
+        False where one of them is not known, or no plan counts on it.
+        """
+        mine, theirs = self._ways.get(node), self._ways.get(other)
+        if mine is None or theirs is None:
+            return False
+        if mine.itinerary.stamp != theirs.itinerary.stamp:
+            return ranks_before(mine.itinerary.stamp, theirs.itinerary.stamp)
+        return (not has_work(mine.itinerary), node) < (not has_work(theirs.itinerary), other)
+
+    def may_yield(self, node: int, stamp: Stamp) -> bool:
+        """Whether what is left of the way back of ``node`` yields to work under ``stamp``."""
+        way = self._ways.get(node)
+        return way is not None and not self._clears(way) and not is_aged(way.itinerary.stamp, stamp)
+
+    def _first_yields(self, one: _Way, two: _Way, pairs: Sequence[tuple[Turn, Turn]]) -> bool | None:
+        """Whether the first of two machines yields, the second (False), or neither by this rule (None)."""
+        first = all(self._is_voluntary(one, turn, two) for turn, _ in pairs)
+        second = all(self._is_voluntary(two, turn, one) for _, turn in pairs)
+        return None if first == second else first
+
+    def _is_voluntary(self, way: _Way, turn: Turn, other: _Way) -> bool:
+        """Whether a turn is of a way back that is not begun and yields to the ``other``."""
+        if turn.to_come >= min(way.retreat, way.in_hand) or self._clears(way):
+            return False
+        return not is_aged(way.itinerary.stamp, other.itinerary.stamp)
+
+    def _clears(self, way: _Way) -> bool:
+        """Whether a move without work has the stamp of work: it clears the way for that."""
+        if has_work(way.itinerary):
+            return False
+        stamp = way.itinerary.stamp
+        return any(one.itinerary.stamp == stamp and has_work(one.itinerary) for one in self._ways.values())
+
     # --- inner works -------------------------------------------------------------------------------------------
+
+    def _way(self, plan: BegunItinerary, now_us: int) -> _Way:
+        itinerary = plan.itinerary
+        way = _Way(itinerary, _turns(self.site, plan, now_us), _moves(itinerary), 0, retreat_moves(itinerary))
+        way.in_hand = way.to_come(0) if itinerary.legs else 0
+        return way
 
     def _agreed_first(self, node: int, other: int, segment: Segment, one: Turn, two: Turn) -> int | None:
         """Who of two machines comes first in these turns by the times under which they last agreed."""
@@ -246,11 +305,6 @@ class PassingOrder:
         }
 
 
-def moves(leg: Leg) -> bool:
-    """Whether a leg is more than standing: waits come and go as a plan is delayed."""
-    return leg.action is not LegAction.STAND
-
-
 def _moves(itinerary: Itinerary) -> tuple[Leg, ...]:
     return tuple(leg._replace(end_ms=0) for leg in itinerary.legs if moves(leg))
 
@@ -273,12 +327,16 @@ def _turns(site: WaySite, plan: BegunItinerary, now_us: int) -> Turns:
 
 def _conflict(one: _Way, two: _Way) -> bool:
     """Whether two plans want one segment at one time, in what is not over."""
+    return next(_meet(one, two), None) is not None
+
+
+def _meet(one: _Way, two: _Way) -> Iterator[tuple[Segment, Turn, Turn]]:
+    """Where two plans want one segment at one time, in what is not over: the turns of both, in no order of segments."""
     for segment in one.turns.keys() & two.turns.keys():
         for mine in one.open_turns(segment):
             for theirs in two.open_turns(segment):
                 if _overlap_us(mine, theirs) > TOLERANCE_US:
-                    return True
-    return False
+                    yield segment, mine, theirs
 
 
 def _overlap_us(one: Turn, two: Turn) -> int:

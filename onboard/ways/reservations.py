@@ -94,6 +94,10 @@ class Reservations:
             gaps.append(Interval(free_us, FOREVER))
         return gaps
 
+    def copy(self) -> "Reservations":
+        """The same, to be changed by itself."""
+        return self.with_way_given(FOREVER)
+
     def with_way_given(self, after_us: int) -> "Reservations":
         """A copy in which machines that stand for ever have given way by ``after_us``, and where they stand is free."""
         found = Reservations()

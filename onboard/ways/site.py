@@ -183,6 +183,11 @@ class WaySite(Site):
         return {end: mouth for mouth, ends in self.links.items() for end in ends}
 
     @cached_property
+    def extents(self) -> dict[tuple[int, float, float], tuple[Segment, ...]]:
+        """Slots of bodies from one position to another on a track, as whoever judges a log has worked them out."""
+        return {}
+
+    @cached_property
     def _crosswise(self) -> frozenset[int]:
         return frozenset(_crosswise(self.tracks))
 

@@ -30,7 +30,7 @@ _NODE_MASK = 0xFF
 #: What a call says where no car is meant (dbc/fleet.dbc); no site takes cars so short.
 NO_WHEELBASE_MM = 1500
 #: Decoded frames kept for the other receivers of the same frame: a simulated fleet decodes each frame once.
-_MEMORY = 4096
+_MEMORY = 1024
 #: Frames of the two contracts of all.
 _FLEET = (*presence.FRAMES, *rights.FRAMES, *calls.FRAMES, *plans.FRAMES)
 _DEVICE = device.FRAMES
@@ -73,6 +73,11 @@ class Codec:
         return _frame_of(Frame, (identifier | sender, pack(message), True, False, False, 0))
 
     # --- in ----------------------------------------------------------------------------------------------------
+
+    def whole(self, arbitration_id: int, data: bytes) -> Message | None:
+        """The message of a classic data frame with a 29-bit identifier; None for a part of a set and what is none."""
+        found = self.decode_part(Frame(arbitration_id, data))
+        return found if isinstance(found, Message) and type(found) in self.wholes else None
 
     def name_of(self, frame: Frame) -> str | None:
         """The DBC name of a frame's message, or None."""
@@ -133,6 +138,11 @@ _SETS: dict[type[Message], Callable[[Any], tuple[Message, ...]]] = {
     CallForProposals: _parts_of_call,
     Itinerary: _parts_of_itinerary,
 }
+
+
+def is_one_frame(message: Message) -> bool:
+    """Whether a message of either bus is one frame, not a set."""
+    return type(message) not in _SETS
 
 
 def _wheelbase_mm(call: CallForProposals) -> int:

@@ -215,7 +215,7 @@ def _call(parts: dict[type[SetFrame] | int, SetFrame]) -> CallForProposals | Non
 def _itinerary(parts: dict[type[SetFrame] | int, SetFrame]) -> Itinerary | None:
     """The itinerary, where its head and all legs that it tells of are there."""
     head = parts.get(ItineraryHead)
-    if not isinstance(head, ItineraryHead):
+    if not isinstance(head, ItineraryHead) or len(parts) <= head.legs:
         return None
     told = [parts.get(number) for number in range(head.legs)]
     legs = tuple(_leg(leg, head.stamp.award_ms) for leg in told if isinstance(leg, ItineraryLeg))

@@ -178,3 +178,16 @@ def test_a_table_that_two_systems_name_alike_is_one_and_must_be_alike(monkeypatc
     monkeypatch.setattr("onboard.contract.generate.modules.system_dbc_text", texts.get)
     with pytest.raises(ContractError, match=re.escape("value table OrderResult is another than that of cell.dbc")):
         contracts()
+
+
+def test_words_that_are_kept_for_later_are_free_and_fit_a_frame() -> None:
+    """``docs/contract-2.md`` promises identifiers that nothing else takes, to words of at most 64 bits."""
+    page = (FOLDER.parents[1] / "docs" / "contract-2.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` \| `([0-9A-F]{6})nn` \| [^|]+ \| ([^|]+) \|", page, re.MULTILINE)
+    assert len(rows) == 12
+    taken = {layout.frame_id >> 8 for layout in LAYOUTS.values()}
+    assert not {name for name, _, _ in rows} & {name for _, name in LAYOUTS}
+    assert len({number for _, number, _ in rows}) == len(rows)
+    for name, number, fields in rows:
+        assert int(number, 16) not in taken, name
+        assert sum(int(width) for width in re.findall(r" (\d+)\b", fields)) <= 64, name

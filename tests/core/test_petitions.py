@@ -1,8 +1,11 @@
 """Open requests: remembered by the holder, oldest first, all tokens or none where no order is agreed."""
 
+import pytest
+
 from onboard.contract.codes import Reason, TokenKind
 from onboard.contract.messages import TokenGrant, TokenRefusal, TokenRequest
 from onboard.core.authority import REFUSED_REPEATS, Claim, TokenBook, TokenKey, segment_token
+from onboard.core.backoff import LONGEST_REPEATS
 from onboard.core.effects import Effect, Send
 from onboard.core.petitions import UNORDERED, Petitions
 from onboard.core.site import Segment
@@ -34,6 +37,23 @@ def test_whoever_was_refused_asks_less_often() -> None:
     alice.on_refusal(TokenRefusal(STEWARD, *KEYS[0], 0, ALICE, Reason.TOKEN_NOT_GRANTABLE_YET), 0)
     assert alice.wake(REFUSED_REPEATS * REPEAT_US - 1) == []
     assert requested(alice.wake(REFUSED_REPEATS * REPEAT_US)) == [5]
+
+
+@pytest.mark.parametrize(
+    ("why", "repeats"),
+    [
+        (Reason.TOKEN_NOT_GRANTABLE_YET, LONGEST_REPEATS),
+        (Reason.DOOR_NOT_READY, LONGEST_REPEATS),
+        (Reason.MIRROR_BEHIND, REFUSED_REPEATS),
+    ],
+)
+def test_whose_plan_needs_a_slot_asks_seldom_where_time_alone_ends_the_refusal(why: Reason, repeats: int) -> None:
+    """Long before the petition lapses all the same."""
+    alice = TokenBook(SITE, ALICE, claim=lambda key: Claim(9, BOB))
+    alice.want(KEYS[0], 0)
+    alice.on_refusal(TokenRefusal(STEWARD, *KEYS[0], 0, ALICE, why), 0)
+    assert alice.wake(repeats * REPEAT_US - 1) == []
+    assert requested(alice.wake(repeats * REPEAT_US)) == [5]
 
 
 def test_a_request_says_the_plan_that_needs_it_and_who_comes_first() -> None:

@@ -2,9 +2,10 @@
 
 import pytest
 
-from onboard.contract.codes import MachineState, Reason
+from onboard.contract.codes import KindCode, MachineState, Reason
 from onboard.contract.messages import (
     Halted,
+    Heartbeat,
     Message,
     SyncDone,
     SyncRequest,
@@ -226,10 +227,9 @@ def test_a_new_fleet_begins_without_who_is_not_there() -> None:
 
 
 def test_many_who_ask_at_once_are_answered_once() -> None:
-    """At power-up all ask all: one answer at once, one more for all others."""
+    """One answer at once, one more for all others."""
     steward = Machine(STEWARD, line("token_held", 3, STEWARD))
     steward.knows(ALICE, BOB)
-    steward.witness._was_started(ALICE, START_US)
     first = said(steward.hear(SyncRequest(ALICE, STEWARD)))
     assert first == [TokenHeld(STEWARD, KEY.kind, KEY.number, 3), SyncDone(STEWARD, ALICE, 2)]
     for node in (ALICE, BOB, ALICE, BOB):
@@ -238,10 +238,21 @@ def test_many_who_ask_at_once_are_answered_once() -> None:
     assert due_us == START_US + ANSWER_PERIOD_US
     assert steward.wake(due_us) == [TokenHeld(STEWARD, KEY.kind, KEY.number, 3), SyncDone(STEWARD, 0, 2)]
     assert steward.witness.next_wake() is None
-    later_us = due_us + 10 * BEAT_US
-    for at_us in (later_us, later_us + 5):
-        answered = said(steward.hear(SyncRequest(BOB, STEWARD), at_us))
-        assert answered[-1] == SyncDone(STEWARD, BOB, 2), "one who has missed something is answered at once"
+    answered = said(steward.hear(SyncRequest(BOB, STEWARD), due_us + 10 * BEAT_US))
+    assert answered[-1] == SyncDone(STEWARD, BOB, 2), "one who has missed something is answered at once"
+
+
+def test_who_is_new_is_asked_by_one_of_all_who_want_to_know() -> None:
+    alice, bob = Machine(ALICE), Machine(BOB)
+    for one in (alice, bob):
+        beat = Heartbeat(STEWARD, 0, 0, 0, 1, KindCode.COMPARTMENT, MachineState.IDLE)
+        one.mirror.on_heartbeat(beat, START_US)
+        assert one.witness.on_heartbeat(beat, START_US, is_fresh=True) == []
+    first_us, second_us = alice.witness.next_wake(), bob.witness.next_wake()
+    assert first_us is not None and second_us is not None and first_us < second_us
+    assert alice.wake(first_us) == [SyncRequest(ALICE, STEWARD)]
+    bob.hear(done(STEWARD, ALICE), first_us + 1)
+    assert bob.witness.next_wake() is None, "what the steward told Alice, Bob has heard"
 
 
 def test_what_a_silent_machine_holds_is_told_by_who_knows() -> None:
@@ -275,7 +286,7 @@ def test_a_disputed_grant_ends_with_its_givers_life() -> None:
     alice = Machine(ALICE)
     given = TokenGrant(BOB, KEY.kind, KEY.number, 2, ALICE)
     assert said(alice.tokens.on_grant(given, START_US)) == [TokenDispute(ALICE, KEY.kind, KEY.number, 2, STEWARD)]
-    alice.witness._was_started(BOB, START_US)
+    alice.witness._was_started(BOB)
     alice.tokens.on_given(TokenGiven(STEWARD, KEY.kind, KEY.number, 1, BOB), START_US)
     assert not alice.tokens.holds(KEY)
     alice.tokens.on_grant(given, START_US)

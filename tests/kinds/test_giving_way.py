@@ -12,6 +12,8 @@ from onboard.core.negotiation import Negotiation, Proposal
 from onboard.core.site import Machine, Segment, Site
 from onboard.systems.car_park.giving_way import GivingWay, YieldDecision
 from onboard.systems.car_park.program import CarStep, Program
+from onboard.systems.car_park.standoff import Standoff
+from onboard.systems.car_park.travel import Carriage
 from onboard.ways.mirror import WayFleet, WayMirror
 from onboard.ways.reservations import FOREVER
 from onboard.ways.sipp import Route, Visit, plan_route
@@ -61,7 +63,7 @@ def robot(site: WaySite, node: int, steps: list[CarStep], *, award_ms: int = 0) 
     fleet = WayFleet(site, machine, TokenBook(site, node), mirror, negotiation)
     program = Program(site, standing=Segment(ALLEY, 1))
     program.replace(steps, Stamp(award_ms, node, 1))
-    made = Robot(fleet, program, GivingWay(fleet, program))
+    made = Robot(fleet, program, GivingWay(fleet, program, Standoff(fleet, Carriage(fleet, fleet.machine.home.track))))
     mirror.on_itinerary(made.told(), 0)
     return made
 

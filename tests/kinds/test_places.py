@@ -4,6 +4,7 @@ from onboard.contract.codes import Grade, KindCode, LegAction, Reason, ShuttleMo
 from onboard.contract.messages import CarAt, Itinerary, Reference, Stamp
 from onboard.core.authority import station_token
 from onboard.core.effects import Record
+from onboard.core.serial import BUS_MS_MODULUS
 from onboard.core.site import Station
 from onboard.holon.holon import Holon
 from onboard.systems.car_park.program import CarHandling, CarStep, StationWork, to_itinerary
@@ -52,6 +53,13 @@ def test_of_two_plans_for_one_place_the_lower_stamp_keeps_it() -> None:
     assert [one["station"] for one in sinks] == [place.number]
     works = JournalRecovery.read(ROBOT, [*AWARDED, TAKEN, *sinks]).works
     assert [work.station for work in works] == [place], "so it is after another restart"
+
+
+def test_a_stamp_of_before_the_wrap_of_bus_time_is_the_lower_one() -> None:
+    board = carrying()
+    board.hears(rival(stamp_ms=BUS_MS_MODULUS - 1_000))
+    board.lives(board.now_us + 1)
+    assert PLACE not in places_of(board.plans[-1])
 
 
 def test_the_older_plan_stays_where_it_is() -> None:

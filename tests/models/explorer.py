@@ -230,7 +230,7 @@ class Explorer:
         known = self._seen_starting.get((j, memory, started))
         if known is None:
             book, witness = self._load(self.nodes[j], self._memories.things[memory])
-            witness._was_started(started, _NOW_US)
+            witness._was_started(started)
             book.asked.add(started)
             known = self._seen_starting[j, memory, started] = self._memories.number(self._save(book, witness))
         return known

@@ -151,9 +151,13 @@ LAYERS: dict[str, Layer] = {
     ),
     # Logs a million frames at a time: on a desk, never on a board; the rest of the trace does without.
     "onboard.trace.columns": Layer(
-        ("onboard.core.frame", "onboard.trace", "onboard.wire"),
-        ("numpy",),
+        (*CORE_TYPES, "onboard.trace", "onboard.wire"),
+        ("numpy", "pyarrow"),
         not_stdlib=frozenset({"asyncio", "random", "threading"}),
+    ),
+    # What python-can reads, python-can reads.
+    "onboard.trace.readers.python_can": Layer(
+        ("onboard.core.frame", "onboard.trace"), ("can",), not_stdlib=frozenset({"asyncio", "random", "threading"})
     ),
     # The trace's own command line reads site files; the composition root loads it where it is asked for.
     "onboard.trace.cli": Layer((*CORE_TYPES, "onboard.config", "onboard.trace")),
@@ -253,13 +257,14 @@ LAYERS = {
     for name, rule in LAYERS.items()
 }
 
-#: Libraries that exactly one file may know, because their interfaces move.
-EXCLUSIVE: dict[str, str] = {
-    "aiomqtt": "onboard/io/mqtt.py",
-    "can": "onboard/io/pycan.py",
-    "cantools": "onboard/wire/dbc_file.py",
-    "distributed": "bus_sim/campaign/engine.py",
-    "ortools": "bus_sim/systems/car_park/compare/optimum.py",
+#: Libraries that only these files may know, because their interfaces move.
+EXCLUSIVE: dict[str, tuple[str, ...]] = {
+    "aiomqtt": ("onboard/io/mqtt.py",),
+    "can": ("onboard/io/pycan.py", "onboard/trace/readers/python_can.py"),
+    "cantools": ("onboard/wire/dbc_file.py",),
+    "distributed": ("bus_sim/campaign/engine.py",),
+    "pyarrow": ("onboard/trace/columns/parquet.py",),
+    "ortools": ("bus_sim/systems/car_park/compare/optimum.py",),
 }
 
 
@@ -351,8 +356,8 @@ def _breach(module: str, own: str, layer: Layer, place: str) -> str:
         if layer.only_stdlib is not None and top not in layer.only_stdlib:
             return "this layer may use only standard modules without I/O, clock, chance or tasks"
         return "time, chance and I/O come in as arguments or through a port" if top in layer.not_stdlib else ""
-    if top in EXCLUSIVE and place != EXCLUSIVE[top]:
-        return f"only {EXCLUSIVE[top]} may know this library"
+    if top in EXCLUSIVE and place not in EXCLUSIVE[top]:
+        return f"only {_words(EXCLUSIVE[top])} may know this library"
     return "" if top in layer.libraries else f"its libraries are {_words(layer.libraries)}"
 
 

@@ -40,7 +40,7 @@ def make(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize(("goal", "extras"), [("run", ".[sim,web]"), ("lint", ".[sim,web,mqtt,test]")])
+@pytest.mark.parametrize(("goal", "extras"), [("run", ".[sim,web]"), ("lint", ".[sim,web,mqtt,parquet,test]")])
 def test_without_a_network_make_says_what_to_do(goal: str, extras: str, tmp_path: Path) -> None:
     python = tmp_path / "python"
     python.write_text(OFFLINE)

@@ -100,6 +100,16 @@ def test_who_was_off_while_its_task_was_called_anew_does_not_begin_it() -> None:
     assert report.verdict is RunVerdict.SERVED, report.why()
 
 
+def test_who_stands_face_to_face_turns_though_the_other_has_rights_behind_it() -> None:
+    """Each had been granted slots beyond the other, took them for blocked, and found no way for ten minutes.
+
+    Two crashes a seed on `standard`, seed 4017.
+    """
+    crash = "crash:at_s=450.741843,target=MR3,restart_s=7.641,write=6,durable=no"
+    report = played("standard", 4017, Arrivals(8, 15, 7.5, 200), crash, limit_s=3_600)
+    assert report.verdict is RunVerdict.SERVED, report.why()
+
+
 def test_a_winner_that_is_not_noted_yet_is_believed_when_all_are_asked() -> None:
     """The power failed between the award and its record; the task was called anew, and awarded to a second robot.
 

@@ -28,7 +28,7 @@ def test_the_same_code_says_every_frame_again(machine: str, capsys: pytest.Captu
     assert int(told.split()[1]) > 200
 
 
-@pytest.mark.parametrize(("machine", "node"), [("MR1", 11), ("ER1", 5)])
+@pytest.mark.parametrize(("machine", "node"), [("MR1", 11), ("MR2", 12)])
 def test_costs_that_are_one_higher_show_in_the_first_bid(
     machine: str, node: int, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -60,8 +60,8 @@ def pack_call(message: Call) -> bytes:
     try:
         return _PACK_HBHBH(
             message.call,
-            task.origin,
-            task.number,
+            task[0],
+            task[1],
             message.operation + message.kind * 0x10,
             message.criterion
             + _FROM_1_TO_15_AT_4[message.attempt]
@@ -129,10 +129,10 @@ def unpack_call_terms(sender: int, data: bytes) -> CallTerms | None:
 def pack_call_load(message: CallLoad) -> bytes:
     car = message.car
     wheelbase_mm = message.wheelbase_mm
-    if not 1500 <= wheelbase_mm <= 4050:
+    if wheelbase_mm < 1500 or wheelbase_mm > 4050:
         raise OutOfRangeError("CallLoad.wheelbase_mm", wheelbase_mm, 1500, 4050)
     try:
-        return _PACK_HHBHB(message.call, message.to_station, car.origin, car.number, (wheelbase_mm - 1500) // 10)
+        return _PACK_HHBHB(message.call, message.to_station, car[0], car[1], (wheelbase_mm - 1500) // 10)
     except struct.error as error:
         raise refusal(
             message,
@@ -152,15 +152,15 @@ def unpack_call_load(sender: int, data: bytes) -> CallLoad | None:
 def pack_call_parent(message: CallParent) -> bytes:
     parent = message.parent
     ready_ms = message.ready_ms
-    if not 0 <= ready_ms <= 1638300:
+    if ready_ms < 0 or ready_ms > 1638300:
         raise OutOfRangeError("CallParent.ready_ms", ready_ms, 0, 1638300)
     ready_ms = ready_ms // 100
     hold_ms = message.hold_ms
-    if not 0 <= hold_ms <= 255750:
+    if hold_ms < 0 or hold_ms > 255750:
         raise OutOfRangeError("CallParent.hold_ms", hold_ms, 0, 255750)
     try:
         return _PACK_HBHBH(
-            message.call, parent.origin, parent.number, ready_ms & 0xFF, (ready_ms >> 8) + (hold_ms // 250) * 0x40
+            message.call, parent[0], parent[1], ready_ms & 0xFF, (ready_ms >> 8) + (hold_ms // 250) * 0x40
         )
     except struct.error as error:
         raise refusal(
@@ -184,14 +184,14 @@ def unpack_call_parent(sender: int, data: bytes) -> CallParent | None:
 def pack_award(message: Award) -> bytes:
     task = message.task
     task_version = message.task_version
-    if not 0 <= task_version <= 127:
+    if task_version < 0 or task_version > 127:
         raise OutOfRangeError("Award.task_version", task_version, 0, 127)
     try:
         return _PACK_HBBHH(
             message.call,
             message.winner,
-            task.origin,
-            task.number,
+            task[0],
+            task[1],
             task_version + message.result * 0x80 + message.reason * 0x400,
         )
     except struct.error as error:

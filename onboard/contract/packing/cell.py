@@ -86,7 +86,7 @@ def unpack_goal_end(sender: int, data: bytes) -> GoalEnd | None:
 
 def pack_goal_terms(message: GoalTerms) -> bytes:
     level = message.level
-    if not 0 <= level <= 5:
+    if level < 0 or level > 5:
         raise OutOfRangeError("GoalTerms.level", level, 0, 5)
     try:
         return _PACK_HIH(message.goal, message.time_limit_ms, level)
@@ -193,10 +193,12 @@ def pack_move_from(message: MoveFrom) -> bytes:
     if manager < 1:
         raise OutOfRangeError("MoveFrom.manager", manager, 1, 255)
     x_mm = message.x_mm
-    if not -524288 <= x_mm <= 524287:
-        raise OutOfRangeError("MoveFrom.x_mm", x_mm, -524288, 524287)
     if x_mm < 0:
+        if x_mm < -524288:
+            raise OutOfRangeError("MoveFrom.x_mm", x_mm, -524288, 524287)
         x_mm += 0x100000
+    elif x_mm > 524287:
+        raise OutOfRangeError("MoveFrom.x_mm", x_mm, -524288, 524287)
     try:
         return _PACK_BHBSI(manager, message.goal, x_mm & 0xFF, (x_mm >> 8) + message.y_mm * 0x1000)
     except struct.error as error:
@@ -221,10 +223,12 @@ def pack_move_to(message: MoveTo) -> bytes:
     if manager < 1:
         raise OutOfRangeError("MoveTo.manager", manager, 1, 255)
     x_mm = message.x_mm
-    if not -524288 <= x_mm <= 524287:
-        raise OutOfRangeError("MoveTo.x_mm", x_mm, -524288, 524287)
     if x_mm < 0:
+        if x_mm < -524288:
+            raise OutOfRangeError("MoveTo.x_mm", x_mm, -524288, 524287)
         x_mm += 0x100000
+    elif x_mm > 524287:
+        raise OutOfRangeError("MoveTo.x_mm", x_mm, -524288, 524287)
     try:
         return _PACK_BHBSI(manager, message.goal, x_mm & 0xFF, (x_mm >> 8) + message.y_mm * 0x1000)
     except struct.error as error:
@@ -290,12 +294,14 @@ def unpack_move_cost_low(sender: int, data: bytes) -> MoveCostLow | None:
 
 def pack_arm_progress(message: ArmProgress) -> bytes:
     x_mm = message.x_mm
-    if not -524288 <= x_mm <= 524287:
-        raise OutOfRangeError("ArmProgress.x_mm", x_mm, -524288, 524287)
     if x_mm < 0:
+        if x_mm < -524288:
+            raise OutOfRangeError("ArmProgress.x_mm", x_mm, -524288, 524287)
         x_mm += 0x100000
+    elif x_mm > 524287:
+        raise OutOfRangeError("ArmProgress.x_mm", x_mm, -524288, 524287)
     goal = message.goal
-    if not 0 <= goal <= 65535:
+    if goal < 0 or goal > 65535:
         raise OutOfRangeError("ArmProgress.goal", goal, 0, 65535)
     try:
         return _PACK_BSIBH(
@@ -319,18 +325,22 @@ def unpack_arm_progress(sender: int, data: bytes) -> ArmProgress | None:
 def pack_part_at(message: PartAt) -> bytes:
     part = message.part
     x_mm = message.x_mm
-    if not -262144 <= x_mm <= 262143:
-        raise OutOfRangeError("PartAt.x_mm", x_mm, -262144, 262143)
     if x_mm < 0:
+        if x_mm < -262144:
+            raise OutOfRangeError("PartAt.x_mm", x_mm, -262144, 262143)
         x_mm += 0x80000
+    elif x_mm > 262143:
+        raise OutOfRangeError("PartAt.x_mm", x_mm, -262144, 262143)
     y_mm = message.y_mm
-    if not -262144 <= y_mm <= 262143:
-        raise OutOfRangeError("PartAt.y_mm", y_mm, -262144, 262143)
     if y_mm < 0:
+        if y_mm < -262144:
+            raise OutOfRangeError("PartAt.y_mm", y_mm, -262144, 262143)
         y_mm += 0x80000
+    elif y_mm > 262143:
+        raise OutOfRangeError("PartAt.y_mm", y_mm, -262144, 262143)
     try:
         return _PACK_BHBI(
-            part.origin, part.number, x_mm & 0xFF, (x_mm >> 8) + y_mm * 0x800 + (0x40000000 if message.aboard else 0)
+            part[0], part[1], x_mm & 0xFF, (x_mm >> 8) + y_mm * 0x800 + (0x40000000 if message.aboard else 0)
         )
     except struct.error as error:
         raise refusal(message, ("PartAt.part.origin", 0, 255), ("PartAt.part.number", 0, 65535)) from error

@@ -20,19 +20,21 @@ _FROM_0_TO_255_AT_2 = {value: value << 2 for value in range(256)}
 _PACK_BBSIH = struct.Struct("<BBiH").pack
 _PACK_BBSIXX = struct.Struct("<BBixx").pack
 _PACK_BIXXX = struct.Struct("<BIxxx").pack
+_PACK_HBIX = struct.Struct("<HBIx").pack
 _PACK_HBSIB = struct.Struct("<HBiB").pack
 _PACK_HBSIX = struct.Struct("<HBix").pack
-_PACK_HHI = struct.Struct("<HHI").pack
 _UNPACK_BIXXX = struct.Struct("<BIxxx").unpack_from
 _UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_arm_order(message: ArmOrder) -> bytes:
     x_mm = message.x_mm
-    if not -524288 <= x_mm <= 524287:
-        raise OutOfRangeError("ArmOrder.x_mm", x_mm, -524288, 524287)
     if x_mm < 0:
+        if x_mm < -524288:
+            raise OutOfRangeError("ArmOrder.x_mm", x_mm, -524288, 524287)
         x_mm += 0x100000
+    elif x_mm > 524287:
+        raise OutOfRangeError("ArmOrder.x_mm", x_mm, -524288, 524287)
     try:
         return _PACK_BBSIXX(message.sequence, x_mm & 0xFF, (x_mm >> 8) + message.y_mm * 0x1000)
     except struct.error as error:
@@ -49,13 +51,11 @@ def unpack_arm_order(sender: int, data: bytes) -> ArmOrder | None:
 
 def pack_grip_order(message: GripOrder) -> bytes:
     part = message.part
-    part_number = part.number
-    if not 0 <= part_number <= 65535:
+    part_number = part[1]
+    if part_number < 0 or part_number > 65535:
         raise OutOfRangeError("GripOrder.part_number", part_number, 0, 65535)
     try:
-        return _PACK_BIXXX(
-            message.sequence, message.grip_action + _FROM_0_TO_255_AT_1[part.origin] + part_number * 0x200
-        )
+        return _PACK_BIXXX(message.sequence, message.grip_action + _FROM_0_TO_255_AT_1[part[0]] + part_number * 0x200)
     except (KeyError, struct.error) as error:
         raise refusal(message, ("GripOrder.sequence", 0, 255), ("GripOrder.part.origin", 0, 255)) from error
 
@@ -70,10 +70,10 @@ def unpack_grip_order(sender: int, data: bytes) -> GripOrder | None:
 
 def pack_order_answer(message: OrderAnswer) -> bytes:
     cost_mm = message.cost_mm
-    if not 0 <= cost_mm <= 4294967295:
+    if cost_mm < 0 or cost_mm > 4294967295:
         raise OutOfRangeError("OrderAnswer.cost_mm", cost_mm, 0, 4294967295)
     try:
-        return _PACK_HHI(message.order, message.order_result + (cost_mm & 0x1FFF) * 0x8, cost_mm >> 13)
+        return _PACK_HBIX(message.order, message.order_result + (cost_mm & 0x1F) * 0x8, cost_mm >> 5)
     except struct.error as error:
         raise refusal(message, ("OrderAnswer.order", 0, 65535)) from error
 
@@ -90,12 +90,14 @@ def unpack_order_answer(sender: int, data: bytes) -> OrderAnswer | None:
 
 def pack_arm_state(message: ArmState) -> bytes:
     x_mm = message.x_mm
-    if not -262144 <= x_mm <= 262143:
-        raise OutOfRangeError("ArmState.x_mm", x_mm, -262144, 262143)
     if x_mm < 0:
+        if x_mm < -262144:
+            raise OutOfRangeError("ArmState.x_mm", x_mm, -262144, 262143)
         x_mm += 0x100000
+    elif x_mm > 262143:
+        raise OutOfRangeError("ArmState.x_mm", x_mm, -262144, 262143)
     y_mm = message.y_mm
-    if not -262144 <= y_mm <= 262143:
+    if y_mm < -262144 or y_mm > 262143:
         raise OutOfRangeError("ArmState.y_mm", y_mm, -262144, 262143)
     try:
         return _PACK_BBSIH(message.sequence, x_mm & 0xFF, (x_mm >> 8) + y_mm * 0x1000, message.arm_mode)
@@ -120,11 +122,11 @@ def unpack_arm_state(sender: int, data: bytes) -> ArmState | None:
 
 def pack_grip_state(message: GripState) -> bytes:
     part = message.part
-    part_number = part.number
-    if not 0 <= part_number <= 65535:
+    part_number = part[1]
+    if part_number < 0 or part_number > 65535:
         raise OutOfRangeError("GripState.part_number", part_number, 0, 65535)
     try:
-        return _PACK_BIXXX(message.sequence, message.grip_mode + _FROM_0_TO_255_AT_2[part.origin] + part_number * 0x400)
+        return _PACK_BIXXX(message.sequence, message.grip_mode + _FROM_0_TO_255_AT_2[part[0]] + part_number * 0x400)
     except (KeyError, struct.error) as error:
         raise refusal(message, ("GripState.sequence", 0, 255), ("GripState.part.origin", 0, 255)) from error
 
@@ -139,12 +141,14 @@ def unpack_grip_state(sender: int, data: bytes) -> GripState | None:
 
 def pack_order_from(message: OrderFrom) -> bytes:
     x_mm = message.x_mm
-    if not -262144 <= x_mm <= 262143:
-        raise OutOfRangeError("OrderFrom.x_mm", x_mm, -262144, 262143)
     if x_mm < 0:
+        if x_mm < -262144:
+            raise OutOfRangeError("OrderFrom.x_mm", x_mm, -262144, 262143)
         x_mm += 0x100000
+    elif x_mm > 262143:
+        raise OutOfRangeError("OrderFrom.x_mm", x_mm, -262144, 262143)
     y_mm = message.y_mm
-    if not -262144 <= y_mm <= 262143:
+    if y_mm < -262144 or y_mm > 262143:
         raise OutOfRangeError("OrderFrom.y_mm", y_mm, -262144, 262143)
     try:
         return _PACK_HBSIX(message.order, x_mm & 0xFF, (x_mm >> 8) + y_mm * 0x1000)
@@ -166,15 +170,17 @@ def unpack_order_from(sender: int, data: bytes) -> OrderFrom | None:
 
 def pack_order_to(message: OrderTo) -> bytes:
     x_mm = message.x_mm
-    if not -262144 <= x_mm <= 262143:
-        raise OutOfRangeError("OrderTo.x_mm", x_mm, -262144, 262143)
     if x_mm < 0:
+        if x_mm < -262144:
+            raise OutOfRangeError("OrderTo.x_mm", x_mm, -262144, 262143)
         x_mm += 0x100000
+    elif x_mm > 262143:
+        raise OutOfRangeError("OrderTo.x_mm", x_mm, -262144, 262143)
     y_mm = message.y_mm
-    if not -262144 <= y_mm <= 262143:
+    if y_mm < -262144 or y_mm > 262143:
         raise OutOfRangeError("OrderTo.y_mm", y_mm, -262144, 262143)
     within_ms = message.within_ms
-    if not 0 <= within_ms <= 2550000:
+    if within_ms < 0 or within_ms > 2550000:
         raise OutOfRangeError("OrderTo.within_ms", within_ms, 0, 2550000)
     try:
         return _PACK_HBSIB(message.order, x_mm & 0xFF, (x_mm >> 8) + y_mm * 0x1000, within_ms // 10000)

@@ -79,7 +79,7 @@ def unpack_drive_order(sender: int, data: bytes) -> DriveOrder | None:
 
 def pack_shuttle_order(message: ShuttleOrder) -> bytes:
     wheelbase_mm = message.wheelbase_mm
-    if not 0 <= wheelbase_mm <= 8191:
+    if wheelbase_mm < 0 or wheelbase_mm > 8191:
         raise OutOfRangeError("ShuttleOrder.wheelbase_mm", wheelbase_mm, 0, 8191)
     try:
         return _PACK_BIXXX(message.sequence, message.action + message.side * 0x10 + wheelbase_mm * 0x20)
@@ -123,11 +123,11 @@ def unpack_light_order(sender: int, data: bytes) -> LightOrder | None:
 
 def pack_desk_order(message: DeskOrder) -> bytes:
     car = message.car
-    car_number = car.number
-    if not 0 <= car_number <= 65535:
+    car_number = car[1]
+    if car_number < 0 or car_number > 65535:
         raise OutOfRangeError("DeskOrder.car_number", car_number, 0, 65535)
     try:
-        return _PACK_BIXXX(message.sequence, message.text + _FROM_0_TO_255_AT_4[car.origin] + car_number * 0x1000)
+        return _PACK_BIXXX(message.sequence, message.text + _FROM_0_TO_255_AT_4[car[0]] + car_number * 0x1000)
     except (KeyError, struct.error) as error:
         raise refusal(message, ("DeskOrder.sequence", 0, 255), ("DeskOrder.car.origin", 0, 255)) from error
 
@@ -171,13 +171,13 @@ def unpack_drive_state(sender: int, data: bytes) -> DriveState | None:
 
 def pack_shuttle_state(message: ShuttleState) -> bytes:
     extension_mm = message.extension_mm
-    if not 0 <= extension_mm <= 8191:
+    if extension_mm < 0 or extension_mm > 8191:
         raise OutOfRangeError("ShuttleState.extension_mm", extension_mm, 0, 8191)
     load_kg = message.load_kg
-    if not 0 <= load_kg <= 4095:
+    if load_kg < 0 or load_kg > 4095:
         raise OutOfRangeError("ShuttleState.load_kg", load_kg, 0, 4095)
     wheelbase_mm = message.wheelbase_mm
-    if not 0 <= wheelbase_mm <= 8191:
+    if wheelbase_mm < 0 or wheelbase_mm > 8191:
         raise OutOfRangeError("ShuttleState.wheelbase_mm", wheelbase_mm, 0, 8191)
     try:
         return _PACK_BHIX(
@@ -220,11 +220,11 @@ def unpack_door_state(sender: int, data: bytes) -> DoorState | None:
 
 def pack_desk_event(message: DeskEvent) -> bytes:
     car = message.car
-    car_number = car.number
-    if not 0 <= car_number <= 65535:
+    car_number = car[1]
+    if car_number < 0 or car_number > 65535:
         raise OutOfRangeError("DeskEvent.car_number", car_number, 0, 65535)
     try:
-        return _PACK_BIXXX(message.sequence, message.event + _FROM_0_TO_255_AT_2[car.origin] + car_number * 0x400)
+        return _PACK_BIXXX(message.sequence, message.event + _FROM_0_TO_255_AT_2[car[0]] + car_number * 0x400)
     except (KeyError, struct.error) as error:
         raise refusal(message, ("DeskEvent.sequence", 0, 255), ("DeskEvent.car.origin", 0, 255)) from error
 
@@ -241,16 +241,16 @@ def unpack_desk_event(sender: int, data: bytes) -> DeskEvent | None:
 
 def pack_bay_state(message: BayState) -> bytes:
     load_kg = message.load_kg
-    if not 0 <= load_kg <= 4095:
+    if load_kg < 0 or load_kg > 4095:
         raise OutOfRangeError("BayState.load_kg", load_kg, 0, 4095)
     length_mm = message.length_mm
-    if not 0 <= length_mm <= 8191:
+    if length_mm < 0 or length_mm > 8191:
         raise OutOfRangeError("BayState.length_mm", length_mm, 0, 8191)
     height_mm = message.height_mm
-    if not 0 <= height_mm <= 4095:
+    if height_mm < 0 or height_mm > 4095:
         raise OutOfRangeError("BayState.height_mm", height_mm, 0, 4095)
     wheelbase_mm = message.wheelbase_mm
-    if not 0 <= wheelbase_mm <= 8191:
+    if wheelbase_mm < 0 or wheelbase_mm > 8191:
         raise OutOfRangeError("BayState.wheelbase_mm", wheelbase_mm, 0, 8191)
     return (
         load_kg
@@ -280,7 +280,7 @@ def unpack_bay_state(sender: int, data: bytes) -> BayState | None:
 
 def pack_platform_state(message: PlatformState) -> bytes:
     load_kg = message.load_kg
-    if not 0 <= load_kg <= 4095:
+    if load_kg < 0 or load_kg > 4095:
         raise OutOfRangeError("PlatformState.load_kg", load_kg, 0, 4095)
     return _PACK_IXXXX(message.carrier_aboard + (0x2 if message.crossing else 0) + load_kg * 0x4)
 

@@ -37,7 +37,7 @@ _UNPACK_Q = struct.Struct("<Q").unpack_from
 
 def pack_node_answer(message: NodeAnswer) -> bytes:
     robot = message.robot
-    if not 1 <= robot <= 250:
+    if robot < 1 or robot > 250:
         raise OutOfRangeError("NodeAnswer.robot", robot, 1, 250)
     try:
         return _PACK_BBHXXXX(
@@ -99,7 +99,7 @@ def unpack_turn_signal(sender: int, data: bytes) -> TurnSignal | None:
 
 def pack_visit_list(message: VisitList) -> bytes:
     robot = message.robot
-    if not 1 <= robot <= 250:
+    if robot < 1 or robot > 250:
         raise OutOfRangeError("VisitList.robot", robot, 1, 250)
     try:
         return _PACK_HBBBBBB(
@@ -126,7 +126,7 @@ def unpack_visit_list(sender: int, data: bytes) -> VisitList | None:
 
 def pack_robot_at(message: RobotAt) -> bytes:
     ahead2 = message.ahead2
-    if not 0 <= ahead2 <= 255:
+    if ahead2 < 0 or ahead2 > 255:
         raise OutOfRangeError("RobotAt.ahead2", ahead2, 0, 255)
     try:
         return _PACK_BBHI(

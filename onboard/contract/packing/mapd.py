@@ -15,6 +15,7 @@ _FROM_0_TO_255_AT_30 = {value: value << 30 for value in range(256)}
 _FROM_0_TO_255_AT_38 = {value: value << 38 for value in range(256)}
 _FROM_0_TO_255_AT_50 = {value: value << 50 for value in range(256)}
 _PACK_BBHI = struct.Struct("<BBHI").pack
+_PACK_HIBX = struct.Struct("<HIBx").pack
 _PACK_IXXXX = struct.Struct("<Ixxxx").pack
 _UNPACK_IXXXX = struct.Struct("<Ixxxx").unpack_from
 _UNPACK_Q = struct.Struct("<Q").unpack_from
@@ -22,10 +23,10 @@ _UNPACK_Q = struct.Struct("<Q").unpack_from
 
 def pack_step_round(message: StepRound) -> bytes:
     step = message.step
-    if not 0 <= step <= 4194303:
+    if step < 0 or step > 4194303:
         raise OutOfRangeError("StepRound.step", step, 0, 4194303)
     open_tasks = message.open_tasks
-    if not 0 <= open_tasks <= 65535:
+    if open_tasks < 0 or open_tasks > 65535:
         raise OutOfRangeError("StepRound.open_tasks", open_tasks, 0, 65535)
     try:
         return (
@@ -48,7 +49,7 @@ def unpack_step_round(sender: int, data: bytes) -> StepRound | None:
 
 def pack_step_turn(message: StepTurn) -> bytes:
     step = message.step
-    if not 0 <= step <= 4194303:
+    if step < 0 or step > 4194303:
         raise OutOfRangeError("StepTurn.step", step, 0, 4194303)
     try:
         return (
@@ -82,7 +83,7 @@ def unpack_step_turn(sender: int, data: bytes) -> StepTurn | None:
 
 def pack_turn_request(message: TurnRequest) -> bytes:
     step = message.step
-    if not 0 <= step <= 4194303:
+    if step < 0 or step > 4194303:
         raise OutOfRangeError("TurnRequest.step", step, 0, 4194303)
     try:
         return _PACK_IXXXX(step + _FROM_0_TO_255_AT_22[message.attempt])
@@ -99,13 +100,13 @@ def unpack_turn_request(sender: int, data: bytes) -> TurnRequest | None:
 
 def pack_path_head(message: PathHead) -> bytes:
     step = message.step
-    if not 0 <= step <= 4194303:
+    if step < 0 or step > 4194303:
         raise OutOfRangeError("PathHead.step", step, 0, 4194303)
     cell = message.cell
-    if not 0 <= cell <= 63999:
+    if cell < 0 or cell > 63999:
         raise OutOfRangeError("PathHead.cell", cell, 0, 63999)
     moves = message.moves
-    if not 0 <= moves <= 4095:
+    if moves < 0 or moves > 4095:
         raise OutOfRangeError("PathHead.moves", moves, 0, 4095)
     try:
         return (
@@ -149,21 +150,19 @@ def unpack_path_moves(sender: int, data: bytes) -> PathMoves | None:
 
 def pack_step_state(message: StepState) -> bytes:
     step = message.step
-    if not 0 <= step <= 4194303:
+    if step < 0 or step > 4194303:
         raise OutOfRangeError("StepState.step", step, 0, 4194303)
     cell = message.cell
-    if not 0 <= cell <= 63999:
+    if cell < 0 or cell > 63999:
         raise OutOfRangeError("StepState.cell", cell, 0, 63999)
     task = message.task
-    if not 0 <= task <= 65535:
+    if task < 0 or task > 65535:
         raise OutOfRangeError("StepState.task", task, 0, 65535)
-    return (
-        step
-        + cell * 0x400000
-        + task * 0x4000000000
-        + (0x40000000000000 if message.loaded else 0)
-        + (0x80000000000000 if message.served else 0)
-    ).to_bytes(8, "little")
+    return _PACK_HIBX(
+        step & 0xFFFF,
+        (step >> 16) + cell * 0x40 + (task & 0x3FF) * 0x400000,
+        (task >> 10) + (0x40 if message.loaded else 0) + (0x80 if message.served else 0),
+    )
 
 
 def unpack_step_state(sender: int, data: bytes) -> StepState | None:

@@ -23,13 +23,13 @@ _UNPACK_Q = struct.Struct("<Q").unpack_from
 
 def pack_cart_order(message: CartOrder) -> bytes:
     sequence = message.sequence
-    if not 0 <= sequence <= 255:
+    if sequence < 0 or sequence > 255:
         raise OutOfRangeError("CartOrder.sequence", sequence, 0, 255)
     cell = message.cell
-    if not 0 <= cell <= 63999:
+    if cell < 0 or cell > 63999:
         raise OutOfRangeError("CartOrder.cell", cell, 0, 63999)
     task = message.task
-    if not 0 <= task <= 65535:
+    if task < 0 or task > 65535:
         raise OutOfRangeError("CartOrder.task", task, 0, 65535)
     try:
         return (
@@ -76,7 +76,7 @@ def pack_cart_state(message: CartState) -> bytes:
     if cell > 63999:
         raise OutOfRangeError("CartState.cell", cell, 0, 63999)
     task = message.task
-    if not 0 <= task <= 65535:
+    if task < 0 or task > 65535:
         raise OutOfRangeError("CartState.task", task, 0, 65535)
     try:
         return _PACK_BHIX(message.sequence, cell, message.moving + task * 0x2)

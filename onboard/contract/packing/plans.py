@@ -35,6 +35,7 @@ _PACK_BBHXXXX = struct.Struct("<BBHxxxx").pack
 _PACK_BBIBB = struct.Struct("<BBIBB").pack
 _PACK_BHHHB = struct.Struct("<BHHHB").pack
 _PACK_BHIX = struct.Struct("<BHIx").pack
+_PACK_II = struct.Struct("<II").pack
 _UNPACK_BBBBI = struct.Struct("<BBBBI").unpack_from
 _UNPACK_BBBBXXXX = struct.Struct("<BBBBxxxx").unpack_from
 _UNPACK_BBBXXXXX = struct.Struct("<BBBxxxxx").unpack_from
@@ -50,7 +51,7 @@ def pack_itinerary_head(message: ItineraryHead) -> bytes:
         raise OutOfRangeError("ItineraryHead.legs", legs, 0, 31)
     stamp = message.stamp
     try:
-        return _PACK_BBIBB(message.version, message.grade + legs * 0x4, stamp.award_ms, stamp.initiator, stamp.call)
+        return _PACK_BBIBB(message.version, message.grade + legs * 0x4, stamp[0], stamp[1], stamp[2])
     except struct.error as error:
         raise refusal(
             message,
@@ -77,7 +78,7 @@ def unpack_itinerary_head(sender: int, data: bytes) -> ItineraryHead | None:
 
 def pack_itinerary_leg(message: ItineraryLeg) -> bytes:
     track = message.track
-    if not 1 <= track <= 254:
+    if track < 1 or track > 254:
         raise OutOfRangeError("ItineraryLeg.track", track, 1, 254)
     end_ms = message.end_ms
     try:
@@ -117,28 +118,32 @@ def unpack_itinerary_leg(sender: int, data: bytes) -> ItineraryLeg | None:
 
 def pack_progress(message: Progress) -> bytes:
     itinerary_version = message.itinerary_version
-    if not 0 <= itinerary_version <= 255:
+    if itinerary_version < 0 or itinerary_version > 255:
         raise OutOfRangeError("Progress.itinerary_version", itinerary_version, 0, 255)
     offset_mm = message.offset_mm
-    if not -32768 <= offset_mm <= 32767:
-        raise OutOfRangeError("Progress.offset_mm", offset_mm, -32768, 32767)
     if offset_mm < 0:
+        if offset_mm < -32768:
+            raise OutOfRangeError("Progress.offset_mm", offset_mm, -32768, 32767)
         offset_mm += 0x10000
+    elif offset_mm > 32767:
+        raise OutOfRangeError("Progress.offset_mm", offset_mm, -32768, 32767)
     speed_mm_s = message.speed_mm_s
-    if not -32768 <= speed_mm_s <= 32767:
-        raise OutOfRangeError("Progress.speed_mm_s", speed_mm_s, -32768, 32767)
     if speed_mm_s < 0:
+        if speed_mm_s < -32768:
+            raise OutOfRangeError("Progress.speed_mm_s", speed_mm_s, -32768, 32767)
         speed_mm_s += 0x10000
+    elif speed_mm_s > 32767:
+        raise OutOfRangeError("Progress.speed_mm_s", speed_mm_s, -32768, 32767)
     try:
-        return (
+        return _PACK_II(
             itinerary_version
             + _FROM_0_TO_31_AT_8[message.leg]
             + _FROM_1_TO_254_AT_13[message.track]
             + _FROM_0_TO_255_AT_21[message.index]
-            + offset_mm * 0x20000000
-            + speed_mm_s * 0x200000000000
-        ).to_bytes(8, "little")
-    except KeyError as error:
+            + (offset_mm & 0x7) * 0x20000000,
+            (offset_mm >> 3) + speed_mm_s * 0x2000,
+        )
+    except (KeyError, struct.error) as error:
         raise refusal(
             message, ("Progress.leg", 0, 31), ("Progress.track", 1, 254), ("Progress.index", 0, 255)
         ) from error
@@ -159,7 +164,7 @@ def unpack_progress(sender: int, data: bytes) -> Progress | None:
 
 def pack_waiting(message: Waiting) -> bytes:
     track = message.track
-    if not 1 <= track <= 254:
+    if track < 1 or track > 254:
         raise OutOfRangeError("Waiting.track", track, 1, 254)
     try:
         return _PACK_BBBBXXXX(track, message.index, message.blocker, message.reason)
@@ -179,10 +184,10 @@ def unpack_waiting(sender: int, data: bytes) -> Waiting | None:
 def pack_task_report(message: TaskReport) -> bytes:
     task = message.task
     station = message.station
-    if not 0 <= station <= 65535:
+    if station < 0 or station > 65535:
         raise OutOfRangeError("TaskReport.station", station, 0, 65535)
     try:
-        return _PACK_BHIX(task.origin, task.number, message.phase + station * 0x10 + message.reason * 0x100000)
+        return _PACK_BHIX(task[0], task[1], message.phase + station * 0x10 + message.reason * 0x100000)
     except struct.error as error:
         raise refusal(message, ("TaskReport.task.origin", 0, 255), ("TaskReport.task.number", 0, 65535)) from error
 
@@ -202,10 +207,10 @@ def unpack_task_report(sender: int, data: bytes) -> TaskReport | None:
 def pack_car_at(message: CarAt) -> bytes:
     car = message.car
     wheelbase_mm = message.wheelbase_mm
-    if not 1500 <= wheelbase_mm <= 4050:
+    if wheelbase_mm < 1500 or wheelbase_mm > 4050:
         raise OutOfRangeError("CarAt.wheelbase_mm", wheelbase_mm, 1500, 4050)
     try:
-        return _PACK_BHHHB(car.origin, car.number, message.station, message.version, (wheelbase_mm - 1500) // 10)
+        return _PACK_BHHHB(car[0], car[1], message.station, message.version, (wheelbase_mm - 1500) // 10)
     except struct.error as error:
         raise refusal(
             message,
@@ -224,7 +229,7 @@ def unpack_car_at(sender: int, data: bytes) -> CarAt | None:
 
 def pack_blocked(message: Blocked) -> bytes:
     track = message.track
-    if not 1 <= track <= 254:
+    if track < 1 or track > 254:
         raise OutOfRangeError("Blocked.track", track, 1, 254)
     try:
         return _PACK_BBHXXXX(track, message.index, message.reason)
@@ -243,7 +248,7 @@ def unpack_blocked(sender: int, data: bytes) -> Blocked | None:
 
 def pack_clear(message: Clear) -> bytes:
     track = message.track
-    if not 1 <= track <= 254:
+    if track < 1 or track > 254:
         raise OutOfRangeError("Clear.track", track, 1, 254)
     try:
         return _PACK_BBHXXXX(track, message.index, message.reason)

@@ -69,7 +69,7 @@ def unpack_go(sender: int, data: bytes) -> Go | None:
 
 def pack_bus_time(message: BusTime) -> bytes:
     bus_time_us = message.bus_time_us
-    if not 0 <= bus_time_us <= 281474976710655:
+    if bus_time_us < 0 or bus_time_us > 281474976710655:
         raise OutOfRangeError("BusTime.bus_time_us", bus_time_us, 0, 281474976710655)
     return (bus_time_us).to_bytes(8, "little")
 
@@ -82,7 +82,7 @@ def unpack_bus_time(sender: int, data: bytes) -> BusTime | None:
 
 def pack_manual_order(message: ManualOrder) -> bytes:
     machine = message.machine
-    if not 1 <= machine <= 250:
+    if machine < 1 or machine > 250:
         raise OutOfRangeError("ManualOrder.machine", machine, 1, 250)
     number = message.number
     if number < 1:
@@ -122,7 +122,7 @@ def unpack_manual_state(sender: int, data: bytes) -> ManualState | None:
 
 def pack_halted(message: Halted) -> bytes:
     machine = message.machine
-    if not 1 <= machine <= 250:
+    if machine < 1 or machine > 250:
         raise OutOfRangeError("Halted.machine", machine, 1, 250)
     try:
         return _PACK_BBBBBXXX(machine, message.reason, message.cause, message.needs_person, message.boot)
@@ -156,11 +156,11 @@ def pack_operator_order(message: OperatorOrder) -> bytes:
     if compartment < 1:
         raise OutOfRangeError("OperatorOrder.compartment", compartment, 1, 255)
     car = message.car
-    car_number = car.number
-    if not 0 <= car_number <= 65535:
+    car_number = car[1]
+    if car_number < 0 or car_number > 65535:
         raise OutOfRangeError("OperatorOrder.car_number", car_number, 0, 65535)
     try:
-        return _PACK_BIXXX(compartment, message.action + _FROM_0_TO_255_AT_4[car.origin] + car_number * 0x1000)
+        return _PACK_BIXXX(compartment, message.action + _FROM_0_TO_255_AT_4[car[0]] + car_number * 0x1000)
     except (KeyError, struct.error) as error:
         raise refusal(message, ("OperatorOrder.compartment", 1, 255), ("OperatorOrder.car.origin", 0, 255)) from error
 

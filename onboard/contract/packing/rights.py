@@ -29,15 +29,16 @@ _FROM_0_TO_255_AT_4 = {value: value << 4 for value in range(256)}
 _FROM_1_TO_255_AT_4 = {value: value << 4 for value in range(1, 256)}
 _FROM_1_TO_255_AT_56 = {value: value << 56 for value in range(1, 256)}
 _PACK_HIBB = struct.Struct("<HIBB").pack
+_PACK_II = struct.Struct("<II").pack
 _UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_token_grant(message: TokenGrant) -> bytes:
     token = message.token
-    if not 0 <= token <= 16777215:
+    if token < 0 or token > 16777215:
         raise OutOfRangeError("TokenGrant.token", token, 0, 16777215)
     version = message.version
-    if not 0 <= version <= 268435455:
+    if version < 0 or version > 268435455:
         raise OutOfRangeError("TokenGrant.version", version, 0, 268435455)
     try:
         return (
@@ -62,10 +63,10 @@ def unpack_token_grant(sender: int, data: bytes) -> TokenGrant | None:
 
 def pack_token_held(message: TokenHeld) -> bytes:
     token = message.token
-    if not 0 <= token <= 16777215:
+    if token < 0 or token > 16777215:
         raise OutOfRangeError("TokenHeld.token", token, 0, 16777215)
     version = message.version
-    if not 0 <= version <= 268435455:
+    if version < 0 or version > 268435455:
         raise OutOfRangeError("TokenHeld.version", version, 0, 268435455)
     return (message.token_kind + token * 0x10 + version * 0x10000000).to_bytes(8, "little")
 
@@ -82,7 +83,7 @@ def unpack_token_held(sender: int, data: bytes) -> TokenHeld | None:
 
 def pack_token_refusal(message: TokenRefusal) -> bytes:
     token = message.token
-    if not 0 <= token <= 16777215:
+    if token < 0 or token > 16777215:
         raise OutOfRangeError("TokenRefusal.token", token, 0, 16777215)
     requester = message.requester
     if requester < 1:
@@ -116,7 +117,7 @@ def unpack_token_refusal(sender: int, data: bytes) -> TokenRefusal | None:
 
 def pack_token_request(message: TokenRequest) -> bytes:
     token = message.token
-    if not 0 <= token <= 16777215:
+    if token < 0 or token > 16777215:
         raise OutOfRangeError("TokenRequest.token", token, 0, 16777215)
     try:
         return _PACK_HIBB(
@@ -148,10 +149,10 @@ def unpack_token_request(sender: int, data: bytes) -> TokenRequest | None:
 
 def pack_token_dispute(message: TokenDispute) -> bytes:
     token = message.token
-    if not 0 <= token <= 16777215:
+    if token < 0 or token > 16777215:
         raise OutOfRangeError("TokenDispute.token", token, 0, 16777215)
     version = message.version
-    if not 0 <= version <= 268435455:
+    if version < 0 or version > 268435455:
         raise OutOfRangeError("TokenDispute.version", version, 0, 268435455)
     try:
         return (
@@ -176,10 +177,10 @@ def unpack_token_dispute(sender: int, data: bytes) -> TokenDispute | None:
 
 def pack_token_given(message: TokenGiven) -> bytes:
     token = message.token
-    if not 0 <= token <= 16777215:
+    if token < 0 or token > 16777215:
         raise OutOfRangeError("TokenGiven.token", token, 0, 16777215)
     version = message.version
-    if not 0 <= version <= 268435455:
+    if version < 0 or version > 268435455:
         raise OutOfRangeError("TokenGiven.version", version, 0, 268435455)
     try:
         return (
@@ -204,10 +205,10 @@ def unpack_token_given(sender: int, data: bytes) -> TokenGiven | None:
 
 def pack_token_seen(message: TokenSeen) -> bytes:
     token = message.token
-    if not 0 <= token <= 16777215:
+    if token < 0 or token > 16777215:
         raise OutOfRangeError("TokenSeen.token", token, 0, 16777215)
     version = message.version
-    if not 0 <= version <= 268435455:
+    if version < 0 or version > 268435455:
         raise OutOfRangeError("TokenSeen.version", version, 0, 268435455)
     try:
         return (
@@ -232,10 +233,10 @@ def unpack_token_seen(sender: int, data: bytes) -> TokenSeen | None:
 
 def pack_token_assigned(message: TokenAssigned) -> bytes:
     token = message.token
-    if not 0 <= token <= 16777215:
+    if token < 0 or token > 16777215:
         raise OutOfRangeError("TokenAssigned.token", token, 0, 16777215)
     version = message.version
-    if not 0 <= version <= 268435455:
+    if version < 0 or version > 268435455:
         raise OutOfRangeError("TokenAssigned.version", version, 0, 268435455)
     try:
         return (
@@ -260,21 +261,21 @@ def unpack_token_assigned(sender: int, data: bytes) -> TokenAssigned | None:
 
 def pack_regeneration(message: Regeneration) -> bytes:
     tokens = message.tokens
-    if not 0 <= tokens <= 65535:
+    if tokens < 0 or tokens > 65535:
         raise OutOfRangeError("Regeneration.tokens", tokens, 0, 65535)
     digest = message.digest
-    if not 0 <= digest <= 65535:
+    if digest < 0 or digest > 65535:
         raise OutOfRangeError("Regeneration.digest", digest, 0, 65535)
     try:
-        return (
+        return _PACK_II(
             message.regeneration_phase
             + _FROM_1_TO_255_AT_4[message.epoch]
             + _FROM_0_TO_250_AT_12[message.lost]
             + _FROM_0_TO_250_AT_20[message.absent]
-            + tokens * 0x10000000
-            + digest * 0x100000000000
-        ).to_bytes(8, "little")
-    except KeyError as error:
+            + (tokens & 0xF) * 0x10000000,
+            (tokens >> 4) + digest * 0x1000,
+        )
+    except (KeyError, struct.error) as error:
         raise refusal(
             message, ("Regeneration.epoch", 1, 255), ("Regeneration.lost", 0, 250), ("Regeneration.absent", 0, 250)
         ) from error
@@ -301,10 +302,10 @@ def unpack_regeneration(sender: int, data: bytes) -> Regeneration | None:
 
 def pack_regeneration_state(message: RegenerationState) -> bytes:
     tokens = message.tokens
-    if not 0 <= tokens <= 65535:
+    if tokens < 0 or tokens > 65535:
         raise OutOfRangeError("RegenerationState.tokens", tokens, 0, 65535)
     digest = message.digest
-    if not 0 <= digest <= 65535:
+    if digest < 0 or digest > 65535:
         raise OutOfRangeError("RegenerationState.digest", digest, 0, 65535)
     try:
         return (

@@ -23,8 +23,7 @@ _new = tuple.__new__
 _ACTION = tuple(Action)
 _STEP_RESULT = tuple(StepResult)
 _FROM_0_TO_255_AT_5 = {value: value << 5 for value in range(256)}
-_FROM_0_TO_30_AT_8 = {value: value << 8 for value in range(31)}
-_FROM_1_TO_255_AT_15 = {value: value << 15 for value in range(1, 256)}
+_FROM_1_TO_255_AT_7 = {value: value << 7 for value in range(1, 256)}
 _PACK_BBBBHBB = struct.Struct("<BBBBHBB").pack
 _PACK_BBHHBX = struct.Struct("<BBHHBx").pack
 _PACK_BBHI = struct.Struct("<BBHI").pack
@@ -42,7 +41,7 @@ _UNPACK_Q = struct.Struct("<Q").unpack_from
 def pack_task_terms(message: TaskTerms) -> bytes:
     task = message.task
     try:
-        return _PACK_BHIX(task.origin, task.number, message.before_ms)
+        return _PACK_BHIX(task[0], task[1], message.before_ms)
     except struct.error as error:
         raise refusal(
             message,
@@ -59,7 +58,7 @@ def unpack_task_terms(sender: int, data: bytes) -> TaskTerms | None:
 
 def pack_box_order(message: BoxOrder) -> bytes:
     desk = message.desk
-    if not 1 <= desk <= 250:
+    if desk < 1 or desk > 250:
         raise OutOfRangeError("BoxOrder.desk", desk, 1, 250)
     box = message.box
     if box < 1:
@@ -68,7 +67,7 @@ def pack_box_order(message: BoxOrder) -> bytes:
     if target < 1:
         raise OutOfRangeError("BoxOrder.target", target, 1, 255)
     within_s = message.within_s
-    if not 0 <= within_s <= 32767:
+    if within_s < 0 or within_s > 32767:
         raise OutOfRangeError("BoxOrder.within_s", within_s, 0, 32767)
     try:
         return _PACK_BHHBH(desk, message.number, box, target, within_s + (0x8000 if message.urgent else 0))
@@ -92,7 +91,7 @@ def unpack_box_order(sender: int, data: bytes) -> BoxOrder | None:
 
 def pack_assignment(message: Assignment) -> bytes:
     vehicle = message.vehicle
-    if not 1 <= vehicle <= 250:
+    if vehicle < 1 or vehicle > 250:
         raise OutOfRangeError("Assignment.vehicle", vehicle, 1, 250)
     task = message.task
     box = message.box
@@ -102,7 +101,7 @@ def pack_assignment(message: Assignment) -> bytes:
     if target < 1:
         raise OutOfRangeError("Assignment.target", target, 1, 255)
     try:
-        return _PACK_BBHHBX(vehicle, task.origin, task.number, box, target)
+        return _PACK_BBHHBX(vehicle, task[0], task[1], box, target)
     except struct.error as error:
         raise refusal(
             message,
@@ -129,7 +128,7 @@ def pack_plan_head(message: PlanHead) -> bytes:
     if version < 1:
         raise OutOfRangeError("PlanHead.version", version, 1, 255)
     steps = message.steps
-    if not 0 <= steps <= 31:
+    if steps < 0 or steps > 31:
         raise OutOfRangeError("PlanHead.steps", steps, 0, 31)
     try:
         return _PACK_BBIXX(version, steps + message.tasks * 0x20, message.begin_ms)
@@ -153,14 +152,14 @@ def pack_plan_step(message: PlanStep) -> bytes:
     if version < 1:
         raise OutOfRangeError("PlanStep.version", version, 1, 255)
     step = message.step
-    if not 0 <= step <= 30:
+    if step < 0 or step > 30:
         raise OutOfRangeError("PlanStep.step", step, 0, 30)
     entity = message.entity
     if entity < 1:
         raise OutOfRangeError("PlanStep.entity", entity, 1, 255)
     end_ms = message.end_ms
     after_step = message.after_step
-    if not 0 <= after_step <= 31:
+    if after_step < 0 or after_step > 31:
         raise OutOfRangeError("PlanStep.after_step", after_step, 0, 31)
     try:
         return _PACK_BBBBHBB(
@@ -199,24 +198,24 @@ def pack_plan_task(message: PlanTask) -> bytes:
     if version < 1:
         raise OutOfRangeError("PlanTask.version", version, 1, 255)
     part = message.part
-    if not 0 <= part <= 6:
+    if part < 0 or part > 6:
         raise OutOfRangeError("PlanTask.part", part, 0, 6)
     put = message.put
-    if not 0 <= put <= 30:
+    if put < 0 or put > 30:
         raise OutOfRangeError("PlanTask.put", put, 0, 30)
     box = message.box
-    if not 1 <= box <= 65535:
+    if box < 1 or box > 65535:
         raise OutOfRangeError("PlanTask.box", box, 1, 65535)
     task = message.task
-    task_number = task.number
-    if not 0 <= task_number <= 65535:
+    task_number = task[1]
+    if task_number < 0 or task_number > 65535:
         raise OutOfRangeError("PlanTask.task_number", task_number, 0, 65535)
     try:
         return _PACK_BBHI(
             version,
             part + message.pick * 0x8,
             put + (box & 0x7FF) * 0x20,
-            (box >> 11) + _FROM_0_TO_255_AT_5[task.origin] + task_number * 0x2000,
+            (box >> 11) + _FROM_0_TO_255_AT_5[task[0]] + task_number * 0x2000,
         )
     except (KeyError, struct.error) as error:
         raise refusal(
@@ -246,21 +245,22 @@ def unpack_plan_task(sender: int, data: bytes) -> PlanTask | None:
 
 def pack_step_report(message: StepReport) -> bytes:
     version = message.version
-    if not 1 <= version <= 255:
+    if version < 1:
         raise OutOfRangeError("StepReport.version", version, 1, 255)
+    step = message.step
+    if step < 0 or step > 30:
+        raise OutOfRangeError("StepReport.step", step, 0, 30)
     at_ms = message.at_ms
-    if not 0 <= at_ms <= 4294967295:
+    if at_ms < 0 or at_ms > 4294967295:
         raise OutOfRangeError("StepReport.at_ms", at_ms, 0, 4294967295)
     try:
-        return (
-            version
-            + _FROM_0_TO_30_AT_8[message.step]
-            + message.result * 0x2000
-            + _FROM_1_TO_255_AT_15[message.entity]
-            + at_ms * 0x800000
-        ).to_bytes(8, "little")
-    except KeyError as error:
-        raise refusal(message, ("StepReport.step", 0, 30), ("StepReport.entity", 1, 255)) from error
+        return _PACK_BHIX(
+            version,
+            step + message.result * 0x20 + _FROM_1_TO_255_AT_7[message.entity] + (at_ms & 0x1) * 0x8000,
+            at_ms >> 1,
+        )
+    except (KeyError, struct.error) as error:
+        raise refusal(message, ("StepReport.version", 1, 255), ("StepReport.entity", 1, 255)) from error
 
 
 def unpack_step_report(sender: int, data: bytes) -> StepReport | None:
@@ -283,10 +283,10 @@ def unpack_step_report(sender: int, data: bytes) -> StepReport | None:
 
 def pack_lane_state(message: LaneState) -> bytes:
     lane = message.lane
-    if not 1 <= lane <= 255:
+    if lane < 1 or lane > 255:
         raise OutOfRangeError("LaneState.lane", lane, 1, 255)
     since_ms = message.since_ms
-    if not 0 <= since_ms <= 4294967295:
+    if since_ms < 0 or since_ms > 4294967295:
         raise OutOfRangeError("LaneState.since_ms", since_ms, 0, 4294967295)
     return (lane + (0x100 if message.blocked else 0) + since_ms * 0x200).to_bytes(8, "little")
 

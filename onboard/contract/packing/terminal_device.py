@@ -24,11 +24,12 @@ _HANDLER_MODE = tuple(HandlerMode)
 _MANUAL_MODE = tuple(ManualMode)
 _MOVE_MODE = tuple(MoveMode)
 _VERB = tuple(Verb)
-_FROM_0_TO_255_AT_31 = {value: value << 31 for value in range(256)}
-_FROM_0_TO_255_AT_39 = {value: value << 39 for value in range(256)}
-_FROM_0_TO_31_AT_26 = {value: value << 26 for value in range(32)}
+_FROM_0_TO_255_AT_15 = {value: value << 15 for value in range(256)}
+_FROM_0_TO_255_AT_23 = {value: value << 23 for value in range(256)}
+_FROM_0_TO_31_AT_10 = {value: value << 10 for value in range(32)}
 _PACK_BBBBXXXX = struct.Struct("<BBBBxxxx").pack
 _PACK_BBHXXXX = struct.Struct("<BBHxxxx").pack
+_PACK_BBIH = struct.Struct("<BBIH").pack
 _PACK_BBXXXXXX = struct.Struct("<BBxxxxxx").pack
 _PACK_BIXXX = struct.Struct("<BIxxx").pack
 _UNPACK_BBBBXXXX = struct.Struct("<BBBBxxxx").unpack_from
@@ -63,7 +64,7 @@ def unpack_move_order(sender: int, data: bytes) -> MoveOrder | None:
 
 def pack_handler_order(message: HandlerOrder) -> bytes:
     box = message.box
-    if not 0 <= box <= 65535:
+    if box < 0 or box > 65535:
         raise OutOfRangeError("HandlerOrder.box", box, 0, 65535)
     try:
         return _PACK_BIXXX(message.sequence, message.action + box * 0x8)
@@ -111,7 +112,7 @@ def unpack_move_state(sender: int, data: bytes) -> MoveState | None:
 
 def pack_handler_state(message: HandlerState) -> bytes:
     box = message.box
-    if not 0 <= box <= 65535:
+    if box < 0 or box > 65535:
         raise OutOfRangeError("HandlerState.box", box, 0, 65535)
     try:
         return _PACK_BIXXX(message.sequence, message.gear + box * 0x4)
@@ -144,29 +145,30 @@ def unpack_lane_sensor(sender: int, data: bytes) -> LaneSensor | None:
 
 
 def pack_mission_key(message: MissionKey) -> bytes:
-    mission = message.mission
-    if not 0 <= mission <= 255:
-        raise OutOfRangeError("MissionKey.mission", mission, 0, 255)
     what = message.what
-    if not 0 <= what <= 65535:
+    if what < 0 or what > 65535:
         raise OutOfRangeError("MissionKey.what", what, 0, 65535)
     before_s = message.before_s
-    if not 0 <= before_s <= 32767:
+    if before_s < 0 or before_s > 32767:
         raise OutOfRangeError("MissionKey.before_s", before_s, 0, 32767)
     try:
-        return (
-            mission
-            + message.verb * 0x100
-            + what * 0x400
-            + _FROM_0_TO_31_AT_26[message.count]
-            + _FROM_0_TO_255_AT_31[message.source]
-            + _FROM_0_TO_255_AT_39[message.target]
-            + before_s * 0x800000000000
-            + (0x4000000000000000 if message.urgent else 0)
-        ).to_bytes(8, "little")
-    except KeyError as error:
+        return _PACK_BBIH(
+            message.mission,
+            message.verb + (what & 0x3F) * 0x4,
+            (what >> 6)
+            + _FROM_0_TO_31_AT_10[message.count]
+            + _FROM_0_TO_255_AT_15[message.source]
+            + _FROM_0_TO_255_AT_23[message.target]
+            + (before_s & 0x1) * 0x80000000,
+            (before_s >> 1) + (0x4000 if message.urgent else 0),
+        )
+    except (KeyError, struct.error) as error:
         raise refusal(
-            message, ("MissionKey.count", 0, 31), ("MissionKey.source", 0, 255), ("MissionKey.target", 0, 255)
+            message,
+            ("MissionKey.mission", 0, 255),
+            ("MissionKey.count", 0, 31),
+            ("MissionKey.source", 0, 255),
+            ("MissionKey.target", 0, 255),
         ) from error
 
 
@@ -191,7 +193,7 @@ def pack_manual_key(message: ManualKey) -> bytes:
     if number < 1:
         raise OutOfRangeError("ManualKey.number", number, 1, 255)
     vehicle = message.vehicle
-    if not 1 <= vehicle <= 250:
+    if vehicle < 1 or vehicle > 250:
         raise OutOfRangeError("ManualKey.vehicle", vehicle, 1, 250)
     try:
         return _PACK_BBHXXXX(number, vehicle, message.manual_mode)

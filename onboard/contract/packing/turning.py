@@ -19,13 +19,13 @@ _UNPACK_Q = struct.Struct("<Q").unpack_from
 
 def pack_turning_order(message: TurningOrder) -> bytes:
     batch = message.batch
-    if not 1 <= batch <= 4095:
+    if batch < 1 or batch > 4095:
         raise OutOfRangeError("TurningOrder.batch", batch, 1, 4095)
     bar_mm = message.bar_mm
     if bar_mm < 1:
         raise OutOfRangeError("TurningOrder.bar_mm", bar_mm, 1, 4095)
     face_um = message.face_um
-    if not 0 <= face_um <= 25500:
+    if face_um < 0 or face_um > 25500:
         raise OutOfRangeError("TurningOrder.face_um", face_um, 0, 25500)
     try:
         return _PACK_HBBBHB(
@@ -59,7 +59,7 @@ def pack_bill_cutting(message: BillCutting) -> bytes:
     if manager < 1:
         raise OutOfRangeError("BillCutting.manager", manager, 1, 255)
     machining_ct = message.machining_ct
-    if not 0 <= machining_ct <= 1048575:
+    if machining_ct < 0 or machining_ct > 1048575:
         raise OutOfRangeError("BillCutting.machining_ct", machining_ct, 0, 1048575)
     try:
         return _PACK_BHBI(manager, message.task, machining_ct & 0xFF, (machining_ct >> 8) + message.tools_ct * 0x1000)
@@ -88,7 +88,7 @@ def pack_bill_waiting(message: BillWaiting) -> bytes:
     if manager < 1:
         raise OutOfRangeError("BillWaiting.manager", manager, 1, 255)
     setup_ct = message.setup_ct
-    if not 0 <= setup_ct <= 1048575:
+    if setup_ct < 0 or setup_ct > 1048575:
         raise OutOfRangeError("BillWaiting.setup_ct", setup_ct, 0, 1048575)
     try:
         return _PACK_BHBI(manager, message.task, setup_ct & 0xFF, (setup_ct >> 8) + message.latency_ct * 0x1000)
@@ -117,7 +117,7 @@ def pack_bill_bar(message: BillBar) -> bytes:
     if manager < 1:
         raise OutOfRangeError("BillBar.manager", manager, 1, 255)
     material_ct = message.material_ct
-    if not 0 <= material_ct <= 1048575:
+    if material_ct < 0 or material_ct > 1048575:
         raise OutOfRangeError("BillBar.material_ct", material_ct, 0, 1048575)
     try:
         return _PACK_BHBI(manager, message.task, material_ct & 0xFF, (material_ct >> 8) + message.total_ct * 0x1000)
@@ -143,7 +143,7 @@ def pack_lathe_progress(message: LatheProgress) -> bytes:
     if manager < 1:
         raise OutOfRangeError("LatheProgress.manager", manager, 1, 255)
     made = message.made
-    if not 0 <= made <= 4095:
+    if made < 0 or made > 4095:
         raise OutOfRangeError("LatheProgress.made", made, 0, 4095)
     try:
         return _PACK_BHBHH(manager, message.task, made & 0xFF, (made >> 8) + message.batch * 0x10, message.lathe_phase)

@@ -67,7 +67,7 @@ def unpack_program_end(sender: int, data: bytes) -> ProgramEnd | None:
 
 def pack_lathe_order(message: LatheOrder) -> bytes:
     edges = message.edges
-    if not 0 <= edges <= 65535:
+    if edges < 0 or edges > 65535:
         raise OutOfRangeError("LatheOrder.edges", edges, 0, 65535)
     try:
         return _PACK_BIXXX(message.sequence, message.lathe_action + _FROM_0_TO_15_AT_2[message.chuck] + edges * 0x40)
@@ -87,7 +87,7 @@ def unpack_lathe_order(sender: int, data: bytes) -> LatheOrder | None:
 
 def pack_job_answer(message: JobAnswer) -> bytes:
     total_ct = message.total_ct
-    if not 0 <= total_ct <= 1048575:
+    if total_ct < 0 or total_ct > 1048575:
         raise OutOfRangeError("JobAnswer.total_ct", total_ct, 0, 1048575)
     try:
         return _PACK_HIXX(message.number, message.job_result + _FROM_0_TO_255_AT_3[message.winner] + total_ct * 0x800)
@@ -107,7 +107,7 @@ def unpack_job_answer(sender: int, data: bytes) -> JobAnswer | None:
 
 def pack_nc_state(message: NcState) -> bytes:
     parts = message.parts
-    if not 0 <= parts <= 65535:
+    if parts < 0 or parts > 65535:
         raise OutOfRangeError("NcState.parts", parts, 0, 65535)
     try:
         return _PACK_BIXXX(message.sequence, message.nc_mode + _FROM_0_TO_255_AT_3[message.program] + parts * 0x800)
@@ -144,13 +144,13 @@ def unpack_tool_state(sender: int, data: bytes) -> ToolState | None:
 
 def pack_job_entry(message: JobEntry) -> bytes:
     batch = message.batch
-    if not 1 <= batch <= 4095:
+    if batch < 1 or batch > 4095:
         raise OutOfRangeError("JobEntry.batch", batch, 1, 4095)
     bar_mm = message.bar_mm
     if bar_mm < 1:
         raise OutOfRangeError("JobEntry.bar_mm", bar_mm, 1, 4095)
     face_um = message.face_um
-    if not 0 <= face_um <= 25500:
+    if face_um < 0 or face_um > 25500:
         raise OutOfRangeError("JobEntry.face_um", face_um, 0, 25500)
     try:
         return _PACK_HBBBHB(

@@ -15,6 +15,7 @@ from onboard.contract.messages import CallForProposals, Itinerary, Stamp
 from onboard.core.negotiation import NeededAnswers, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine, Segment, Station
+from onboard.systems.car_park.clearance import MAX_EXPANSIONS, Clearance
 from onboard.systems.car_park.program import (
     MAX_STEPS,
     STAMP_AHEAD_US,
@@ -22,12 +23,13 @@ from onboard.systems.car_park.program import (
     CarStep,
     Program,
     StationWork,
+    steps_of,
     to_itinerary,
 )
 from onboard.systems.car_park.site import CarPark, class_of_end
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayMirror
-from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
+from onboard.ways.passing import BegunItinerary
 from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import FOREVER, Reservations
 from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
@@ -46,8 +48,10 @@ PROMISE_GRACE_US = 60_000_000
 FEW_PLACES = 3
 #: Whoever only stands in the way is out of it so long after the award: planning, tokens, and a way to another refuge.
 YIELDING_US = 45_000_000
-#: Bound of one route search, in expansions (a wall-time bound would not replay).
-MAX_EXPANSIONS = 4_000
+#: A way back that begins within so long after the award goes on: its machine may not have heard of it by then.
+HEARD_US = 2_000_000
+#: Others' ways back are asked to yield for no less than so much: each that yields tells its plan anew.
+WORTH_US = 2_000_000
 
 
 class Alternative(NamedTuple):
@@ -97,6 +101,10 @@ class CarParkGeneration:
     tentative: dict[tuple[int, int], Solution] = field(default_factory=dict)
     #: A person has a hand in (row M38): no new tasks.
     is_held: bool = False
+    clearance: Clearance = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.clearance = Clearance(self.site, self.mirror, self.machine.node_id)
 
     # --- the Estimator -----------------------------------------------------------------------------------------
 
@@ -138,11 +146,10 @@ class CarParkGeneration:
         return Proposal(to_bus_ms(solution.finish_us), itinerary, (solution,), tuple(alternatives))
 
     def _offer(self, call: CallForProposals, solution: Solution) -> Itinerary:
-        stamp = Stamp(call.deadline_ms, call.sender, call.call & 0xFF)
         # Legs name only the version: a tentative set must never complete a firm one.
         version = (self.program.version + 128) & 0xFF or 1
         steps = [*self.program.remaining[: solution.kept], *solution.steps]
-        return to_itinerary(self.machine.node_id, version, Grade.TENTATIVE, stamp, steps)
+        return to_itinerary(self.machine.node_id, version, Grade.TENTATIVE, _stamp(call), steps)
 
     # --- the search --------------------------------------------------------------------------------------------
 
@@ -151,7 +158,9 @@ class CarParkGeneration:
     ) -> tuple[Solution | None, list[Alternative]]:
         """All solutions evaluated, the earliest finish first; ties by the site's order of places.
 
-        A bid comes behind what this machine has bid for already (``behind_bids``); a task that is won does not.
+        A bid comes behind what this machine has bid for already (``behind_bids``); a task that is won does not. Others'
+        ways back are asked to yield to a task that is won, and to one for which there is no way else: where they were
+        for every bid, machines from far away won in place of those that were about to be near.
 
         Candidates whose bound is no better than the best found are not searched; they are told with that bound. Where
         there is no solution around machines that only stand there, one that counts on their giving way (design,
@@ -159,46 +168,53 @@ class CarParkGeneration:
         """
         start = self._start(call, now_us, behind_bids=behind_bids)
         best, alternatives = self._search(call, now_us, start, self.mirror.reservations)
+        if alternatives and (best is None or not behind_bids):
+            best, alternatives = self._past_retreats(call, now_us, start, best) or (best, alternatives)
         if best is None and alternatives:
             asked_us = max(self._deadline_us(call, now_us), now_us) + YIELDING_US
             best, more = self._search(call, now_us, start, self.mirror.reservations.with_way_given(asked_us))
             alternatives += more
-            if best is not None and not self._can_give_way(best, now_us):
+            if best is not None and not self._have_room(best, now_us):
                 best = None
         return best, alternatives
 
-    def _can_give_way(self, solution: Solution, now_us: int) -> bool:
-        """Whether each machine that stands in the way finds another refuge in time, around this and all plans."""
+    def _have_room(self, solution: Solution, now_us: int) -> bool:
+        """Whether each machine that only stands in the way finds another refuge in time, around this and all plans."""
         mine = to_itinerary(self.machine.node_id, 1, Grade.FIRM, Stamp(to_bus_ms(now_us), 0, 0), list(solution.steps))
-        windows = itinerary_windows(self.site, mine, now_us, solution.start_us)
-        standing = self.mirror.reservations.standing_in(self.machine.node_id, windows)
-        taken = self.mirror.reservations.with_way_given(FOREVER)
-        taken.release(self.machine.node_id)
-        taken.reserve(self.machine.node_id, windows, lift_uses(self.site, mine, now_us, solution.start_us))
-        for node in standing:
-            itinerary = self.mirror.itineraries.get(node)
-            place = None if itinerary is None else final_position(self.site, itinerary)
-            others = [one for one in self.mirror.others_standing() if one != place]
-            if place is None or not self._finds_refuge(
-                node, place, taken, [*others, solution.steps[-1].destination], now_us
-            ):
-                return False
-        return True
+        plan = BegunItinerary(mine, solution.start_us)
+        standing = self.clearance.standing_in(plan, now_us)
+        if standing is None:
+            return False
+        return self.clearance.have_room(plan, standing, self.mirror.reservations.copy(), now_us) is not None
 
-    def _finds_refuge(self, node: int, place: Segment, taken: Reservations, others: list[Segment], now_us: int) -> bool:
-        start_us = max(now_us, taken.standing_since(node) or now_us)
-        found = plan_route(
-            self.site,
-            taken,
-            node,
-            place,
-            start_us,
-            (),
-            open_refuges(self.site, others),
-            MAX_EXPANSIONS,
-            self.mirror.lift_floors(now_us, start_us),
-        )
-        return not isinstance(found, NoRoute)
+    def _past_retreats(
+        self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], best: Solution | None
+    ) -> tuple[Solution, list[Alternative]] | None:
+        """A sooner solution than ``best`` that counts on others' ways back to yield; None where there is none.
+
+        Those who yield stand where their work ends, which the solution does not touch, and find a way back around it
+        and all plans: so nobody waits for whom it delays. Together they are not delayed by more than twice what it
+        is sooner: a customer waits for it, and the next one for them.
+        """
+        stamp = _stamp(call)
+        horizon_us = max(self._deadline_us(call, now_us), now_us) + AWARD_LATENCY_US + HEARD_US
+        held = self.clearance.held_back(stamp, horizon_us, now_us)
+        while held:
+            found, tried = self._search(call, now_us, start, self.clearance.without_retreats(held, now_us))
+            if found is None or (best is not None and best.finish_us - found.finish_us < WORTH_US):
+                return None
+            steps = [*self.program.remaining[: found.kept], *found.steps]
+            plan = BegunItinerary(to_itinerary(self.machine.node_id, 1, Grade.FIRM, stamp, steps), steps[0].begin_us)
+            yielding, refusing = self.clearance.met(plan, held, now_us)
+            if not refusing:
+                waits = {node: (held[node].place, held[node].since_us) for node in yielding}
+                taken = self.clearance.without_retreats({node: held[node] for node in yielding}, now_us)
+                later_us = self.clearance.have_room(plan, waits, taken, now_us)
+                if later_us is None or (best is not None and 2 * (best.finish_us - found.finish_us) < later_us):
+                    return None
+                return found, tried
+            held = {node: held[node] for node in yielding}
+        return None
 
     def _search(
         self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], reservations: Reservations
@@ -279,7 +295,7 @@ class CarParkGeneration:
             visits,
             self._refuges(),
             MAX_EXPANSIONS,
-            self.mirror.lift_floors(now_us, start_us),
+            self.mirror.lift_floors(now_us, start_us, reservations),
         )
         return None if isinstance(route, NoRoute) else route
 
@@ -293,7 +309,7 @@ class CarParkGeneration:
         visits = tuple(self._work_visit(work, now_us) for work in works)
         route = self._plan(self.mirror.reservations, origin, start_us, visits, now_us)
         # A few steps may be kept before these.
-        return None if route is None or len(route.legs) + 3 > MAX_STEPS else _steps_of(route, works)
+        return None if route is None or len(route.legs) + 3 > MAX_STEPS else steps_of(route, works)
 
     def _work_visit(self, work: StationWork, now_us: int) -> Visit:
         if work.handling is CarHandling.TAKE and work.station in self.site.compartments.values():
@@ -389,7 +405,7 @@ class CarParkGeneration:
             StationWork(CarHandling.TAKE, source, call.car, call.wheelbase_mm, call),
             StationWork(CarHandling.LEAVE, sink, call.car, call.wheelbase_mm, call),
         ]
-        return _steps_of(route, works)
+        return steps_of(route, works)
 
     def _deadline_us(self, call: CallForProposals, now_us: int) -> int:
         """When a call closes, or closed; now where that is read in a time that was not its caller's: work in hand."""
@@ -403,6 +419,11 @@ def open_class(call: CallForProposals) -> int | None:
     return next((one for one in found if one is not None), None)
 
 
+def _stamp(call: CallForProposals) -> Stamp:
+    """What gives a plan for a call its place among the others'."""
+    return Stamp(call.deadline_ms, call.sender, call.call & 0xFF)
+
+
 def _end(station: int, place: Station) -> Station:
     return Station.from_number(station) if class_of_end(station) is None else place
 
@@ -410,20 +431,3 @@ def _end(station: int, place: Station) -> Station:
 def _one_a_segment(places: list[Station]) -> list[Station]:
     """The first of each segment's places: both sides are reached and served alike."""
     return list({place.segment: place for place in reversed(places)}.values())
-
-
-def _steps_of(route: Route, works: list[StationWork]) -> tuple[CarStep, ...]:
-    """The legs of a route as steps, each WORK leg with the next work."""
-    ahead = iter(works)
-    return tuple(
-        CarStep(
-            leg.action,
-            leg.track,
-            leg.from_index,
-            leg.to_index,
-            leg.begin_us,
-            leg.end_us,
-            next(ahead) if leg.action is LegAction.WORK else None,
-        )
-        for leg in route.legs
-    )

@@ -4,23 +4,27 @@ Wherever the two plans want one segment at one time:
 - where an order was agreed before, a delay has upset it: who comes first goes on, the other comes later by what is
   missing (an action dependency graph as of Hoenig et al., "Persistent and Robust Execution of MAPF Schedules in
   Warehouses", 2019: an order taken from plans without conflict has no cycle, so nobody waits for ever);
-- where none was, the plans were made at the same time: who only stands there gives way; else who holds the segment's
-  token goes on, else who has the lower stamp. The other plans its way anew, under its old stamp, so that nobody is
-  displaced for ever.
+- where none was, the plans were made at the same time, or one counts on the other's way back, which yields to work
+  (``onboard.ways.retreats``); who only stands there gives way; else who holds the segment's token goes on, else who has
+  the lower stamp. The other plans its way anew, under its old stamp, so that nobody is displaced for ever; who has
+  no work clears the way of who comes, and takes its stamp.
 """
 
 from dataclasses import dataclass
 from enum import Enum
 
 from onboard.contract.codes import LegAction
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Stamp
 from onboard.core.authority import segment_token
-from onboard.core.serial import ranks_before
 from onboard.systems.car_park.program import CarStep, Program
+from onboard.systems.car_park.standoff import Standoff
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayFleet
 from onboard.ways.passing import TOLERANCE_US
-from onboard.ways.passing_order import Meeting
+from onboard.ways.passing_order import Meeting, Turn
 from onboard.ways.reservations import FOREVER
+from onboard.ways.retreats import has_work
 from onboard.ways.site import WaySite
 
 
@@ -38,13 +42,36 @@ class GivingWay:
 
     fleet: WayFleet
     program: Program
+    standoff: Standoff
 
     def heed(self, sender: int, now_us: int) -> YieldDecision:
-        """What the newest plan of ``sender`` means; at LATER the program's times have been changed."""
+        """What the newest plan of ``sender`` means; at LATER the program is told again, mostly with other times."""
+        first = self.standoff.goes_first(sender, now_us)
+        if first == sender:
+            return self.fall_back(sender, now_us)
         meetings = self._meetings(sender, now_us)
-        if any(self._has_to_turn(meeting, sender) for meeting in meetings):
+        unordered = [meeting for meeting in meetings if meeting.first is None and first == NOBODY]
+        yields = self.fleet.mirror.order.who_yields(self.fleet.node_id, sender, unordered) if unordered else NOBODY
+        if any(self._has_to_turn(meeting, sender, yields) for meeting in unordered):
             return YieldDecision.ANEW
-        return self._come_behind([meeting for meeting in meetings if meeting.first == sender])
+        answer = self._come_behind([meeting for meeting in meetings if meeting.first == sender])
+        if answer is YieldDecision.NOTHING and unordered and self._is_counted_on(sender):
+            # It may have counted on my way back to yield; that is begun, and it hears so.
+            self.program.shift(0)
+            return YieldDecision.LATER
+        return answer
+
+    def _is_counted_on(self, sender: int) -> bool:
+        plan = self.fleet.mirror.itineraries.get(sender)
+        return plan is not None and has_work(plan) and not self.program.works()
+
+    def stamp_for(self, sender: int, now_us: int) -> Stamp:
+        """Under which stamp I make room for ``sender``: its own where I only stand in its way, without work."""
+        plan = self.fleet.mirror.itineraries.get(sender)
+        stands = any(_stands(one.mine) and not _stands(one.theirs) for one in self._meetings(sender, now_us))
+        if plan is None or not stands or not has_work(plan) or self.program.works():
+            return self.program.stamp
+        return plan.stamp
 
     def fall_back(self, sender: int, now_us: int) -> YieldDecision:
         """Where no other way was found: come behind ``sender`` on the way that I have."""
@@ -54,18 +81,16 @@ class GivingWay:
         found = self.fleet.mirror.order.meetings(self.fleet.node_id, sender)
         return [meeting for meeting in found if min(meeting.mine.to_us, meeting.theirs.to_us) > now_us]
 
-    def _has_to_turn(self, meeting: Meeting, sender: int) -> bool:
-        if meeting.first is not None:
-            return False
-        i_stand, they_stand = meeting.mine.to_us >= FOREVER, meeting.theirs.to_us >= FOREVER
-        if i_stand != they_stand:
-            return i_stand
+    def _has_to_turn(self, meeting: Meeting, sender: int, yields: int) -> bool:
+        if yields == NOBODY and _stands(meeting.mine) != _stands(meeting.theirs):
+            return _stands(meeting.mine)
         holder = self.fleet.tokens.holder_of(segment_token(meeting.segment))
         if holder in (self.fleet.node_id, sender):
             # A right in hand outranks stamps: whoever has it is about to be there.
             return holder == sender
-        plans = self.fleet.mirror.itineraries
-        return ranks_before(plans[sender].stamp, plans[self.fleet.node_id].stamp)
+        if yields != NOBODY:
+            return yields == self.fleet.node_id
+        return self.fleet.mirror.order.ranks_before(sender, self.fleet.node_id)
 
     def _come_behind(self, meetings: list[Meeting]) -> YieldDecision:
         """Move each of my steps so far that it begins when the others' turns are over; work in hand stays as it is."""
@@ -95,6 +120,10 @@ class GivingWay:
                 self.program.delay(number, by_us)
                 answer = YieldDecision.LATER
         return answer
+
+
+def _stands(turn: Turn) -> bool:
+    return turn.to_us >= FOREVER
 
 
 def _moving(steps: list[CarStep]) -> list[tuple[int, CarStep]]:

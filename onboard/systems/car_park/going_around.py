@@ -292,13 +292,17 @@ class GoingAround:
         kept, origin, start_us = self._turning((), now_us)
         if kept or other in mirror.obstacles.machines:
             return []
-        slots = mirror.slots_of(machine, self.fleet.tokens.holder_of)
+        # Rights that it has beyond me it cannot use: it grants them to me, who goes first then.
+        slots = mirror.obstacles.slots_of(machine, mirror.progress.get(other), lambda slot: NOBODY)
         works = self.program.works()
         mirror.set_aside(other, slots, Reason.NOT_AUTHORISED, now_us)
         steps = self.generation.reroute(origin, start_us, works, now_us)
         mirror.admit(other, now_us)
         self._seen = mirror.obstacles.changes
-        return [] if steps is None else self.take_up(0, steps, works, now_us)
+        if steps is None:
+            return []
+        self.standoff.turned(other, now_us)
+        return self.take_up(0, steps, works, now_us)
 
     def _is_trapped(self, now_us: int) -> bool:
         """Whether the ride in hand is with a lift that is an obstacle."""

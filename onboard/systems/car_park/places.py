@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from onboard.contract.codes import LegAction
 from onboard.contract.messages import Itinerary
 from onboard.core.authority import station_token
+from onboard.core.serial import ranks_before
 from onboard.core.site import Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
@@ -54,7 +55,7 @@ class PlaceChoice:
         if holder == me or mine is None:
             return False
         rivals = [one for one in mirror.itineraries.values() if one.sender != me and _works_at(one, station)]
-        return any(one.sender == holder or one.stamp < mine.stamp for one in rivals)
+        return any(one.sender == holder or ranks_before(one.stamp, mine.stamp) for one in rivals)
 
 
 def _works_at(itinerary: Itinerary, station: Station) -> bool:

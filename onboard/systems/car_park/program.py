@@ -15,6 +15,7 @@ from onboard.core.serial import from_bus_ms, successor, to_bus_ms
 from onboard.core.site import Segment, Station
 from onboard.ways.lifts import lift_at, platform_on, sill
 from onboard.ways.occupancy import hop_origins
+from onboard.ways.sipp import Route
 from onboard.ways.site import WaySite
 
 #: Most steps that fit in an itinerary: the leg number has 5 bits.
@@ -253,6 +254,23 @@ def standing_itinerary(sender: int, version: int, stamp: Stamp, place: Segment, 
     steps = [CarStep(LegAction.STAND, place.track, place.index, place.index, now_us, now_us + 1000)]
     # What was awarded is long done: an old award time could not be reached by the leg's 24 bits.
     return to_itinerary(sender, version, Grade.FIRM, stamp._replace(award_ms=to_bus_ms(now_us)), steps)
+
+
+def steps_of(route: Route, works: Sequence[StationWork]) -> tuple[CarStep, ...]:
+    """The legs of a route as steps, each WORK leg with the next work."""
+    ahead = iter(works)
+    return tuple(
+        CarStep(
+            leg.action,
+            leg.track,
+            leg.from_index,
+            leg.to_index,
+            leg.begin_us,
+            leg.end_us,
+            next(ahead) if leg.action is LegAction.WORK else None,
+        )
+        for leg in route.legs
+    )
 
 
 def ends_at(site: WaySite, step: CarStep) -> Segment:

@@ -102,11 +102,11 @@ class ParkingRobot:
         self.carriage.is_clear = lambda: self.shuttle.is_home
         self.carriage.route_ahead = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
         self.riding = Riding(self.fleet)
-        self.giving_way = GivingWay(self.fleet, self.program)
         self.recovery = JournalRecovery.read(self.fleet.node_id, self.fleet.entries)
         custody.replay(self.fleet, self.recovery.cars.values())
         self.fleet.tokens.before_grant = partial(custody.before_grant, self.fleet)
         self.going_around = GoingAround(self.fleet, self.generation, self.carriage, self.shuttle, self._take_up)
+        self.giving_way = GivingWay(self.fleet, self.program, self.going_around.standoff)
         self.holding = RobotHold(self.fleet, self.generation, self.carriage, self.shuttle)
         machine = RobotDevices(self.carriage, self.shuttle, self.riding)
         self.starting = Starting(
@@ -216,7 +216,7 @@ class ParkingRobot:
         return effects + self._publish(now_us)
 
     def _reroute(self, sender: int, now_us: int) -> list[Effect]:
-        """Do the same work by another way, under the same stamp; where there is none, come behind on the old one."""
+        """Do the same work by another way; where there is none, come behind on the old one."""
         kept, origin, start_us = self.program.turning(now_us)
         works = [step.work for step in self.program.remaining[kept:] if step.work is not None]
         unplanned = self.program.unplanned
@@ -228,9 +228,9 @@ class ParkingRobot:
             steps = self.generation.reroute(origin, start_us, works, now_us)
         if steps is None:
             return self._publish(now_us) if self.giving_way.fall_back(sender, now_us) is YieldDecision.LATER else []
-        if not kept:
-            self._begun = False
-        self.program.replace([*self.program.remaining[:kept], *steps], self.program.stamp, unplanned)
+        self._begun = self._begun and bool(kept)
+        stamp = self.giving_way.stamp_for(sender, now_us)
+        self.program.replace([*self.program.remaining[:kept], *steps], stamp, unplanned)
         effects: list[Effect] = [Report(f"gives way to node {sender}: " + "; ".join(str(step) for step in steps))]
         return effects + self._publish(now_us)
 

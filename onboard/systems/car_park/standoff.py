@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from onboard.contract.codes import KindCode
 from onboard.contract.constants import NOBODY
 from onboard.core.authority import segment_token
-from onboard.core.serial import ranks_before
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.mirror import WayFleet
 
@@ -27,13 +26,30 @@ class Standoff:
     carriage: Carriage
     due_us: int | None = None
     _with: int = NOBODY
+    _turned: tuple[int, int] = NOBODY, 0
+
+    def turned(self, other: int, now_us: int) -> None:
+        """I have found another way, away from ``other``: it comes behind me on that."""
+        self._turned = other, now_us + 2 * PATIENCE_US
+
+    def goes_first(self, other: int, now_us: int) -> int:
+        """Who of me and ``other`` goes first wherever we meet, because of who turned; NOBODY where nobody had to.
+
+        One decision for all slots: if each turned for the slots that the other has a right to, both would answer each
+        other's plans for ever.
+        """
+        node, until_us = self._turned
+        if node == other and now_us < until_us:
+            return self.fleet.node_id
+        is_first = self._with == other and self.fleet.mirror.order.ranks_before(self.fleet.node_id, other)
+        return other if is_first else NOBODY
 
     def look(self, now_us: int) -> int:
         """The robot to turn away from, once that is due; NOBODY else."""
         other = self._facing()
         if other != self._with:
             self._with = other
-            waits = 2 if other != NOBODY and self._ranks_before(other) else 1
+            waits = 2 if self.fleet.mirror.order.ranks_before(self.fleet.node_id, other) else 1
             self.due_us = None if other == NOBODY else now_us + waits * PATIENCE_US
         if self.due_us is None or now_us < self.due_us:
             return NOBODY
@@ -51,8 +67,3 @@ class Standoff:
         petitions = self.fleet.petitions
         wants = any(petitions.claim(segment_token(here), other) is not None for here in self.carriage.occupied())
         return other if wants else NOBODY
-
-    def _ranks_before(self, other: int) -> bool:
-        plans = self.fleet.mirror.itineraries
-        mine, theirs = plans.get(self.fleet.node_id), plans.get(other)
-        return mine is not None and theirs is not None and ranks_before(mine.stamp, theirs.stamp)

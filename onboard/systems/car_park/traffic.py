@@ -154,21 +154,15 @@ _OPERATION = (
     TrafficBound("CarAt", _ALL, _two, _second, "a car changes hands"),
 )
 
-#: Every machine says all it has to each of the others as it hears of it, which is twice for those that ask all at
-#: first. Nobody holds cars or has plans yet.
+#: Every machine asks all once, and who was not answered; it says all it has once to all who ask within a quarter of a
+#: second, and once to who asks late (``onboard/holon/witness.py``). Nobody holds cars or has plans yet.
 _POWER_UP = (
-    TrafficBound("SyncRequest", _ALL, lambda n: n.nodes, lambda n: 5 * n.heartbeat_us, "to all, and to each new peer"),
-    TrafficBound(
-        "SyncDone", _ALL, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "after all that is said to who asks"
-    ),
-    TrafficBound("TokenHeld", _ALL, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks"),
-    TrafficBound("ItineraryHead", _ROBOT, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks"),
-    TrafficBound(
-        "ItineraryLeg", _ROBOT, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "an idle robot's one leg"
-    ),
-    TrafficBound(
-        "Progress", (KindCode.ROBOT, KindCode.LIFT), lambda n: 2 * n.nodes + 2, lambda n: 5 * n.heartbeat_us, "the same"
-    ),
+    TrafficBound("SyncRequest", _ALL, _two, lambda n: 5 * n.heartbeat_us, "to all, and to who has not answered"),
+    TrafficBound("SyncDone", _ALL, _two, lambda n: 5 * n.heartbeat_us, "after all that is said to those who ask"),
+    TrafficBound("TokenHeld", _ALL, _two, lambda n: 5 * n.heartbeat_us, "to those who ask"),
+    TrafficBound("ItineraryHead", _ROBOT, _three, lambda n: 5 * n.heartbeat_us, "at the start, and to those who ask"),
+    TrafficBound("ItineraryLeg", _ROBOT, _three, lambda n: 5 * n.heartbeat_us, "an idle robot's one leg"),
+    TrafficBound("Progress", (KindCode.ROBOT, KindCode.LIFT), _three, lambda n: 5 * n.heartbeat_us, "the same"),
     TrafficBound(
         "BusTime", (), lambda n: 3 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks, by two for a moment"
     ),

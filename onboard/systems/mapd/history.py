@@ -1,21 +1,14 @@
 """What robots of a floor of cells say: the part of the history that this system has of its own."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from onboard.contract.mapd import PathHead, PathMoves, StepState, StepTurn
 from onboard.contract.messages import Message
 from onboard.history.history import History
 from onboard.history.system import SystemFact, SystemHistory
 from onboard.history.tasks import TaskFold
+from onboard.systems.mapd.moves import Assembly
 from onboard.systems.mapd.site import Mapd
-
-
-@dataclass
-class PathSeen:
-    """A robot's newest path, in parts: whole once each was heard."""
-
-    head: PathHead
-    parts: dict[int, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +34,8 @@ class MapdHistory(SystemHistory):
         self.cells = dict(site.homes)
         #: Cells that each robot has left behind.
         self.passed = dict.fromkeys(site.homes, 0)
-        self.paths: dict[int, PathSeen] = {}
+        #: Each robot's newest path, as far as it was heard.
+        self.paths: dict[int, Assembly] = {}
 
     def feed(self, message: Message, time_us: int) -> SystemFact | None:
         """Follow robots of the site, their paths in parts, and turns that were lost."""
@@ -55,11 +49,10 @@ class MapdHistory(SystemHistory):
                 self.cells[message.sender] = message.cell
                 return CellTold(message)
             case PathHead():
-                self.paths[message.sender] = PathSeen(message)
+                self.paths[message.sender] = Assembly(message)
             case PathMoves():
-                path = self.paths.get(message.sender)
-                if path is not None and path.head.version == message.version:
-                    path.parts[message.part] = message.codes
+                if message.sender in self.paths:
+                    self.paths[message.sender].take(message)
         return None
 
 

@@ -6,6 +6,7 @@ is told to the view from here.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from onboard.contract.codes import CallResult
 from onboard.contract.mapd import StepState
@@ -13,7 +14,7 @@ from onboard.contract.mapd_device import CartState
 from onboard.contract.messages import CallForProposals, Message, Reference
 from onboard.history.calls import CallAnswered, CallOpened, CallRepeated
 from onboard.history.history import Fact
-from onboard.systems.mapd.fields import MOVE_BITS, MOVES_A_FRAME, NO_TASK
+from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.history import CellTold, TurnTold, mapd_history
 from onboard.systems.mapd.site import FREE, Mapd
 from onboard.trace.scene.arrange import arrange
@@ -152,18 +153,10 @@ class MapdScene:
 
     def _ahead(self, node: int) -> Iterator[int]:
         """The cells of its path that a robot has not come to yet; incomplete, a path is not shown."""
-        robot, path = self._robots[node], mapd_history(self.view.history).paths.get(node)
-        if path is None or path.head.cell not in self._spots:
-            return
-        head = path.head
-        if any(part not in path.parts for part in range(-(-head.moves // MOVES_A_FRAME))):
-            return
-        cell = head.cell
-        for number in range(head.moves):
-            code = path.parts[number // MOVES_A_FRAME] >> MOVE_BITS * (number % MOVES_A_FRAME) & (1 << MOVE_BITS) - 1
-            ways = self.site.floor.ways[cell]
-            cell = ways[code - 1] if 0 < code <= len(ways) else cell
-            if head.step + number + 1 > robot.step and code:
+        heard = mapd_history(self.view.history).paths.get(node)
+        path = heard.path(self.site.floor) if heard is not None else None
+        for (_, before), (step, cell) in pairwise(path.steps()) if path is not None else ():
+            if step > self._robots[node].step and cell != before:
                 yield cell
 
     def marks(self, now_us: int) -> Json:

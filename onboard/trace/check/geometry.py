@@ -5,6 +5,7 @@ the lift's track), and a lift's gate (index 255), which whoever is over the sill
 its mouth, one pitch away: whoever is there is turned, or turning, and is in both slots.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -18,6 +19,8 @@ PLATFORM_INDEX = 0
 GATE_INDEX = 255
 #: A body counts as in a slot from here on, mm: sensors are read to the millimetre, and moments before they are told.
 TOLERANCE_MM = 20
+#: Extents whose slots are kept: stops, and moments in between, of a dozen robots over a day.
+_EXTENTS_KEPT = 1 << 14
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +49,21 @@ def body_of(site: Site, progress: Progress, time_us: int) -> ReportedPosition | 
     return ReportedPosition(progress.sender, progress.track, progress.index, position_mm, progress.speed_mm_s, time_us)
 
 
-def slots_of(site: Site, track: int, low_mm: float, high_mm: float) -> list[Segment]:
-    """Slots that a robot's body from ``low_mm`` to ``high_mm`` is in, gates of the sills that it is over included."""
+def slots_of(site: Site, track: int, low_mm: float, high_mm: float) -> tuple[Segment, ...]:
+    """Slots that a robot's body from ``low_mm`` to ``high_mm`` is in, gates of the sills that it is over included.
+
+    They are asked for again and again, of each body by every rule: what was found is kept with the site.
+    """
+    known, extent = way_site(site).extents, (track, low_mm, high_mm)
+    found = known.get(extent)
+    if found is None:
+        if len(known) >= _EXTENTS_KEPT:
+            known.clear()
+        found = known[extent] = tuple(_slots_of(site, *extent))
+    return found
+
+
+def _slots_of(site: Site, track: int, low_mm: float, high_mm: float) -> list[Segment]:
     ways = way_site(site)
     line = ways.tracks[track]
     lowest = 0 if _goes_on(site, Segment(track, 0)) else 1
@@ -69,18 +85,18 @@ def _goes_on(site: Site, position: Segment) -> bool:
     return position in ways.platforms or position in ways.mouths
 
 
-def occupied(site: Site, body: ReportedPosition) -> list[Segment]:
+def occupied(site: Site, body: ReportedPosition) -> tuple[Segment, ...]:
     """Slots that a robot's body is in."""
     return swept(site, body, body.position_mm)
 
 
-def swept(site: Site, body: ReportedPosition, until_mm: float) -> list[Segment]:
+def swept(site: Site, body: ReportedPosition, until_mm: float) -> tuple[Segment, ...]:
     """Slots that a robot's body is in and comes through until its centre is at ``until_mm`` on the same track."""
     ways = way_site(site)
     if ways.tracks[body.track].kind is TrackKind.LIFT:
-        return [Segment(body.track, body.index)]
+        return (Segment(body.track, body.index),)
     half_mm = ways.carrier_length_mm / 2
-    low_mm, high_mm = sorted((float(body.position_mm), until_mm))
+    low_mm, high_mm = sorted((body.position_mm, until_mm))
     return slots_of(site, body.track, low_mm - half_mm, high_mm + half_mm)
 
 
@@ -96,7 +112,7 @@ def body_at(site: Site, body: ReportedPosition, tape_mm: int) -> ReportedPositio
     return replace(body, track=told.track, index=index, position_mm=told.position_mm)
 
 
-def sent_through(site: Site, body: ReportedPosition, order: DriveOrder) -> list[Segment]:
+def sent_through(site: Site, body: ReportedPosition, order: DriveOrder) -> Sequence[Segment]:
     """Slots through which an order sends a body: along its track, or to turn where it is."""
     ways, here = way_site(site), Segment(body.track, body.index)
     if not ways.is_charted:

@@ -31,6 +31,11 @@ SILENT_US = 7_000_000
 JUMP_US = 100_000
 #: A clock that is far off is set anew by the second word, and that comes within two periods of 5 s, us.
 SETTLING_US = 11_000_000
+#: What the picture is made of: half of what is said on a bus is none of it.
+_TAKEN = {
+    *(BusTime, TokenGrant, TokenHeld, TokenAssigned, Regeneration),
+    *(Progress, DriveState, ManualState, Heartbeat, Halted),
+}
 
 
 class BusPicture:
@@ -120,8 +125,20 @@ class BusPicture:
 
     def feed(self, event: LogEvent[Message]) -> None:
         """Take up one message before the rules see it."""
-        self.now_us = time_us = event.time_us
+        self.now_us = event.time_us
+        if type(event.message) in _TAKEN:
+            self._take(event)
+
+    def _take(self, event: LogEvent[Message]) -> None:
+        time_us = event.time_us
         match event.message:
+            case Heartbeat() as beat:
+                if not self.boots:
+                    # The first sign of life of a whole site in its first life: all tokens are where the site file says.
+                    self.tokens.from_start = beat.boot == 1 and beat.state is MachineState.STARTING
+                self.boots[beat.sender] = beat.boot
+                self.heard_us[beat.sender] = time_us
+                self._on_state(beat)
             case BusTime(bus_time_us=bus_us):
                 self._on_bus_time(bus_us, time_us)
             case TokenGrant() | TokenHeld() | TokenAssigned() | Regeneration() as word:
@@ -134,13 +151,6 @@ class BusPicture:
                 self._sensed_mm[node] = position_mm
             case ManualState() as state:
                 self._on_manual(state, time_us)
-            case Heartbeat() as beat:
-                if not self.boots:
-                    # The first sign of life of a whole site in its first life: all tokens are where the site file says.
-                    self.tokens.from_start = beat.boot == 1 and beat.state is MachineState.STARTING
-                self.boots[beat.sender] = beat.boot
-                self.heard_us[beat.sender] = time_us
-                self._on_state(beat)
             case Halted() as word if word.sender == word.machine and word.reason in RIGHTS_LOST:
                 self.announcing.add(word.sender)
 

@@ -69,12 +69,13 @@ def _report(verdict: LogVerdict, site: Site | None) -> list[str]:
 
 def _check(args: argparse.Namespace, checks: Checks) -> LogVerdict:
     with open_log(args) as log:
+        feed = checks.feed
         for frame in log:
             classic = frame.classic()
             if classic is None:
                 checks.verdict.unknown["CAN FD frame"] += 1
             else:
-                checks.feed(frame.time_us, frame.channel, classic)
+                feed(frame.time_us, frame.channel, classic)
         verdict = checks.finish()
     for fault, count in log.faults.counts.items():
         verdict.unknown[fault.value] += count

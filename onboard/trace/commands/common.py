@@ -45,7 +45,9 @@ class TraceError(ValueError):
 
 def add_log(parser: argparse.ArgumentParser) -> None:
     """The log that a command reads."""
-    parser.add_argument("log", metavar="LOG", help="candump -L, Vector ASC or pcapng file, or - for standard input")
+    parser.add_argument(
+        "log", metavar="LOG", help="candump -L, Vector ASC or BLF, PEAK TRC or pcapng file, or - for stdin"
+    )
 
 
 def add_site(parser: argparse.ArgumentParser, *, required: bool = False) -> None:

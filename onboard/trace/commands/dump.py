@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import TextIO
 
@@ -73,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
             _write_file(chosen)
         else:
             screen = Screen(_look(args), tuple(one.channel for one in sets if one.channel != "any"))
-            _print_all(screen.text(frame) for frame in chosen)
+            _print_all((map(screen.text, frames), are_there) for frames, are_there in chosen.portions())
             tell_faults(log)
     if chosen.errors_hidden:
         print(f"{log.name}: error frames not shown: {chosen.errors_hidden}; -e shows them", file=sys.stderr)
@@ -90,8 +91,27 @@ class _Chosen:
         self._left = count
 
     def __iter__(self) -> Iterator[RawFrame]:
-        # Who asks for a number of frames gets an answer as soon as they are there.
-        for frame in self.log if self._left is None else self.log.one_by_one():
+        return chain.from_iterable(frames for frames, _ in self.portions())
+
+    def portions(self) -> Iterator[tuple[Iterator[RawFrame], bool]]:
+        """Some at a time, and whether these are there already, as the log has them."""
+        if self._left is not None:
+            # Who asks for a number of frames gets an answer as soon as they are there.
+            yield self._passing(self.log.one_by_one()), False
+            return
+        for frames, are_there in self.log.portions():
+            yield self._passing(frames) if self._sets != [FilterSet()] else self._data_frames(frames), are_there
+
+    def _data_frames(self, frames: Iterator[RawFrame]) -> Iterator[RawFrame]:
+        """What passes where nobody asks for anything else."""
+        for frame in frames:
+            if frame.is_error:
+                self.errors_hidden += 1
+            else:
+                yield frame
+
+    def _passing(self, frames: Iterator[RawFrame]) -> Iterator[RawFrame]:
+        for frame in frames:
             if not any(one.passes(frame) for one in self._sets):
                 self.errors_hidden += frame.is_error and not any(one.error_mask for one in self._sets)
                 continue
@@ -123,7 +143,7 @@ def _decode(args: argparse.Namespace, chosen: _Chosen) -> None:
     else:
         site = site_of(args)
         lines = MessageLines(site, codecs_for(site), screen)
-    _print_all(line for frame in chosen for line in lines.of(frame))
+    _print_all((lines.all(frames), are_there) for frames, are_there in chosen.portions())
     tell_faults(chosen.log)
     for line in lines.report():
         print(f"{chosen.log.name}: {line}", file=sys.stderr)
@@ -158,9 +178,13 @@ def _write_file(chosen: _Chosen) -> None:
     tell_faults(chosen.log)
 
 
-def _print_all(lines: Iterator[str]) -> None:
+def _print_all(portions: Iterator[tuple[Iterator[str], bool]]) -> None:
     """To standard output; at once where a person or a pipe waits for each line of a live bus."""
     out = sys.stdout
-    for line in lines:
-        out.write(f"{line}\n")
+    for lines, are_there in portions:
+        if are_there:
+            text = "\n".join(lines)
+            out.write(f"{text}\n" if text else "")
+        else:
+            out.writelines(f"{line}\n" for line in lines)
     out.flush()

@@ -58,12 +58,18 @@ class Screen:
         self._colours = {name: number for number, name in enumerate(channels)}
         self._indent = False
         self._last_us: int | None = None
+        #: For ``prefix``: channels as they are padded, the second that was told last, and how a line in it begins.
+        self._names: dict[str, str] = {}
+        self._is_absolute = look.stamp is TimeFormat.ABSOLUTE
+        self._second, self._begins = -1, ""
 
     def text(self, frame: RawFrame) -> str:
         """The line of a frame, or its two lines where it is an error frame with its words; without the last end."""
         name = frame.channel
         number = self._colours.setdefault(name, len(self._colours))
-        self._width = max(self._width, len(name))
+        if len(name) > self._width:
+            self._width = len(name)
+            self._names.clear()
         if self._look.log:
             return log_line(frame, width=self._width, extra=self._look.extra)
         self._indent |= frame.is_extended
@@ -83,8 +89,18 @@ class Screen:
 
     def prefix(self, frame: RawFrame) -> str:
         """What stands before the words of a decoded message: time and channel."""
-        self._width = max(self._width, len(frame.channel))
-        return f" {self._time(frame.time_us)} {frame.channel:<{self._width}}  "
+        name = self._names.get(frame.channel)
+        if name is None:
+            if len(frame.channel) > self._width:
+                self._width = len(frame.channel)
+                self._names.clear()
+            name = self._names[frame.channel] = f" {frame.channel:<{self._width}}  "
+        if not self._is_absolute:
+            return f" {self._time(frame.time_us)}{name}"
+        second, microseconds = divmod(frame.time_us, _MILLION)
+        if second != self._second:
+            self._second, self._begins = second, f" ({second:010d}."
+        return f"{self._begins}{microseconds:06d}) {name}"
 
     def _time(self, time_us: int) -> str:
         seconds, microseconds = divmod(time_us, _MILLION)

@@ -1,7 +1,8 @@
 """Vector ASC logs: classic, CAN FD, remote and error frames; header as CANalyzer, log2asc and python-can write it.
 
 The date of the header is taken for UTC, as the format names no zone; without one, times begin at 0. Bus n is the
-channel ``canN``, as asc2log names it from 1 on: ASC counts from 1, and a few tools from 0.
+channel ``canN``, as asc2log names it from 1 on: ASC counts from 1, and a few tools from 0. Where a comment of our own
+writer names a bus, that is its channel.
 """
 
 import calendar
@@ -27,6 +28,8 @@ _NO_FRAME = re.compile(
     r"(\d+\.\d+\s+)?(start\s+of\s+measurement|\d+\s+statistic|can\s+\d+\s+status|log\s+trigger|\S+\s+trigger))",
     re.IGNORECASE,
 )
+#: What ``AscWriter`` says of a bus before its first frame.
+_NAMED = re.compile(r"// bus (\d+) is (\S{1,64})")
 _ERROR_CLASS_BUS = 0x80
 #: Bits of the flags behind the data of a CANFD line, after duration and length in bits.
 _REMOTE_MARK, _FLEXIBLE_MARK = 0x10, 0x1000
@@ -46,6 +49,11 @@ class _AscHeader:
         self.base = 16
         self.relative = False
         self.now_us = 0
+        self.names: dict[str, str] = {}
+
+    def channel(self, bus: str) -> str:
+        """The name of a bus."""
+        return self.names.get(bus, f"can{bus}")
 
 
 def read_asc(lines: Iterable[bytes], faults: LogFaults) -> Iterator[tuple[int, RawFrame]]:
@@ -67,7 +75,9 @@ def read_asc(lines: Iterable[bytes], faults: LogFaults) -> Iterator[tuple[int, R
 
 def _header(line: str, state: _AscHeader) -> None:
     words = line.lower().split()
-    if words[0] == "date":
+    if (named := _NAMED.fullmatch(line)) is not None:
+        state.names[named[1]] = named[2]
+    elif words[0] == "date":
         state.start_us = _date_us(line[4:])
     elif words[0] == "base":
         state.base = 10 if words[1:2] == ["dec"] else 16
@@ -97,28 +107,30 @@ def _frame(line: str, state: _AscHeader) -> RawFrame | LogFault:
     state.now_us = state.now_us + stamp_us if state.relative else stamp_us
     time_us = state.start_us + state.now_us
     if match := _CLASSIC.match(timed[3]):
-        return _classic(time_us, match, state.base)
+        return _classic(time_us, match, state)
     if match := _FLEXIBLE.match(timed[3]):
-        return _flexible(time_us, match, state.base)
+        return _flexible(time_us, match, state)
     if match := _ERROR.match(timed[3]):
-        return RawFrame(time_us, f"can{match[1]}", _ERROR_CLASS_BUS, bytes(8), is_error=True)
+        return RawFrame(time_us, state.channel(match[1]), _ERROR_CLASS_BUS, bytes(8), is_error=True)
     return LogFault.NOT_A_LINE
 
 
-def _classic(time_us: int, match: re.Match[str], base: int) -> RawFrame | LogFault:
-    bus, digits, long, direction, kind, length, rest = match.groups()
+def _classic(time_us: int, match: re.Match[str], state: _AscHeader) -> RawFrame | LogFault:
+    number, digits, long, direction, kind, length, rest = match.groups()
+    base, bus = state.base, state.channel(number)
     can_id, sent = _identifier(digits, long, base), direction.lower() != "rx"
     if can_id is None:
         return LogFault.IDENTIFIER
     size = min(int(length or "0", 16), CAN_MAX_DLC)
     if kind.lower() == "r":
-        return RawFrame(time_us, f"can{bus}", can_id, b"", bool(long), True, False, size, None, sent)
+        return RawFrame(time_us, bus, can_id, b"", bool(long), True, False, size, None, sent)
     data = _data(rest, size, base)
-    return LogFault.DATA if data is None else RawFrame(time_us, f"can{bus}", can_id, data, bool(long), sent=sent)
+    return LogFault.DATA if data is None else RawFrame(time_us, bus, can_id, data, bool(long), sent=sent)
 
 
-def _flexible(time_us: int, match: re.Match[str], base: int) -> RawFrame | LogFault:
-    bus, direction, digits, long, faster, error_state, code, length, rest = match.groups()
+def _flexible(time_us: int, match: re.Match[str], state: _AscHeader) -> RawFrame | LogFault:
+    number, direction, digits, long, faster, error_state, code, length, rest = match.groups()
+    base, bus = state.base, state.channel(number)
     can_id, sent = _identifier(digits, long, base), direction.lower() != "rx"
     if can_id is None:
         return LogFault.IDENTIFIER
@@ -130,8 +142,8 @@ def _flexible(time_us: int, match: re.Match[str], base: int) -> RawFrame | LogFa
     if not marks & _FLEXIBLE_MARK:
         flags = None
         if marks & _REMOTE_MARK:
-            return RawFrame(time_us, f"can{bus}", can_id, b"", bool(long), True, False, int(code, 16), None, sent)
-    return RawFrame(time_us, f"can{bus}", can_id, data, bool(long), fd_flags=flags, sent=sent)
+            return RawFrame(time_us, bus, can_id, b"", bool(long), True, False, int(code, 16), None, sent)
+    return RawFrame(time_us, bus, can_id, data, bool(long), fd_flags=flags, sent=sent)
 
 
 def _marks(words: list[str]) -> int:

@@ -4,9 +4,7 @@ import re
 
 #: Beginnings of files that people take for logs, or name by mistake; the first that fits.
 _BEGINNINGS: tuple[tuple[bytes, str], ...] = (
-    (b"LOGG", "a Vector BLF log; write it anew as ASC: can_logconvert LOG LOG.asc"),
     (b"MDF ", "an ASAM MDF measurement; export it as Vector ASC with the tool that wrote it"),
-    (b";$FILEVERSION", "a PEAK TRC log; write it anew as ASC: can_logconvert LOG LOG.asc"),
     (b"SQLite format 3", "a database, perhaps of python-can; write it anew as ASC: can_logconvert LOG LOG.asc"),
     (b"timestamp,", "python-can's CSV; write it anew as ASC: can_logconvert LOG LOG.asc"),
     *(

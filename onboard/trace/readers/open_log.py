@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from functools import cache
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, NamedTuple, Self, TextIO, cast
@@ -68,18 +68,21 @@ class Log:
             self._file.close()
 
     def __iter__(self) -> Iterator[RawFrame]:
+        return chain.from_iterable(frames for frames, _ in self.portions())
+
+    def portions(self) -> Iterator[tuple[Iterator[RawFrame], bool]]:
+        """The same frames some at a time, and whether these are there already: those of a live bus come one by one."""
         with self._watched() as watched:
             placed = self._placed(watched)
             if placed is not None:
-                yield from self.faults.watch(placed)
+                yield self.faults.watch(placed), False
                 return
             for text in self._texts(watched):
                 read_block = _block_reader() if text.is_whole and len(text.lines) >= _LEAST_BYTES else None
                 if read_block is not None:
-                    yield from read_block(text.lines, text.first, self.faults).frames()
+                    yield read_block(text.lines, text.first, self.faults).frames(), True
                 else:
-                    lines = read_candump(io.BytesIO(text.lines), self.faults, text.first)
-                    yield from self.faults.watch(lines)
+                    yield self.faults.watch(read_candump(io.BytesIO(text.lines), self.faults, text.first)), False
 
     def one_by_one(self) -> Iterator[RawFrame]:
         """The same frames, but nothing of the log is looked at behind the one that is asked for."""
@@ -103,10 +106,14 @@ class Log:
         return _Watched(self._file, self._bar)
 
     def _placed(self, watched: "_Watched") -> Iterator[tuple[int, RawFrame]] | None:
-        """Frames of a binary log or an ASC one, with their places; None for what is read as candump's."""
+        """Frames of every format but candump's, with their places; None for what is read as candump's."""
         head = watched.first_line
         if head[: len(MAGIC)] == MAGIC:
             return read_pcapng(watched.read, self.faults)
+        if head.startswith((b"LOGG", b";$FILEVERSION")):
+            from onboard.trace.readers.python_can import BLF_MAGIC, read_blf, read_trc  # noqa: PLC0415  # for these only
+
+            return (read_blf if head.startswith(BLF_MAGIC) else read_trc)(watched.read, self.faults)
         return read_asc(watched, self.faults) if _ASC.match(head) else None
 
     def _texts(self, watched: "_Watched") -> "Iterator[LogText]":
@@ -121,7 +128,7 @@ class Log:
         if not head:
             raise LogOpenError(f"{self.name}: is empty; name a log that something was written to")
         if self.faults.is_no_log:
-            known = "candump -L, Vector ASC, pcapng"
+            known = "candump -L, Vector ASC and BLF, PEAK TRC, pcapng"
             raise LogOpenError(f"{self.name}: no frame of a log that we read ({known}); {guess(head)}")
 
 

@@ -5,7 +5,7 @@ overhangs its sill.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from onboard.contract.codes import DriveMode, KindCode
 from onboard.contract.messages import DriveOrder, DriveState, Message, PlatformState, Progress
@@ -151,7 +151,7 @@ class PlatformThere(Rule):
         slots = sent_through(site, self.picture.sensed(body) or body, event.message)
         self._judge(event, body, slots, "is sent over")
 
-    def _judge(self, event: LogEvent[Message], body: ReportedPosition, slots: list[Segment], how: str) -> None:
+    def _judge(self, event: LogEvent[Message], body: ReportedPosition, slots: Sequence[Segment], how: str) -> None:
         site, wrong = self.picture.site, False
         for slot in slots:
             lift = self.picture.bodies.get(site.stewards.get(slot.track, 0))

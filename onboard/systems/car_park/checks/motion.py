@@ -1,6 +1,6 @@
 """Motion: only under authority and inside it, and never two bodies in one slot (design, section 5)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from onboard.contract.codes import KindCode
 from onboard.contract.messages import DriveOrder, Progress
@@ -89,7 +89,7 @@ class InsideAuthority(Rule):
         self,
         event: LogEvent[Progress] | LogEvent[DriveOrder],
         body: ReportedPosition,
-        slots: list[Segment],
+        slots: Sequence[Segment],
         how: str,
         now_us: int | None = None,
     ) -> None:

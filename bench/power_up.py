@@ -1,0 +1,38 @@
+"""What all machines say that start together: ``python -m bench.power_up [MACHINES] [SEEDS] [BIT/S]``.
+
+Default: 26 machines at 500 kbit/s, first without loss, then 20 seeds in which each receiver misses 10 % of all frames.
+``bus_sim/campaign/power_up.py`` says when a machine takes part.
+"""
+
+import statistics
+import sys
+
+from bus_sim.campaign.power_up import PowerUp, large_with, power_up
+
+LOSS = 0.1
+
+
+def _line(title: str, found: PowerUp) -> str:
+    most = ", ".join(f"{name} {number}" for name, number in found.frames.most_common(6))
+    return f"{title}: worst second {found.worst_second:.1%}; all take part after {found.longest_s:.2f} s; {most}"
+
+
+def main() -> int:
+    """Exit status 1 where somebody never takes part."""
+    numbers = [int(word) for word in sys.argv[1:]]
+    machines, seeds, bitrate = [*numbers, *(26, 20, 500_000)[len(numbers) :]]
+    site = large_with(machines, bitrate)
+    whole = power_up(site)
+    print(_line(f"{machines} machines, nothing lost", whole), flush=True)
+    lossy = [power_up(site, LOSS, seed) for seed in range(1, seeds + 1)]
+    if lossy:
+        worst = max(lossy, key=lambda one: one.worst_second)
+        print(_line(f"{LOSS:.0%} lost, fullest of {seeds} seeds", worst))
+        times_s = [one.longest_s for one in lossy]
+        print(f"all take part: median {statistics.median(times_s):.2f} s, longest {max(times_s):.2f} s")
+        print(f"mirrors equal after the time in {sum(one.mirrors == 1 for one in lossy)} of {seeds} seeds")
+    return 0 if all(len(one.parts_s) == machines for one in [whole, *lossy]) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
