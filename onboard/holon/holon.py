@@ -219,19 +219,23 @@ class Holon:
         if self.journal.is_foreign:
             return []
         local_us = self.time.steady(local_us)
-        self.schedule.changed()
         if not self.clock.is_set:
+            self.schedule.changed()
             # Plans made before bus time is known would be told in a time of one's own.
             self._sensed_early[type(message)] = message
             return []
         now_us = self.clock.bus_us(local_us)
-        return self._settle(self._awake(now_us) + self.behaviour.sense(message, now_us), now_us)
+        effects = self._awake(now_us)
+        self.schedule.changed() if effects else self.schedule.acted()
+        return self._settle(effects + self.behaviour.sense(message, now_us), now_us)
 
     def wake(self, local_us: int) -> list[Effect]:
         """Do what has fallen due."""
         local_us = self.time.steady(local_us)
         if self.schedule.only_speaks(local_us):
             return self._speak(local_us)
+        if self.schedule.only_works(local_us):
+            return self._work(local_us)
         self.schedule.changed()
         # Who has slept counts nobody as silent, so that it does not take itself for the time source.
         effects = self._awake(self.clock.bus_us(local_us))
@@ -260,6 +264,14 @@ class Holon:
             return None
         due_us = self.schedule.due_us()
         return None if due_us is None else self.time.loop_us(due_us)
+
+    def _work(self, local_us: int) -> list[Effect]:
+        """Go on with the work, and say what is said at fixed times: nothing else is due."""
+        self.time.elect(local_us)
+        now_us = self.clock.bus_us(local_us)
+        self.presence.begins(now_us)
+        self.schedule.acted()
+        return self._settle(self.fixed.words(now_us), now_us)
 
     def _speak(self, local_us: int) -> list[Effect]:
         """Say what is said at fixed times; go on with the work only where somebody fell silent, or came back."""

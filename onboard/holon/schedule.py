@@ -7,7 +7,8 @@ next. ``sweeps`` keeps nothing: every event is followed by every part, so that a
 from dataclasses import dataclass, field
 from typing import ClassVar, get_args
 
-from onboard.contract.messages import BusTime, Heartbeat, Message
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import BusTime, Heartbeat, Message, SyncRequest
 from onboard.core.behaviour import Attentive, Behaviour, Fleet, OverheardWord
 from onboard.core.mirror import Peer
 from onboard.holon.fixed_times import FixedTimes
@@ -40,6 +41,9 @@ class Schedule:
     _due_us: int | None = None
     #: The same of all but what is said at fixed times.
     _work_due_us: int | None = None
+    #: When the first of all but the behaviour and the negotiation is due, and of which state of rights that is.
+    _rest_us: int | None = None
+    _rest_of: int | None = None
     #: From when on the behaviour is to see every event.
     _looks_from_us: int = 0
     #: Who said last what changes nothing, by node.
@@ -60,7 +64,13 @@ class Schedule:
 
     def changed(self) -> None:
         """Something happened here that any part may have to do with."""
-        self.is_known, self.is_asked, self.waits_until_us = False, False, 0
+        self.is_known, self.is_asked, self.waits_until_us, self._rest_of = False, False, 0, None
+
+    def acted(self) -> None:
+        """Only the behaviour has had anything to do: what is due in all else is due as before, if its rights are."""
+        rests = self._rest_of
+        self.changed()
+        self._rest_of = rests
 
     def slewed(self) -> None:
         """Bus time went on a little faster or slower: what is due stays due, at another time of my own clock."""
@@ -91,17 +101,34 @@ class Schedule:
             self.waits_until_us = min(due_us, self._looks_from_us)
 
     def _first_work_us(self) -> int | None:
+        if self._rest_of != self.fleet.tokens.changes:
+            self._rest_us, self._rest_of = self._first_of_rest_us(), self.fleet.tokens.changes
+        times = [self._rest_us]
+        if self.part.begins:
+            # In the negotiation nothing is due while bus time is lost: its deadlines mean nothing then. What the last
+            # wake found holds until the next time message.
+            times += (None if self.is_time_lost else self.fleet.negotiation.next_wake(), self.behaviour.next_wake())
+        return min([time for time in times if time is not None], default=None)
+
+    def _first_of_rest_us(self) -> int | None:
+        """The same of all but the behaviour, and the negotiation of which it is a part."""
         part, is_apart = self.part, self.part.holding.is_apart
         times = [part.holding.next_wake(), part.regeneration.next_wake(), part.presence.held_until_us]
         if not is_apart:
             times.append(part.witness.next_wake())
         if not (is_apart or part.regeneration.is_frozen):
             times += (self.fleet.tokens.next_wake(), self.rights.petition_due())
-        if part.begins:
-            # In the negotiation nothing is due while bus time is lost: its deadlines mean nothing then. What the last
-            # wake found holds until the next time message.
-            times += (None if self.is_time_lost else self.fleet.negotiation.next_wake(), self.behaviour.next_wake())
         return min([time for time in times if time is not None], default=None)
+
+    def only_works(self, local_us: int) -> bool:
+        """Whether nothing but the behaviour, or a word at fixed times, is due."""
+        if not self.is_known or self.sweeps or not self.part.begins:
+            return False
+        clock, now_us = self.part.time.clock, self.part.time.clock.bus_us(local_us)
+        others = (self._rest_us, None if self.is_time_lost else self.fleet.negotiation.next_wake())
+        if any(due_us is not None and due_us <= now_us for due_us in others):
+            return False
+        return clock.is_lost(local_us) is self.is_time_lost and not self.part.presence.slept(now_us)
 
     def only_speaks(self, local_us: int) -> bool:
         """Whether nothing but a word that is said at fixed times is due, and nobody looks for anything."""
@@ -152,8 +179,8 @@ class Schedule:
 
         None of an obstacle is: that it is heard may end that. What bus time changes it says itself (``slewed``).
         """
-        is_candidate = type(message) in _OVERHEARD and now_us < self.waits_until_us
-        if is_candidate and message.sender not in self.fleet.mirror.aside:
+        is_candidate = type(message) in _OVERHEARD or self._asks_another(message)
+        if is_candidate and now_us < self.waits_until_us and message.sender not in self.fleet.mirror.aside:
             return self.fleet.tokens.changes
         if type(message) is not BusTime:
             self.changed()
@@ -164,4 +191,10 @@ class Schedule:
         if before != self.fleet.tokens.changes or not self.is_known:
             return False
         attentive = self._attentive
-        return attentive is not None and isinstance(message, OverheardWord) and not attentive.heeds(message)
+        if attentive is None or self._asks_another(message):
+            return attentive is not None
+        return isinstance(message, OverheardWord) and not attentive.heeds(message)
+
+    def _asks_another(self, message: Message) -> bool:
+        """Whether somebody else is asked what it knows."""
+        return type(message) is SyncRequest and message.whom not in (NOBODY, self.fleet.node_id)

@@ -330,8 +330,8 @@ class ParkingRobot:
         return min([time for time in times if time is not None], default=None)
 
     def looks_from(self) -> int:
-        """It looks often while it starts, waits for a slot or rides, and for a drive that got stuck, or goes again."""
-        return self.going_around.looks_from() if self.starting.is_over else 0
+        """It looks often while it waits for a slot or rides, and for a drive that got stuck, or goes again."""
+        return self.going_around.looks_from()
 
     def heeds(self, message: OverheardWord) -> bool:
         """Where lifts are, and who has a station or a car; of slots it knows what it has, and waits for."""
