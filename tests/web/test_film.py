@@ -47,7 +47,7 @@ def test_a_log_of_another_format_shows_the_same(tmp_path: Path) -> None:
     assert onboard(["trace", "convert", str(log_of("small")), str(other_log)]) == 0
     with film_of("small") as film, film_of("small", other_log) as other:
         one, two = shown(film, film.last_us), shown(other, other.last_us)
-    assert one == two and one["figures"] == {"parked": 1, "fetched": 1, "calls": 6, "bids": 6}
+    assert one == two and one["figures"] == {"parked": 1, "fetched": 1, "calls": 2, "bids": 2}
 
 
 def test_the_load_shown_is_that_of_the_frames_to_the_bit() -> None:
