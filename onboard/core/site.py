@@ -52,6 +52,11 @@ class Station(NamedTuple):
         return f"p({self.track},{self.index}){'NF'[self.side]}"
 
 
+#: A sign of life that is given early comes so long after the last at the least, us: what a bus may be asked for stays
+#: bounded.
+BEATS_APART_US = 300_000
+
+
 @dataclass(frozen=True, slots=True)
 class Machine:
     """One machine of the site. ``home`` is where it stands at first, or before its ``station`` where it is fixed."""

@@ -9,6 +9,7 @@ from onboard.contract.messages import BusTime
 from onboard.core.behaviour import Fleet
 from onboard.core.bus_time import BUS_TIME_MODULUS
 from onboard.core.effects import Effect, Send
+from onboard.core.site import BEATS_APART_US
 from onboard.holon.drops import ToldDrops
 from onboard.holon.holds import Holds
 from onboard.holon.presence import Presence
@@ -16,8 +17,6 @@ from onboard.holon.timekeeper import Timekeeper
 
 #: Whoever changes what all believe tells its digest so long after, us: the words of one step go together.
 TELL_US = 100_000
-#: So long after its last sign of life at the least, us: what a bus may be asked for stays bounded.
-BEATS_APART_US = 300_000
 
 
 @dataclass

@@ -18,7 +18,7 @@ from onboard.core.site import Segment
 from onboard.holon import holon
 from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.robot import ParkingRobot
-from onboard.systems.car_park.site import car_park
+from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.ways.mirror import way_mirror
 from tests.system.scene import Scene, play, stays
 
@@ -29,7 +29,9 @@ CARS = ((0, 200), (60, 300), (120, None))
 _NEARLY = (1 << SEEN_VERSION_BITS) - 2
 
 
-def scene_with(*faults: str, before_start: Callable[[Controller], None] | None = None) -> Scene:
+def scene_with(
+    *faults: str, before_start: Callable[[Controller], None] | None = None, rides: RideCalls = RideCalls.PLANNED
+) -> Scene:
     injections = [parse_injection(fault) for fault in faults]
 
     def plant(simulation: Simulation) -> None:
@@ -37,7 +39,7 @@ def scene_with(*faults: str, before_start: Callable[[Controller], None] | None =
         if before_start is not None:
             simulation.before_start.append(before_start)
 
-    return play(find_site("small"), stays(*CARS), plant=plant, limit_s=900)
+    return play(replace(car_park(find_site("small")), rides=rides), stays(*CARS), plant=plant, limit_s=900)
 
 
 def assert_all_served(scene: Scene) -> None:
@@ -190,7 +192,7 @@ def test_an_initiator_lost_between_deadline_and_award_calls_anew_and_one_machine
 
 
 def test_an_outer_winner_lost_after_its_sub_award_leaves_the_lift_to_others() -> None:
-    scene = scene_with("crash:target=MR1,at_s=28,restart=no")
+    scene = scene_with("crash:target=MR1,at_s=28,restart=no", rides=RideCalls.BEFORE)
     assert_all_served(scene)
     sub_us, sub = scene.first(Award, lambda award: award.sender == FIRST and award.result is CallResult.AWARDED)
     assert sub_us < 28e6 and sub.winner == 5

@@ -110,7 +110,8 @@ def is_frozen(one: object) -> bool:
         return True
     if dataclasses.is_dataclass(one):
         return bool(getattr(type(one), "__dataclass_params__").frozen)  # noqa: B009  # not in the stubs
-    return isinstance(one, tuple | frozenset) or type(one).__name__ in ("method", "cell")
+    # A bare object has nothing in it: it is a mark.
+    return isinstance(one, tuple | frozenset) or type(one) is object or type(one).__name__ in ("method", "cell")
 
 
 def test_p19_machines_have_nothing_in_common_but_the_bus(whole: Scene) -> None:

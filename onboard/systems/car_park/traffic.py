@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from onboard.contract.codes import KindCode
-from onboard.core.site import Site
-from onboard.holon.fixed_times import BEATS_APART_US
+from onboard.core.site import BEATS_APART_US, Site
 from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.trace.frame_length import longest_frame_bits
 from onboard.trace.response import ANYBODY, Stream
