@@ -1,5 +1,6 @@
 """A robot that is started again while the others plan, bid and drive goes on from where it is, and wrongs nobody."""
 
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -108,6 +109,21 @@ def test_who_stands_face_to_face_turns_though_the_other_has_rights_behind_it() -
     crash = "crash:at_s=450.741843,target=MR3,restart_s=7.641,write=6,durable=no"
     report = played("standard", 4017, Arrivals(8, 15, 7.5, 200), crash, limit_s=3_600)
     assert report.verdict is RunVerdict.SERVED, report.why()
+
+
+def test_two_plans_that_cannot_change_where_they_meet_do_not_answer_each_other_without_end(tmp_path: Path) -> None:
+    """One was aboard a lift, the other about to go to it: each turned for slots of the other, told the same plan
+    again, and the bus was full of it for nine seconds; delay upon delay, one then planned for five hours later.
+
+    Two crashes a seed on `standard`, seed 5019.
+    """
+    first = "crash:at_s=67.514212,target=MR3,restart_s=18.479,write=3,durable=no"
+    second = "crash:at_s=232.339681,target=MR1,restart_s=3.692,frame=49"
+    log = tmp_path / "run.log"
+    report = played("standard", 5019, Arrivals(8, 15, 7.5, 200), first, second, limit_s=3_600, trace=log)
+    assert report.verdict is RunVerdict.SERVED, report.why()
+    seconds = Counter(line.partition(".")[0] for line in log.read_text().splitlines())
+    assert max(seconds.values()) < 400
 
 
 def test_a_winner_that_is_not_noted_yet_is_believed_when_all_are_asked() -> None:

@@ -17,6 +17,7 @@ from onboard.contract.codes import LegAction
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Stamp
 from onboard.core.authority import segment_token
+from onboard.core.site import Segment
 from onboard.systems.car_park.program import CarStep, Program
 from onboard.systems.car_park.standoff import Standoff
 from onboard.ways.kinematics import run_duration_us
@@ -54,7 +55,9 @@ class GivingWay:
         meetings = self._meetings(sender, now_us)
         unordered = [meeting for meeting in meetings if meeting.first is None and first == NOBODY]
         yields = self.fleet.mirror.order.who_yields(self.fleet.node_id, sender, unordered) if unordered else NOBODY
-        if any(self._has_to_turn(meeting, sender, yields) for meeting in unordered):
+        # One decision for all that they want at one time: by each slot's own both would turn, and again for that.
+        decisive = min(unordered, key=_begin, default=None)
+        if decisive is not None and self._has_to_turn(decisive, sender, yields):
             return YieldDecision.ANEW
         answer = self._come_behind([meeting for meeting in meetings if meeting.first == sender])
         if answer is YieldDecision.NOTHING and unordered and self._is_counted_on(sender):
@@ -126,6 +129,11 @@ class GivingWay:
                 self.program.delay(number, by_us)
                 answer = YieldDecision.LATER
         return answer
+
+
+def _begin(meeting: Meeting) -> tuple[int, Segment]:
+    """From when two machines want a segment both: the same for either."""
+    return max(meeting.mine.from_us, meeting.theirs.from_us), meeting.segment
 
 
 def _stands(turn: Turn) -> bool:

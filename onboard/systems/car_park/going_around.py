@@ -127,7 +127,7 @@ class GoingAround:
         """Another way; where there is none, stand without a plan until the other has gone: it plans around mine."""
         self._stands_since_us = None
         works = self.program.works()
-        kept, origin, start_us = self._turning((), now_us)
+        kept, origin, start_us = self.turning((), now_us)
         steps = self.generation.reroute(origin, start_us, self._ahead(works, kept), now_us)
         if steps is None:
             self.turn_later(now_us)
@@ -198,7 +198,7 @@ class GoingAround:
         works = [work for work in self.program.works() if work.call.task not in tasks]
         if self.shuttle.work is not None and self.shuttle.work.call.task in tasks:
             self.shuttle.drop()
-        kept, origin, start_us = self._turning(tasks, now_us)
+        kept, origin, start_us = self.turning(tasks, now_us)
         steps = self.generation.reroute(origin, start_us, self._ahead(works, kept), now_us)
         if steps is None or self._is_trapped(now_us):
             self.turn_later(now_us)
@@ -246,7 +246,7 @@ class GoingAround:
     def _choose_for(self, work: StationWork, now_us: int) -> list[Effect]:
         """Nothing where there is no other place, or no way there, now: it waits at its own then."""
         in_hand = self.program.step is not None and self.program.step.work == work
-        kept, origin, start_us = self._turning([work.call.task] if in_hand else (), now_us)
+        kept, origin, start_us = self.turning([work.call.task] if in_hand else (), now_us)
         works = self._ahead(self.program.works(), kept)
         for place in self.places.instead(work, now_us)[:MOST_PLACES] if work in works else ():
             moved = [one._replace(station=place) if one == work else one for one in works]
@@ -273,7 +273,7 @@ class GoingAround:
             self._retry_at_us = now_us + LOOK_US
             return []
         works = self.program.works()
-        kept, origin, start_us = self._turning((), now_us)
+        kept, origin, start_us = self.turning((), now_us)
         steps = self.generation.reroute(origin, start_us, self._ahead(works, kept), now_us)
         if steps is not None and not self._is_trapped(now_us):
             self._since_us = self._retry_at_us = None
@@ -289,7 +289,7 @@ class GoingAround:
     def _turn_away(self, other: int, now_us: int) -> list[Effect]:
         """Plan anew as if who stands face to face with me stood there for ever; without a way all stays as it is."""
         mirror, machine = self.fleet.mirror, self.fleet.site.machines[other]
-        kept, origin, start_us = self._turning((), now_us)
+        kept, origin, start_us = self.turning((), now_us)
         if kept or other in mirror.obstacles.machines:
             return []
         # Rights that it has beyond me it cannot use: it grants them to me, who goes first then.
@@ -309,7 +309,7 @@ class GoingAround:
         remaining = self.program.remaining
         return bool(remaining) and remaining[0].action is LegAction.RIDE and self._is_hindered(remaining[:1], now_us)
 
-    def _turning(self, tasks: Sequence[Reference], now_us: int) -> tuple[int, Segment, int]:
+    def turning(self, tasks: Sequence[Reference], now_us: int) -> tuple[int, Segment, int]:
         """As ``Program.turning``, but a run that stands at a mark before an obstacle, or work dropped, ends there."""
         remaining, here = self.program.remaining, self.carriage.standing_at
         if remaining and here is not None and lift_at(self.fleet.site, here) is None and self.carriage.target is None:

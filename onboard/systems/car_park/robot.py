@@ -217,7 +217,7 @@ class ParkingRobot:
 
     def _reroute(self, sender: int, now_us: int) -> list[Effect]:
         """Do the same work by another way; where there is none, come behind on the old one."""
-        kept, origin, start_us = self.program.turning(now_us)
+        kept, origin, start_us = self.going_around.turning((), now_us)
         works = [step.work for step in self.program.remaining[kept:] if step.work is not None]
         unplanned = self.program.unplanned
         steps = self.generation.reroute(origin, start_us, [*works, *unplanned], now_us)
@@ -226,7 +226,7 @@ class ParkingRobot:
         elif unplanned:
             # What finds no way now must not stand in the way of others either.
             steps = self.generation.reroute(origin, start_us, works, now_us)
-        if steps is None:
+        if steps is None or steps == tuple(self.program.remaining[kept:]):
             return self._publish(now_us) if self.giving_way.fall_back(sender, now_us) is YieldDecision.LATER else []
         self._begun = self._begun and bool(kept)
         stamp = self.giving_way.stamp_for(sender, now_us)
