@@ -114,7 +114,8 @@ def test_who_stands_face_to_face_turns_though_the_other_has_rights_behind_it() -
 def test_two_plans_that_cannot_change_where_they_meet_do_not_answer_each_other_without_end(tmp_path: Path) -> None:
     """One was aboard a lift, the other about to go to it: each turned for slots of the other, and told the same plan.
 
-    The bus was full for nine seconds; delay upon delay, one then planned for five hours later. Two crashes a seed on `standard`, seed 5019.
+    The bus was full for nine seconds; delay upon delay, one then planned for five hours later.
+    Two crashes a seed on `standard`, seed 5019.
     """
     first = "crash:at_s=67.514212,target=MR3,restart_s=18.479,write=3,durable=no"
     second = "crash:at_s=232.339681,target=MR1,restart_s=3.692,frame=49"
