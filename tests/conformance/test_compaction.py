@@ -69,7 +69,7 @@ def state(site: Site, node: int, entries: list[Entry]) -> object:
     machine = site.machines[node]
     holon = Holon(site, machine, factory_for(site, machine.kind), boot=9, entries=entries)
     holon.fleet.entries = ()
-    holon.tokens.changes = 0
+    holon.tokens.changes = holon.tokens.beliefs.changes = 0
     return plain([holon.tokens, holon.mirror, holon.behaviour, holon.presence], set())
 
 

@@ -56,7 +56,7 @@ def test_an_undisturbed_story_names_the_handling_the_way_and_the_lift() -> None:
         ("crash:target=MR1,at_s=30", 11, "started anew", 9),
         ("crash:target=MR1,at_s=30,restart=no", 11, "silent", 12),
         ("pause:target=MR1,at_s=40,for_s=30", 11, "silent", 12),
-        ("actuator_stuck:target=ER1,at_s=12,for_s=60", 5, "is not ready", 15),
+        ("actuator_stuck:target=ER1,at_s=12,for_s=60", 5, "is not ready", 14),
     ],
 )
 def test_a_planted_cause_is_found(fault: str, node: int, word: str, at_least_s: float) -> None:

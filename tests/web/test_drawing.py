@@ -40,7 +40,7 @@ def test_names_are_unique_at_every_size_and_times_are_the_sites_own(
     with served(words, tmp_path) as address:
         paused(browser, address)
         at(browser, 1000)
-        expect(browser.locator("#clock")).to_have_text("16:07:07")
+        expect(browser.locator("#clock")).to_have_text("16:07:08")
         for width in (1600, 1280, 900, 600, 390):
             browser.set_viewport_size({"width": width, "height": 800})
             names = [box["name"] for what in ("place", "machine") for box in drawn(browser, what).values()]

@@ -79,7 +79,7 @@ def test_a_live_bus_shows_what_its_frames_say_and_its_load() -> None:
         return source.snapshot(), str(refused.value)
 
     snapshot, refused = asyncio.run(play())
-    assert snapshot["figures"] == {"parked": 1, "fetched": 1, "calls": 6, "bids": 6}
+    assert snapshot["figures"] == {"parked": 1, "fetched": 1, "calls": 2, "bids": 2}
     assert snapshot["machines"][1]["doors"]["light"] in ("red", "green"), "its devices are on the same wires here"
     assert all(0 < load < 1 for _, load, *_ in snapshot["chart"])
     assert "not simulated" in refused

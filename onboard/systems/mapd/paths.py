@@ -20,8 +20,8 @@ class Path:
     cells: tuple[int, ...]
 
     def at(self, step: int) -> int:
-        """Cell at a step from ``start`` on."""
-        return self.cells[min(step - self.start, len(self.cells) - 1)]
+        """Cell at a step; before ``start`` the first, for a path that is heard may begin later."""
+        return self.cells[max(0, min(step - self.start, len(self.cells) - 1))]
 
     @property
     def end(self) -> int:
