@@ -312,7 +312,8 @@ class Lift:
                 self.ride = ride
                 return self.statements(now_us)
             case LiftDeed.LET_IN:
-                self.ride, self._gate_was_out = ride, False
+                # A grant of the gate may be under way still, of a boarding that its robot gave up.
+                self.ride, self._gate_was_out = ride, not self._holds_gate()
             case LiftDeed.ARRIVE:
                 self._gate_was_out = False
                 return self._stand()
