@@ -126,6 +126,16 @@ def test_two_plans_that_cannot_change_where_they_meet_do_not_answer_each_other_w
     assert max(seconds.values()) < 400
 
 
+def test_a_lift_goes_though_its_gate_was_granted_for_a_boarding_that_was_given_up() -> None:
+    """It took the robot aboard for one that had not come in yet, gave the gate back to it, and both waited.
+
+    Two crashes a seed on `standard`, seed 5081.
+    """
+    crash = "crash:at_s=46.577741,target=MR3,restart_s=1.093,write=4,durable=no"
+    report = played("standard", 5081, Arrivals(8, 15, 7.5, 200), crash, limit_s=3_600)
+    assert report.verdict is RunVerdict.SERVED, report.why()
+
+
 def test_a_winner_that_is_not_noted_yet_is_believed_when_all_are_asked() -> None:
     """The power failed between the award and its record; the task was called anew, and awarded to a second robot.
 
