@@ -1,10 +1,12 @@
 """The rules of the house hold in the sources, and each rule notices its breach."""
 
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from tests.project.sources import MAX_LINES, check_text, check_tree, text_files
+from tests.tools import DEADLINE_S
 
 ROOT = Path(__file__).parents[2]
 
@@ -62,3 +64,18 @@ def test_a_document_that_is_named_must_exist(tmp_path: Path) -> None:
     name = "docs/" + "nowhere.md"
     (tmp_path / "onboard" / "a.py").write_text(f'"""See {name}."""\n', encoding="utf-8")
     assert check_tree(tmp_path) == [f"onboard/a.py:1: {name} does not exist"]
+
+
+#: What stands at the top of the project: fixed by the customer, and what tools need.
+TOP = frozenset(
+    ".ci .gitignore CHANGELOG.md CONTRIBUTING.md LICENSE Makefile NOTICE README.md SECURITY.md THIRD_PARTY.md "
+    "bench bus_sim dbc deploy docs examples hil onboard pyproject.toml tests".split()
+)
+
+
+def test_nothing_that_a_run_left_behind_is_kept_at_the_top() -> None:
+    if not (ROOT / ".git").exists():
+        return  # unpacked from an archive: what lies here is what was kept, and what a run leaves besides
+    command = ["git", "-C", str(ROOT), "-c", f"safe.directory={ROOT}", "ls-files", "-z"]
+    kept = subprocess.run(command, check=True, capture_output=True, text=True, timeout=DEADLINE_S).stdout.split("\0")
+    assert sorted({name.split("/")[0] for name in kept if name} - TOP) == []
