@@ -321,19 +321,15 @@ class Compartment:
         """My journal is lost and my rights are new: whatever was meant with the car in my bay, it is parked."""
         self.stewardship.left, self.memory.car_class = None, bay_task.class_in(self.bay, self._park)
         self.memory.job = (left.car, Operation.PARK, left.car, left.wheelbase_mm)
-        return [
-            job_record(*self.memory.job, self.memory.car_class),
-            *self._take_up_job(now_us),
-            self.outputs.light_up(LightColour.RED),
-        ]
+        noted = job_record(*self.memory.job, self.memory.car_class)
+        return [noted, *self._take_up_job(now_us), self.outputs.light_up(LightColour.RED)]
 
     def _take_up_job(self, now_us: int) -> list[Effect]:
         """After a restart in the middle of a task: journal, tokens and sensors tell how far it has come."""
         assert self.memory.job is not None
         task, operation, car, wheelbase_mm = self.memory.job
-        of_task, version = self.stewardship.tasks.get(car, (task, 1))
-        winner = self.stewardship.winners.get(car, 0)
-        self.job = BayTask(task, operation, car, wheelbase_mm, winner, version if of_task == task else 1)
+        winner, version = self.stewardship.winner_of(car, task)
+        self.job = BayTask(task, operation, car, wheelbase_mm, winner, version)
         self.job.was_granted, self.job.car_class = self.memory.was_granted, self.memory.car_class
         if self.job.was_granted:
             self._go(BayPhase.SERVING)
@@ -371,9 +367,8 @@ class Compartment:
 
     def _admit(self, key: DeskInput, now_us: int) -> list[Effect]:
         """Steps 2 to 5: check the car, print the ticket, call, turn the light red and close the input door."""
-        assert self.bay is not None
         bay = self.bay
-        if not bay.load_kg or self._use is BayUse.EXIT:
+        if bay is None or not bay.load_kg or self._use is BayUse.EXIT:
             return []
         found = bay_task.admitted(bay, self._park, self.fleet.mirror, charging=key is DeskInput.CHARGING_KEY)
         if isinstance(found, DeskText):
@@ -450,9 +445,8 @@ class Compartment:
         text = DeskText.CAR_READY
         if job.is_given_back:
             job.wait(now_us)
-            text = (
-                text if job.car in self.tickets else bay_task.refusal_text(job.car_class, self._park, self.fleet.mirror)
-            )
+            if job.car not in self.tickets:
+                text = bay_task.refusal_text(job.car_class, self._park, self.fleet.mirror)
         return [*self.outputs.door(DoorName.INPUT, DoorAction.OPEN), self.outputs.show(text, job.car)]
 
     def _when_handover(self, now_us: int) -> list[Effect]:
