@@ -127,7 +127,7 @@ class Stewardship:
         return self.won(car, report.sender, task, version)
 
     def winner_of(self, car: Reference, task: Reference) -> tuple[int, int]:
-        """Who may fetch a car for ``task``, 0 for nobody, and the task's version: of a task before it nothing counts."""
+        """Who may fetch a car for ``task``, 0 for nobody, and its version; what was won for another does not count."""
         known, version = self.tasks.get(car, (task, 1))
         return (self.winners.get(car, NOBODY), version) if known == task else (NOBODY, 1)
 
