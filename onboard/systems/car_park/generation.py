@@ -244,9 +244,9 @@ class CarParkGeneration:
         horizon_us = max(self._deadline_us(call, now_us), now_us) + AWARD_LATENCY_US + HEARD_US
         held = self.clearance.held_back(stamp, horizon_us, now_us)
         while held:
-            taken = self.clearance.without_retreats(held, now_us)
+            taken, plans = self.clearance.without_retreats(held, now_us), [self.mirror.plans[node] for node in held]
             found, tried = yield from self._search(call, now_us, start, taken)
-            if any(self.mirror.plans.get(node) is not one.plan for node, one in held.items()):
+            if any(self.mirror.plans.get(node) is not plan for node, plan in zip(held, plans, strict=True)):
                 # Others have planned anew while this was searched.
                 return None
             if found is None or (best is not None and best.finish_us - found.finish_us < WORTH_US):
