@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from onboard.contract.constants import NOBODY
 from onboard.contract.codes import Reason
+from onboard.contract.constants import NOBODY
 from onboard.contract.messages import (
     Award,
     Bid,
@@ -34,6 +34,18 @@ from onboard.ways.mirror import WayFleet, WayMirror
 from tests.models.snapshot import NOW_US
 
 Entry = Mapping[str, str | int]
+#: By these nothing is decided: counts, what never changes, what is the same under another name.
+_NAMES = """
+    site _park machine factory timing prepare entries counters drops claimants event changes gifts awards_sent number
+    is_obstacle is_sound delay slot policy silent alternatives searched rights
+"""
+#: By these nothing is decided here: ways and their times, and when within a while something is said again.
+_WAYS = """
+    reservations plans replaced order standing giving_way carriage clearance blocked_words _robots outputs stall backoff
+    _stood places standoff _said_us _prune_at_us _tokens_seen _seen _heard _places_seen
+"""
+#: Attributes of machines that an exploration does not compare.
+LEFT_OUT = frozenset((_NAMES + _WAYS).split())
 #: Rounds in which a machine comes to rest after an event.
 _MOST_ROUNDS = 40
 
@@ -166,7 +178,7 @@ class AtWork:
         mirror = self.fleet.mirror
         mirror.hear(word, NOW_US)
         handler = self.rights.handlers().get(type(word)) or mirror.handlers().get(type(word))
-        effects = handler(word, NOW_US) if handler is not None else []
+        effects: list[Effect] = handler(word, NOW_US) if handler is not None else []
         if isinstance(word, CallForProposals | Bid | Award | TaskReport | LeftOut | Itinerary):
             is_early = isinstance(word, CallForProposals) and not self.takes_part
             effects += [] if is_early else self._negotiated(self.fleet.negotiation.receive(word, NOW_US))

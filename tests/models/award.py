@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 from onboard.contract.codes import Operation
 from onboard.contract.messages import Bid, CarAt, Itinerary, Message, Progress, Reference, Waiting
 from onboard.core.records import BootRecord, TokenHeldRecord
-from onboard.systems.car_park.bay_memory import car_record, job_record
+from onboard.systems.car_park.bay_memory import car_record, job_record, winner_record
 from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.compartment_factory import CompartmentFactory
 from onboard.systems.car_park.records import NumberRecord
 from onboard.ways.tokens import car_token
-from tests.models.at_work import AtWork, Entry
+from tests.models.at_work import LEFT_OUT, AtWork, Entry
 from tests.models.bays import BayBody, DoorsState
 from tests.models.robots import PricedFactory, RobotBody, RobotState, stand_still
 from tests.sites import one_floor
@@ -24,15 +24,6 @@ SITE = one_floor(2)
 BAY, CHEAP, DEAR = 1, 11, 12
 CAR, TASK, WHEELBASE_MM = Reference(BAY, 1), Reference(BAY, 7), 2_600
 PLACE, KEY = SITE.places[0], car_token(*CAR)
-#: What no machine decides anything by, or nothing here: counts, ways and their times.
-LEFT_OUT = frozenset(
-    (
-        "site _park machine factory timing prepare entries counters drops claimants reservations plans replaced order "
-        "standing giving_way carriage clearance blocked_words _robots outputs stall _said_us changes backoff "
-        "alternatives _stood searched is_obstacle is_sound delay slot policy number silent rights places standoff "
-        "event _prune_at_us _tokens_seen _seen _heard _places_seen gifts claimants _made _rides_with_me"
-    ).split()
-)
 
 
 def is_said(word: Message) -> bool:
@@ -41,7 +32,7 @@ def is_said(word: Message) -> bool:
 
 
 class View(NamedTuple):
-    """Of one machine: whether it holds the car, has the task in hand, and, of the compartment, whom it takes for that."""
+    """Of one machine: whether it holds the car, has the task in hand, and, whom the compartment takes for that."""
 
     holds: bool
     in_hand: bool
@@ -68,6 +59,8 @@ class AwardPart:
             boot,
             TokenHeldRecord(KEY.kind, KEY.number, 1, BAY).entry,
             car_record(stands).entry,
+            # Who brought it, by an award that was said again.
+            winner_record(CAR, CHEAP, CAR, 1).entry,
             NumberRecord(TASK.number).entry,
             job_record(TASK, Operation.RETRIEVE, CAR, WHEELBASE_MM).entry,
         )

@@ -1,7 +1,7 @@
 """Every interleaving of a few shipped machines on the worst of buses, with crashes between any two effects.
 
 What was said may be heard by any machine at any later time, in any order, often or never. Looked for: what must never
-be (``Part.wrong``), and traps: states from which the goal is not reached although all live and nothing is lost any more.
+be (``Part.wrong``), and traps: states from which the goal is not reached though all live and nothing is lost any more.
 
 What a machine does about an event is done in order; it crashes before any of it, or hears its next word behind all of
 it: for words that come as late as they like, nothing in between differs from this. What a machine makes of an event is
@@ -16,11 +16,9 @@ from typing import Any, NamedTuple, Protocol
 
 from onboard.contract.messages import CallForProposals, Message
 from tests.models.at_work import AtWork, Deed, Entry, Moved
-from tests.models.snapshot import copied, essence
+from tests.models.snapshot import WHILE_US, copied, essence
 from tests.models.table import Table
 
-#: While this passes everything that waits falls due, us: no machine repeats itself more slowly.
-WHILE_US = 10_000_000
 #: Whiles in which all must have come to its end once nothing fails any more.
 PATIENCE = 16
 
@@ -222,13 +220,10 @@ class Engine:
         known = self._hearings.get((i, mind, bus))
         if known is None:
             known = []
-            bits, word = bus, 0
-            while bits:
-                if bits & 1:
-                    after, deeds = self._does(i, mind, word)
-                    if (after != mind or deeds) and self._within[after]:
-                        known.append((word, after, deeds))
-                bits, word = bits >> 1, word + 1
+            for word in _ones(bus):
+                after, deeds = self._does(i, mind, word)
+                if (after != mind or deeds) and self._within[after]:
+                    known.append((word, after, deeds))
             self._hearings[i, mind, bus] = known
         return known
 
@@ -261,7 +256,7 @@ class Engine:
         if whole != state:
             yield whole, ("waits", -1, down, -1)
         if state.crashes < self.limits.crashes:
-            for i, after, deeds in done:
+            for i, _, deeds in done:
                 rest = base
                 for j, other, more in done:
                     if j != i:
@@ -313,13 +308,10 @@ class Engine:
                 return state
             for i, bits in enumerate(new):
                 heard[i] |= bits
-                word = 0
-                while bits:
+                for word in _ones(bits):
                     mind = state.minds[i]
-                    if bits & 1:
-                        assert mind is not None
-                        state = self._all_done(state, i, *self._does(i, mind, word))
-                    bits, word = bits >> 1, word + 1
+                    assert mind is not None
+                    state = self._all_done(state, i, *self._does(i, mind, word))
 
     # --- the search ----------------------------------------------------------------------------------------------
 
@@ -349,12 +341,14 @@ class Engine:
         seen, waiting = {state}, deque([state])
         wrong, remembers, limits = self.part.wrong, self.limits.remembers, self.limits
         judged: dict[tuple[int | None, ...], str] = {}
-        began_s = time.process_time()
+        began_s, taken = time.process_time(), 0
         while waiting and not found.why and len(seen) < limits.most_states:
             state = waiting.popleft()
             if not self.ends_well(state):
                 found.trap, found.why = state, "a trap"
                 break
+            if self.part.is_over(self._seen(state)):
+                continue
             for after, step in self.steps(state):
                 found.transitions += 1
                 if after in seen:
@@ -369,7 +363,8 @@ class Engine:
                     found.wrong, found.why = after, why
                     break
                 waiting.append(after)
-            if time.process_time() - began_s > limits.most_s:
+            taken += 1
+            if not taken % 64 and time.process_time() - began_s > limits.most_s:
                 break
         found.states, found.is_complete = len(seen), not waiting and not found.why
         found.spent_s = time.process_time() - began_s
@@ -396,6 +391,15 @@ class Engine:
         if what == "hears":
             text += f" {self._words.things[about]}"
         return text if most < 0 else f"{text}, and crashes after {most} of its deeds"
+
+
+def _ones(bits: int) -> Iterator[int]:
+    """The places of the bits that are set, from 0."""
+    place = 0
+    while bits:
+        if bits & 1:
+            yield place
+        bits, place = bits >> 1, place + 1
 
 
 def _set(values: tuple[Any, ...], at: int, value: Any) -> tuple[Any, ...]:

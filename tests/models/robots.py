@@ -28,7 +28,8 @@ _BEGIN_US = NOW_US + (1 << 32) * 1000
 _END_US = _BEGIN_US + 3_600_000_000
 #: What a bid is above the deadline of its call, ms: nobody's floor is above that.
 _PRICE_MS = 600_000
-_CAR_KG = 1_500
+#: What a car weighs, kg.
+CAR_KG = 1_500
 
 
 class RobotState(NamedTuple):
@@ -75,7 +76,7 @@ class RobotBody(Body):
         if not self.is_quick:
             return []
         mode = ShuttleMode.HOME if order.action is ShuttleAction.RETRACT else ShuttleMode.REACHED
-        load_kg = {ShuttleAction.GRIP: _CAR_KG, ShuttleAction.RELEASE: 0}.get(order.action, self.now.load_kg)
+        load_kg = {ShuttleAction.GRIP: CAR_KG, ShuttleAction.RELEASE: 0}.get(order.action, self.now.load_kg)
         self.now = self.now._replace(sequence=order.sequence, mode=mode, load_kg=load_kg)
         return [self._shuttle()]
 

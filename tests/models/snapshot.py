@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
-from types import BuiltinFunctionType, CellType, FunctionType, MethodType, ModuleType
+from types import CellType, FunctionType, MethodType
 from typing import Any
 
 from onboard.contract.base import Message
@@ -18,17 +18,24 @@ from onboard.core.site import Machine, Site, Timing
 
 #: Bus time of all that is explored, us: no number of another kind is within a half of it.
 NOW_US = 1 << 40
+#: While this passes everything that waits falls due, us: no machine repeats itself more slowly.
+WHILE_US = 10_000_000
+_WHILES = "whiles from now"
 _LEAST_US, _MOST_US = NOW_US // 2, 2 * NOW_US
 #: Older than this nothing becomes, us: no machine here waits for longer since something happened (``LOST_AFTER_US``).
 OLDEST_US = 20_000_000
 
-_ATOMS = (int, str, bytes, float, bool, type(None), type, frozenset, BuiltinFunctionType, ModuleType)
 #: The same for all copies: nobody changes them.
 _SHARED = (Site, Machine, Timing, Message, Enum)
 
 
 def _is_time(value: int) -> bool:
     return _LEAST_US < value < _MOST_US
+
+
+def _is_shared(kind: type) -> bool:
+    """Whether nobody changes things of a class, or it is no part of a machine: copies have them in common."""
+    return issubclass(kind, _SHARED) or not (kind in _COPIES or kind.__module__.startswith(_COPIED))
 
 
 @dataclass
@@ -40,32 +47,43 @@ class _Copier:
 
     def copy(self, thing: Any) -> Any:
         kind = type(thing)
+        how = _HOW_COPIED.get(kind, _UNKNOWN)
+        if how is _UNKNOWN:
+            how = _HOW_COPIED[kind] = None if _is_shared(kind) else _COPIES.get(kind, _Copier._instance)
+        if how is None:
+            return thing
         if kind is int:
             return max(thing - self.by_us, NOW_US - OLDEST_US) if self.by_us and _is_time(thing) else thing
-        if kind in _ATOM_SET or isinstance(thing, _SHARED):
-            return thing
         found = self.known.get(id(thing))
-        if found is not None:
-            return found
-        made = _BY_KIND.get(kind, _Copier._instance)(self, thing)
-        # The original is kept as long as its number stands for it.
-        self.known[id(thing)] = made
-        return made
+        if found is None:
+            # The original is kept as long as its number stands for it.
+            found = self.known[id(thing)] = how(self, thing)
+        return found
+
+    def _same(self, thing: Any) -> Any:
+        return thing
 
     def _tuple(self, thing: Any) -> Any:
-        return tuple([self.copy(one) for one in thing])
+        copy, kind = self.copy, type(thing)
+        made = [copy(one) for one in thing]
+        for one, other in zip(made, thing, strict=True):
+            if one is not other:
+                return tuple(made) if kind is tuple else tuple.__new__(kind, made)
+        return thing
 
     def _list(self, thing: Any) -> Any:
         made: list[Any] = []
         self.known[id(thing)] = made
-        made.extend([self.copy(one) for one in thing])
+        copy = self.copy
+        made.extend([copy(one) for one in thing])
         return made
 
     def _dict(self, thing: Any) -> Any:
         made = type(thing)()
         self.known[id(thing)] = made
+        copy = self.copy
         for key, value in thing.items():
-            made[self.copy(key)] = self.copy(value)
+            made[copy(key)] = copy(value)
         return made
 
     def _set(self, thing: Any) -> Any:
@@ -90,27 +108,26 @@ class _Copier:
         return partial(self.copy(thing.func), *[self.copy(one) for one in thing.args], **keywords)
 
     def _instance(self, thing: Any) -> Any:
-        kind = type(thing)
+        kind, copy = type(thing), self.copy
         if issubclass(kind, tuple):
-            return tuple.__new__(kind, [self.copy(one) for one in thing])
-        if not kind.__module__.startswith(_COPIED):
-            return thing
+            return self._tuple(thing)
         made = object.__new__(kind)
         self.known[id(thing)] = made
         for name in _slots(kind):
             if hasattr(thing, name):
-                object.__setattr__(made, name, self.copy(getattr(thing, name)))
-        own = getattr(thing, "__dict__", None)
-        if own is not None:
+                object.__setattr__(made, name, copy(getattr(thing, name)))
+        if hasattr(thing, "__dict__"):
             new = made.__dict__
-            for name, value in own.items():
-                new[name] = self.copy(value)
+            for name, value in thing.__dict__.items():
+                new[name] = copy(value)
         return made
 
 
-_ATOM_SET = frozenset(_ATOMS)
+_UNKNOWN = _Copier._same
+#: Classes of this project are copied; all else that is not below has no state of a machine.
 _COPIED = ("onboard.", "tests.")
-_BY_KIND: dict[type, Callable[[_Copier, Any], Any]] = {
+_COPIES: dict[type, Callable[[_Copier, Any], Any]] = {
+    int: _Copier._same,
     tuple: _Copier._tuple,
     list: _Copier._list,
     dict: _Copier._dict,
@@ -121,10 +138,18 @@ _BY_KIND: dict[type, Callable[[_Copier, Any], Any]] = {
     FunctionType: _Copier._function,
     partial: _Copier._partial,
 }
+_HOW_COPIED: dict[type, Callable[[_Copier, Any], Any] | None] = {}
 
 
-def _slots(kind: type) -> list[str]:
-    return [name for one in kind.__mro__ for name in getattr(one, "__slots__", ()) if not name.startswith("__")]
+_SLOTS: dict[type, tuple[str, ...]] = {}
+
+
+def _slots(kind: type) -> tuple[str, ...]:
+    found = _SLOTS.get(kind)
+    if found is None:
+        names = [name for one in kind.__mro__ for name in getattr(one, "__slots__", ())]
+        found = _SLOTS[kind] = tuple(name for name in names if not name.startswith("__"))
+    return found
 
 
 def copied(machine: Any, by_us: int = 0) -> Any:
@@ -137,6 +162,24 @@ def essence(thing: Any, left_out: frozenset[str]) -> Any:
     return _Essence(left_out).of(thing)
 
 
+_VALUES = (Message, Enum, str, bytes, int, float, bool, type(None), frozenset)
+_NOTHING = (Site, Machine, Timing, type)
+
+
+def _how_compared(kind: type) -> str:
+    if kind is int or issubclass(kind, tuple):
+        return "int" if kind is int else "row"
+    if issubclass(kind, _VALUES):
+        return "value"
+    if issubclass(kind, _NOTHING):
+        return "nothing"
+    names: dict[type, str] = {list: "list", deque: "list", dict: "dict", Counter: "dict", set: "set"}
+    return names.get(kind, "instance" if kind.__module__.startswith(_COPIED) else "nothing")
+
+
+_HOW_COMPARED: dict[type, str] = {}
+
+
 @dataclass
 class _Essence:
     left_out: frozenset[str]
@@ -145,22 +188,28 @@ class _Essence:
 
     def of(self, thing: Any) -> Any:
         kind = type(thing)
-        if kind in _ATOM_SET or isinstance(thing, (Message, Enum)):
+        how = _HOW_COMPARED.get(kind)
+        if how is None:
+            how = _HOW_COMPARED[kind] = _how_compared(kind)
+        if how == "value":
             return thing
-        if issubclass(kind, tuple):
-            return tuple([self.of(one) for one in thing])
-        if isinstance(thing, (Site, Machine, Timing)) or id(thing) in self.met:
+        if how == "int":
+            # All that is due within a while is due when it has passed.
+            return (_WHILES, -(-(thing - NOW_US) // WHILE_US)) if _is_time(thing) else thing
+        of = self.of
+        if how == "row":
+            return tuple([of(one) for one in thing])
+        if how == "nothing" or id(thing) in self.met:
             return None
         self.met.add(id(thing))
-        if kind in (list, deque):
-            return tuple([self.of(one) for one in thing])
-        if kind in (dict, Counter):
-            return frozenset([(self.of(key), self.of(value)) for key, value in thing.items()])
-        if kind is set:
-            return frozenset([self.of(one) for one in thing])
-        if not kind.__module__.startswith(_COPIED):
-            return None
-        own, left_out = getattr(thing, "__dict__", {}), self.left_out
-        values = [(name, self.of(value)) for name, value in own.items() if name not in left_out]
-        values += [(name, self.of(getattr(thing, name))) for name in _slots(kind) if name not in left_out]
+        if how == "list":
+            return tuple([of(one) for one in thing])
+        if how == "dict":
+            return frozenset([(of(key), of(value)) for key, value in thing.items()])
+        if how == "set":
+            return frozenset([of(one) for one in thing])
+        left_out, slots = self.left_out, _slots(kind)
+        values = [(name, of(getattr(thing, name))) for name in slots if name not in left_out] if slots else []
+        if hasattr(thing, "__dict__"):
+            values += [(name, of(value)) for name, value in thing.__dict__.items() if name not in left_out]
         return tuple(values)
