@@ -30,8 +30,18 @@ class BayBody(Body):
 
     def start(self) -> list[Message]:
         """Doors and bay are told."""
-        small = (4_500, 1_500, 2_700) if self.load_kg else (0, 0, 0)
-        return [self._doors(), BayState(self.node, self.load_kg, *small, False, False)]
+        length_mm, height_mm, wheelbase_mm = (4_500, 1_500, 2_700) if self.load_kg else (0, 0, 0)
+        bay = BayState(
+            self.node,
+            load_kg=self.load_kg,
+            length_mm=length_mm,
+            height_mm=height_mm,
+            width_mm=1_800 if self.load_kg else 0,
+            wheelbase_mm=wheelbase_mm,
+            person_inside=False,
+            carrier_in_front=False,
+        )
+        return [self._doors(), bay]
 
     def _doors(self) -> DoorState:
         return DoorState(self.node, self.now.input_door, self.now.output_door, LightColour.RED)
