@@ -1,21 +1,57 @@
-"""Every interleaving of the shipped token book and witness: ``python -m tests.models.explore --help``."""
+"""Every interleaving of shipped code: ``python -m tests.models.explore --help``."""
 
 import argparse
+from collections.abc import Callable
 
+from tests.models import engine
+from tests.models.award import AwardPart
+from tests.models.custody import CustodyPart
 from tests.models.explorer import Explorer, Limits
+
+#: What is explored by the engine, by name: made from how many machines and calls.
+PARTS: dict[str, Callable[[int, int], engine.Part]] = {
+    "award": lambda machines, calls: AwardPart(calls, nodes=AwardPart.nodes[:machines]),
+    "taking": lambda machines, calls: CustodyPart(calls, nodes=AwardPart.nodes[:machines], laden=False),
+    "leaving": lambda machines, calls: CustodyPart(calls, nodes=AwardPart.nodes[:machines]),
+}
 
 
 def main() -> None:
     """Explore as the command line says."""
-    parser = argparse.ArgumentParser(description="Every interleaving of the shipped token book and witness.")
-    parser.add_argument("--nodes", type=int, default=3)
-    parser.add_argument("--versions", type=int, default=2)
+    parser = argparse.ArgumentParser(description="Every interleaving of shipped code.")
+    parser.add_argument("part", nargs="?", default="tokens", choices=["tokens", *PARTS])
     parser.add_argument("--crashes", type=int, default=1)
-    parser.add_argument("--old-copies", type=int, default=0, help="starts from an old copy of a journal")
-    parser.add_argument("--ghost", action="store_true", help="a node that the site does not have says what it likes")
     parser.add_argument("--most-s", type=float, default=600.0, help="CPU seconds after which it ends")
+    parser.add_argument("--nodes", type=int, default=3, help="of the book of rights, or of the part")
+    parser.add_argument("--versions", type=int, default=2, help="tokens: the newest that is explored")
+    parser.add_argument("--old-copies", type=int, default=0, help="tokens: starts from an old copy of a journal")
+    parser.add_argument("--ghost", action="store_true", help="tokens: a node that the site does not have speaks")
+    parser.add_argument("--calls", type=int, default=2, help="award, taking, leaving: most calls in one life")
     options = parser.parse_args()
-    limits = Limits(options.nodes, options.versions, options.crashes, options.old_copies, options.ghost, options.most_s)
+    if options.part != "tokens":
+        limits = engine.Limits(options.crashes, most_s=options.most_s)
+        explore_part(PARTS[options.part](options.nodes, options.calls), limits)
+        return
+    explore_tokens(
+        Limits(options.nodes, options.versions, options.crashes, options.old_copies, options.ghost, options.most_s)
+    )
+
+
+def explore_part(part: engine.Part, limits: engine.Limits) -> None:
+    """Explore one part, and tell the shortest way to what is wrong."""
+    explorer = engine.Engine(part, limits)
+    found = explorer.run()
+    print(
+        f"{limits}: {found.states:,} states, {found.transitions:,} transitions, {found.runs:,} runs of shipped code, "
+        f"{found.spent_s:.1f} s, {'complete' if found.is_complete else 'not complete'}: {found.why or 'nothing wrong'}"
+    )
+    state = found.wrong or found.trap
+    if state is not None:
+        print(explorer.told(state))
+
+
+def explore_tokens(limits: Limits) -> None:
+    """Explore the book of rights and its witness."""
     explorer = Explorer(limits)
     found = explorer.run()
     print(

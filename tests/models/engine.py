@@ -1,0 +1,406 @@
+"""Every interleaving of a few shipped machines on the worst of buses, with crashes between any two effects.
+
+What was said may be heard by any machine at any later time, in any order, often or never. Looked for: what must never
+be (``Part.wrong``), and traps: states from which the goal is not reached though all live and nothing is lost any more.
+
+What a machine does about an event is done in order; it crashes before any of it, or hears its next word behind all of
+it: for words that come as late as they like, nothing in between differs from this. What a machine makes of an event is
+worked out once, in its shipped code, and remembered by what decides it (``snapshot.essence``).
+"""
+
+import time
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol
+
+from onboard.contract.messages import CallForProposals, Message
+from tests.models.at_work import AtWork, Deed, Entry, Moved
+from tests.models.snapshot import WHILE_US, copied, essence
+from tests.models.table import Table
+
+#: Whiles in which all must have come to its end once nothing fails any more.
+PATIENCE = 16
+
+
+class Lasting(NamedTuple):
+    """What outlives a controller: its journal's entries and its body's state."""
+
+    journal: tuple[tuple[tuple[str, str | int], ...], ...]
+    body: Any
+
+
+class State(NamedTuple):
+    """Of each machine what decides what it does (None while it is down) and what outlives it; and the bus.
+
+    All but the count are numbers of things in the engine's tables; ``bus`` has a bit for each word said.
+    """
+
+    minds: tuple[int | None, ...]
+    lasting: tuple[int, ...]
+    bus: int
+    crashes: int
+
+
+class Part(Protocol):
+    """What is explored: which machines, how they begin, what must not be, and what is to come about."""
+
+    nodes: tuple[int, ...]
+    #: Attributes of machines that decide nothing here.
+    left_out: frozenset[str]
+    #: Whiles that pass without any fault before the exploration begins.
+    prelude: int
+
+    def journal(self, node: int) -> tuple[Entry, ...]:
+        """What is in a machine's journal at first."""
+
+    def body(self, node: int) -> Any:
+        """How its body stands at first."""
+
+    def made(self, node: int, journal: tuple[Entry, ...], body: Any) -> AtWork:
+        """The machine, at power-up."""
+
+    def hears(self, node: int, word: Message) -> bool:
+        """Whether a word is anything to a machine: what it is deaf to is lost for it."""
+
+    def is_within(self, machine: AtWork) -> bool:
+        """Whether what comes after is explored still: where numbers only grow, it ends somewhere."""
+
+    def view(self, machine: AtWork) -> Any:
+        """What ``wrong`` and ``is_over`` look at of one machine that is up."""
+
+    def wrong(self, views: tuple[Any, ...]) -> str:
+        """What must never be, in words; None stands for a machine that is down."""
+
+    def is_over(self, views: tuple[Any, ...]) -> bool:
+        """Whether the goal is reached."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much is explored: crashes, states, CPU s; whether to remember how each state was come to."""
+
+    crashes: int = 1
+    most_states: int = 1 << 62
+    most_s: float = 1e9
+    remembers: bool = True
+
+
+@dataclass
+class Found:
+    """What an exploration found: how often it stepped, and the first state of each kind that must not be."""
+
+    states: int = 0
+    transitions: int = 0
+    is_complete: bool = False
+    spent_s: float = 0.0
+    why: str = ""
+    wrong: State | None = None
+    trap: State | None = None
+    #: How often shipped code was run; all else was remembered.
+    runs: int = 0
+
+
+#: How a state was come to: who did what, and how many effects of it were carried out (-1 for all).
+Step = tuple[str, int, Any, int]
+
+
+@dataclass
+class Engine:
+    """Breadth first, every reachable state once: what is found has the shortest way to it."""
+
+    part: Part
+    limits: Limits
+    found: Found = field(default_factory=Found)
+    came_from: dict[State, tuple[State, Step]] = field(default_factory=dict)
+    _minds: Table[Any] = field(default_factory=Table)
+    _machines: list[AtWork] = field(default_factory=list)
+    _views: list[Any] = field(default_factory=list)
+    _within: list[bool] = field(default_factory=list)
+    _words: Table[Message] = field(default_factory=Table)
+    _deeds: Table[tuple[Deed, ...]] = field(default_factory=Table)
+    _lasting: Table[Lasting] = field(default_factory=Table)
+    _done: dict[tuple[int, int, Any], tuple[int, int]] = field(default_factory=dict)
+    _hearings: dict[tuple[int, int, int], list[tuple[int, int, int]]] = field(default_factory=dict)
+    _after: dict[tuple[int, int, int], tuple[int, int]] = field(default_factory=dict)
+    _started: dict[tuple[int, int], tuple[int, int]] = field(default_factory=dict)
+    _ends_well: dict[Any, bool] = field(default_factory=dict)
+    _fresh: int = 0
+    #: The words that each machine hears at all, as bits of the bus.
+    _heeded: list[int] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.nodes = self.part.nodes
+        self._heeded = [0] * len(self.nodes)
+        assert self._deeds.number(()) == 0, "nothing to do is number 0"
+
+    # --- one machine ---------------------------------------------------------------------------------------------
+
+    def _mind(self, i: int, machine: AtWork) -> int:
+        number = self._minds.number((i, essence(machine, self.part.left_out)))
+        if number == len(self._machines):
+            self._machines.append(machine)
+            self._views.append(self.part.view(machine))
+            self._within.append(self.part.is_within(machine))
+        return number
+
+    def _does(self, i: int, mind: int, event: Any) -> tuple[int, int]:
+        """What machine i makes of an event: a word by number, or who is down while a while passes."""
+        known = self._done.get((i, mind, event))
+        if known is None:
+            self.found.runs += 1
+            if isinstance(event, int):
+                machine = copied(self._machines[mind])
+                deeds = machine.hears(self._words.things[event])
+            else:
+                machine = copied(self._machines[mind], WHILE_US)
+                deeds = machine.waits(event)
+            known = self._mind(i, machine), self._deeds.number(tuple(deeds))
+            self._done[i, mind, event] = known
+        return known
+
+    def starts(self, i: int, lasting: int) -> tuple[int, int]:
+        """Machine i at power-up, and its first deeds."""
+        known = self._started.get((i, lasting))
+        if known is None:
+            self.found.runs += 1
+            kept = self._lasting.things[lasting]
+            machine = self.part.made(self.nodes[i], tuple(dict(line) for line in kept.journal), kept.body)
+            deeds = machine.starts()
+            known = self._started[i, lasting] = self._mind(i, machine), self._deeds.number(tuple(deeds))
+        return known
+
+    def _carried_out(self, lasting: int, deeds: int, most: int) -> tuple[int, int]:
+        """What lasts, and what is on the bus, after the first so many deeds."""
+        known = self._after.get((lasting, deeds, most))
+        if known is None:
+            (journal, body), said = self._lasting.things[lasting], 0
+            for deed in self._deeds.things[deeds][:most]:
+                match deed:
+                    case Message():
+                        said |= 1 << self._word(deed)
+                    case Moved(state=state):
+                        body = state
+                    case _:
+                        journal = (*journal, deed)
+            known = self._after[lasting, deeds, most] = self._lasting.number(Lasting(journal, body)), said
+        return known
+
+    def _word(self, word: Message) -> int:
+        known = len(self._words.things)
+        number = self._words.number(word)
+        if number == known:
+            for i, node in enumerate(self.nodes):
+                self._heeded[i] |= (node != word.sender and self.part.hears(node, word)) << number
+        if isinstance(word, CallForProposals):
+            # Too late for who hears it after a while.
+            self._fresh |= 1 << number
+        return number
+
+    # --- all of them ---------------------------------------------------------------------------------------------
+
+    def steps(self, state: State) -> Iterator[tuple[State, Step]]:
+        """All states that may come next, and how."""
+        minds, lasting, bus, crashes = state
+        may_crash = crashes < self.limits.crashes
+        for i, mind in enumerate(minds):
+            if mind is None:
+                after, deeds = self.starts(i, lasting[i])
+                yield from self._outcomes(state, i, after, deeds, ("starts", i, None, -1))
+                continue
+            if may_crash:
+                yield State(_set(minds, i, None), lasting, bus, crashes + 1), ("crashes", i, None, -1)
+            for word, after, deeds in self._heard(i, mind, bus):
+                yield from self._outcomes(state, i, after, deeds, ("hears", i, word, -1))
+        yield from self._while(state)
+
+    def _heard(self, i: int, mind: int, bus: int) -> list[tuple[int, int, int]]:
+        """Each word on the bus by which anything changes with machine i: the word, its mind after it and its deeds."""
+        bus &= self._heeded[i]
+        known = self._hearings.get((i, mind, bus))
+        if known is None:
+            known = []
+            for word in _ones(bus):
+                after, deeds = self._does(i, mind, word)
+                if (after != mind or deeds) and self._within[after]:
+                    known.append((word, after, deeds))
+            self._hearings[i, mind, bus] = known
+        return known
+
+    def _outcomes(self, state: State, i: int, after: int, deeds: int, step: Step) -> Iterator[tuple[State, Step]]:
+        """All deeds are done, or the machine crashes after some of them."""
+        minds, lasting, bus, crashes = state
+        count = len(self._deeds.things[deeds]) if deeds else 0
+        kept, said = self._carried_out(lasting[i], deeds, count)
+        yield State(_set(minds, i, after), _set(lasting, i, kept), bus | said, crashes), step
+        if crashes < self.limits.crashes:
+            for most in range(1, count + 1):
+                kept, said = self._carried_out(lasting[i], deeds, most)
+                down = State(_set(minds, i, None), _set(lasting, i, kept), bus | said, crashes + 1)
+                yield down, (step[0], i, step[2], most)
+
+    def _while(self, state: State) -> Iterator[tuple[State, Step]]:
+        """A while passes for all that are up; one of them may crash in the middle of what it does then."""
+        down = frozenset(self.nodes[i] for i, mind in enumerate(state.minds) if mind is None)
+        base = state._replace(bus=state.bus & ~self._fresh)
+        done = []
+        for i, mind in enumerate(state.minds):
+            if mind is not None:
+                after, deeds = self._does(i, mind, down)
+                if not self._within[after]:
+                    return
+                done.append((i, after, deeds))
+        whole = base
+        for i, after, deeds in done:
+            whole = self._all_done(whole, i, after, deeds)
+        if whole != state:
+            yield whole, ("waits", -1, down, -1)
+        if state.crashes < self.limits.crashes:
+            for i, _, deeds in done:
+                rest = base
+                for j, other, more in done:
+                    if j != i:
+                        rest = self._all_done(rest, j, other, more)
+                for most in range(1, len(self._deeds.things[deeds]) + 1):
+                    kept, said = self._carried_out(rest.lasting[i], deeds, most)
+                    minds, lasting = _set(rest.minds, i, None), _set(rest.lasting, i, kept)
+                    yield State(minds, lasting, rest.bus | said, state.crashes + 1), ("waits", i, down, most)
+
+    def _all_done(self, state: State, i: int, after: int, deeds: int) -> State:
+        kept, said = self._carried_out(state.lasting[i], deeds, len(self._deeds.things[deeds]))
+        return State(_set(state.minds, i, after), _set(state.lasting, i, kept), state.bus | said, state.crashes)
+
+    def _seen(self, state: State) -> tuple[Any, ...]:
+        return tuple([None if mind is None else self._views[mind] for mind in state.minds])
+
+    # --- traps ---------------------------------------------------------------------------------------------------
+
+    def ends_well(self, state: State) -> bool:
+        """Whether, all alive and nothing lost, the goal is reached; what was on the bus before was heard by nobody."""
+        path: list[Any] = []
+        good = False
+        state = state._replace(bus=0)
+        for i, mind in enumerate(state.minds):
+            if mind is None:
+                state = self._all_done(state, i, *self.starts(i, state.lasting[i]))
+        for _ in range(PATIENCE):
+            key = state.minds, state.bus
+            known = self._ends_well.get(key)
+            if known is not None:
+                good = known
+                break
+            path.append(key)
+            state = self._all_hear(state)
+            if self.part.is_over(self._seen(state)):
+                good = True
+                break
+            state = self._passes(state._replace(bus=0))
+        for key in path if good else path[:1]:
+            self._ends_well[key] = good
+        return good
+
+    def _all_hear(self, state: State) -> State:
+        """Each hears all that is said, in turn, until nothing new is said."""
+        heard = [0] * len(self.nodes)
+        while True:
+            new = [state.bus & heeds & ~known for heeds, known in zip(self._heeded, heard, strict=True)]
+            if not any(new):
+                return state
+            for i, bits in enumerate(new):
+                heard[i] |= bits
+                for word in _ones(bits):
+                    mind = state.minds[i]
+                    assert mind is not None
+                    state = self._all_done(state, i, *self._does(i, mind, word))
+
+    # --- the search ----------------------------------------------------------------------------------------------
+
+    def begin(self) -> State:
+        """All were started, by their journals of before, and heard each other until the part begins."""
+        lasting = []
+        for node in self.nodes:
+            journal = tuple(tuple(entry.items()) for entry in self.part.journal(node))
+            lasting.append(self._lasting.number(Lasting(journal, self.part.body(node))))
+        state = State((None,) * len(self.nodes), tuple(lasting), 0, 0)
+        for i in range(len(self.nodes)):
+            state = self._all_done(state, i, *self.starts(i, state.lasting[i]))
+        for _ in range(self.part.prelude):
+            state = self._passes(self._all_hear(state)._replace(bus=0))
+        return state
+
+    def _passes(self, state: State) -> State:
+        """A while passes for all, who all are up."""
+        for i, mind in enumerate(state.minds):
+            assert mind is not None
+            state = self._all_done(state, i, *self._does(i, mind, frozenset()))
+        return state
+
+    def run(self) -> Found:
+        """Explore until all is seen, something is wrong or a trap, or the limit is reached."""
+        found, state = self.found, self.begin()
+        seen, waiting = {state}, deque([state])
+        wrong, remembers, limits = self.part.wrong, self.limits.remembers, self.limits
+        judged: dict[tuple[int | None, ...], str] = {}
+        began_s, taken = time.process_time(), 0
+        while waiting and not found.why and len(seen) < limits.most_states:
+            state = waiting.popleft()
+            if not self.ends_well(state):
+                found.trap, found.why = state, "a trap"
+                break
+            if self.part.is_over(self._seen(state)):
+                continue
+            for after, step in self.steps(state):
+                found.transitions += 1
+                if after in seen:
+                    continue
+                seen.add(after)
+                if remembers:
+                    self.came_from[after] = state, step
+                why = judged.get(after.minds)
+                if why is None:
+                    why = judged[after.minds] = wrong(self._seen(after))
+                if why:
+                    found.wrong, found.why = after, why
+                    break
+                waiting.append(after)
+            taken += 1
+            if not taken % 64 and time.process_time() - began_s > limits.most_s:
+                break
+        found.states, found.is_complete = len(seen), not waiting and not found.why
+        found.spent_s = time.process_time() - began_s
+        return found
+
+    def told(self, state: State) -> str:
+        """How a state was come to, and what it is, for a person."""
+        steps = []
+        at = state
+        while at in self.came_from:
+            at, step = self.came_from[at]
+            steps.append(self._told_step(step))
+        lines = steps[::-1]
+        for i, node in enumerate(self.nodes):
+            mind = state.minds[i]
+            lines.append(f"node {node}: {'down' if mind is None else self._views[mind]}")
+            lines += [f"    {dict(line)}" for line in self._lasting.things[state.lasting[i]].journal]
+        return "\n".join(lines)
+
+    def _told_step(self, step: Step) -> str:
+        what, i, about, most = step
+        who = "all" if i < 0 else f"node {self.nodes[i]}"
+        text = f"{who} {what}"
+        if what == "hears":
+            text += f" {self._words.things[about]}"
+        return text if most < 0 else f"{text}, and crashes after {most} of its deeds"
+
+
+def _ones(bits: int) -> Iterator[int]:
+    """The places of the bits that are set, from 0."""
+    place = 0
+    while bits:
+        if bits & 1:
+            yield place
+        bits, place = bits >> 1, place + 1
+
+
+def _set(values: tuple[Any, ...], at: int, value: Any) -> tuple[Any, ...]:
+    return (*values[:at], value, *values[at + 1 :])

@@ -1,0 +1,112 @@
+"""Bugs that are planted in shipped code to see whether an exploration finds them."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from onboard.contract.constants import NOBODY
+from onboard.core.authority import TokenBook
+from onboard.core.effects import Record
+from onboard.core.records import TokenGivenRecord
+from onboard.systems.car_park import custody
+from onboard.systems.car_park.compartment import Compartment
+from onboard.systems.car_park.handling import ShuttleWork
+from onboard.systems.car_park.records import AwardRecord, HandledRecord
+from onboard.systems.car_park.recovery import JournalRecovery
+from onboard.systems.car_park.robot import ParkingRobot
+from onboard.systems.car_park.stewardship import Stewardship
+
+Method = Callable[..., Any]
+TWO, TRAP, LOST = "two hold the car", "a trap", "its keeper does not know where the car stands"
+
+
+class Planted(NamedTuple):
+    """A bug: where it is planted, what is made of what stands there, and what is to be found."""
+
+    owner: Any
+    name: str
+    made: Callable[[Method], Method]
+    found: str
+
+
+def _turned(method: Method) -> Method:
+    return lambda *args: method(*args)[::-1]
+
+
+def _nothing(method: Method) -> Method:
+    return lambda *_: []
+
+
+def _one_less(method: Method) -> Method:
+    return lambda *args: method(*args) - 1
+
+
+def _unwritten(method: Method) -> Method:
+    """What it does is not written down; None stays None."""
+
+    def without(*args: Any) -> Any:
+        effects = method(*args)
+        return effects and [one for one in effects if not isinstance(one, Record)]
+
+    return without
+
+
+def _never_refused(method: Method) -> Method:
+    return lambda *args: method(*args) or []
+
+
+def _without(*records: type) -> Callable[[Method], Method]:
+    def made(method: Method) -> Method:
+        def take(memory: Any, record: Any) -> None:
+            if not isinstance(record, records):
+                method(memory, record)
+
+        return take
+
+    return made
+
+
+def _of_any_task(method: Method) -> Method:
+    def winner_of(stewardship: Stewardship, car: Any, task: Any) -> tuple[int, int]:
+        return stewardship.winners.get(car, NOBODY), 1
+
+    return winner_of
+
+
+def _keeps_given(method: Method) -> Method:
+    def replay(book: TokenBook, entries: Any) -> None:
+        method(book, [entry for entry in entries if entry.get("record") != TokenGivenRecord.NAME])
+
+    return replay
+
+
+def _never_again(method: Method) -> Method:
+    def take_up(compartment: Compartment, now_us: int) -> Any:
+        effects = method(compartment, now_us)
+        assert compartment.job is not None
+        compartment.job.retry_at_us = None
+        return effects
+
+    return take_up
+
+
+AWARD = {
+    "a grant is said before it is written": Planted(TokenBook, "give", _turned, TWO),
+    "a right is given under its old version": Planted(TokenBook, "own_version", _one_less, TRAP),
+    "what was given away is held again after a restart": Planted(TokenBook, "replay", _keeps_given, TWO),
+    "a grant is said once": Planted(TokenBook, "wake", _nothing, TRAP),
+    "the winner of the task before counts": Planted(Stewardship, "winner_of", _of_any_task, TRAP),
+    "an award is told before it is written": Planted(ParkingRobot, "_take_on", _turned, TRAP),
+    "a robot forgets what it has won": Planted(JournalRecovery, "_take", _without(AwardRecord), TRAP),
+    "a restarted compartment does not call": Planted(Compartment, "_take_up_job", _never_again, TRAP),
+}
+
+LEAVING = {
+    "a grant is said before it is written": Planted(TokenBook, "give", _turned, TWO),
+    "the place of a car is not written": Planted(custody, "before_taking", _unwritten, LOST),
+    "a car is taken before its place is known": Planted(custody, "before_taking", _never_refused, LOST),
+    "where a car is left is said once": Planted(custody, "before_grant", _nothing, TRAP),
+    "a keeper forgets where its cars stand": Planted(custody, "replay", _nothing, TRAP),
+    "a robot forgets what it has handled": Planted(JournalRecovery, "_take", _without(HandledRecord), TRAP),
+    "a car that was left is not passed on": Planted(ShuttleWork, "_finish", _nothing, TRAP),
+    "a stroke is not written": Planted(ShuttleWork, "_next", _unwritten, TRAP),
+}
