@@ -242,8 +242,8 @@ class ParkingRobot:
                 self.generation.reserve(call, proposal, now_us)
                 return [Report(weighed(proposal.alternatives))]
             case Released(call_key=key):
-                self.generation.ahead.end(key, now_us)
                 self.generation.tentative.pop(key, None)
+                self.generation.ahead.end(key, now_us)
                 return []
             case Awarded(call_key=key, call=call, proposal=proposal, award=award):
                 self.generation.tentative.pop(key, None)
