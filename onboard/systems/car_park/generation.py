@@ -447,7 +447,7 @@ class CarParkGeneration:
         """Places for a class of car at which none stands and that nobody has promised, in the site's order."""
         promised = self._promised(now_us, bid)
         free = [place for place in self.mirror.free_places() if place.number not in promised]
-        return [place for place in free if self.site.takes(place, car_class)]
+        return self.site.best_for(car_class, free)
 
     def _promised(self, now_us: int, bid: CallKey | None) -> set[int]:
         """Places at which somebody's plan, or mine, will work: two parkings never aim at one place (row P42)."""
