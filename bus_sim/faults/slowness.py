@@ -9,8 +9,8 @@ from bus_sim.run import BusRun
 from onboard.controller.shell import Controller
 from onboard.ways.effort import SLICE_STEPS, Effort, Searching
 
-#: What a step of a search takes where figures are measured, us: docs/figures.md says on which machine, and how much of
-#: what bids and plans cost that accounts for. A board that is ``factor`` times as slow takes ``factor`` times as long.
+#: What a step of a search takes where figures are measured, us: 8 to 9 for bounds, 8 to 21 for searches with all that a
+#: bid needs besides (docs/figures.md, "A slow board"). A board ``factor`` times as slow takes ``factor`` times as long.
 STEP_US: Final = 15
 
 

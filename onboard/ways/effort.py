@@ -15,17 +15,17 @@ _Given = ParamSpec("_Given")
 #: Tells steps, and comes to its result in the end.
 Search = Generator[int, None, T]
 
-#: A step is the free-flow bound of one place; a state taken off a search's queue, with its moves, takes as long as ten
-#: of them (``python -m bench.steps``).
+#: A step is the free-flow bound of one place; a state taken off a search's queue, with its moves, takes about as long
+#: as ten of them (docs/figures.md, "A slow board").
 POP_STEPS = 10
-#: So many steps and then something else has its turn: 2 ms where figures are measured, 20 ms on a board that is ten
-#: times as slow; a drive waits 500 ms for its next order, and is given one each 200 ms.
+#: So many steps and then something else has its turn: 4 ms where figures are measured, 30 ms on a board eight times as
+#: slow. A drive is given an order each 200 ms, and brakes by itself after 500 ms without one.
 SLICE_STEPS = 250
 
 
 @dataclass
 class Effort:
-    """What all searches of one machine cost."""
+    """What all searches of one machine cost, and whether they are sliced."""
 
     #: Counted since power-up.
     steps: int = 0

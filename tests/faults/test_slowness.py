@@ -1,13 +1,19 @@
 """A machine whose board is slow: thinking takes virtual time, motion goes on meanwhile, and runs repeat."""
 
+from collections.abc import Iterator
 from typing import TypeVar
 
 import pytest
 
+from bus_sim.faults import slowness
+from bus_sim.faults.arm import arm
+from bus_sim.faults.injection import parse_injection
+from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.contract.messages import Bid, CallForProposals, Message
+from onboard.contract.messages import Bid, CallForProposals, DriveOrder, DriveState, Message
 from onboard.core.serial import from_bus_ms
 from tests.faults.world import Seen, watch
+from tests.system.scene import Scene, play, stays
 
 ROBOT = 11
 M = TypeVar("M", bound=Message)
@@ -50,3 +56,28 @@ def test_it_is_slow_for_so_long_and_after_a_restart_too(fault: str, after: bool)
     assert seen.looks == [True]
     assert watch(*faults, seconds=32, look=(31, is_slow), cars=0).looks == [False]
     assert seen.simulation.controllers[ROBOT].holon.boot == (2 if after else 1)
+
+
+@pytest.mark.parametrize(("slice_steps", "is_late"), [(60, False), (100_000, True)])
+def test_motion_is_served_between_slices(monkeypatch: pytest.MonkeyPatch, slice_steps: int, is_late: bool) -> None:
+    """No order to a drive that moves is later than 300 ms; where searches are not sliced one is."""
+    monkeypatch.setattr(slowness, "SLICE_STEPS", slice_steps)
+    faults = [parse_injection("slow:target=MR1|MR2,factor=150")]
+    cars = stays(*[(20.0 * number, 150.0 + 20 * number) for number in range(5)])
+    scene = play(find_site("small"), cars, plant=lambda run: arm(run, faults), limit_s=400, extra_s=0)
+    refresh_us = scene.simulation.site.timing.drive_refresh_us
+    late_us = [us - refresh_us for name in ("MR1", "MR2") for us in waits_for_order(scene, name)]
+    assert len(late_us) > 100
+    assert (max(late_us) > 300_000) is is_late
+
+
+def waits_for_order(scene: Scene, name: str) -> Iterator[int]:
+    """How long a moving drive waited each time until its order was said again, us."""
+    said_us, sequence, moved = 0, None, False
+    for one in scene.said:
+        if one.bus == name and isinstance(one.message, DriveState):
+            moved = one.message.speed_mm_s != 0
+        elif one.bus == name and isinstance(one.message, DriveOrder):
+            if moved and one.message.sequence == sequence:
+                yield one.time_us - said_us
+            said_us, sequence = one.time_us, one.message.sequence

@@ -47,3 +47,27 @@ def test_what_others_plan_while_it_is_searched_is_looked_at_before_the_bid() -> 
     assert not found.stands(1_000)
     reserved.release(77)
     assert found.stands(1_000)
+
+
+def test_an_award_is_answered_with_what_was_worked_out_while_the_bid_stood() -> None:
+    """The same as by a search when it is awarded; that search is made only where others have planned otherwise."""
+    site = two_lifts()
+    searching, at_once = carrier_at(site, way_back(site)), carrier_at(site, way_back(site))
+    bid, _ = asked(searching, fetch(), SLICE_STEPS)
+    searching.reserve(fetch(), bid, 10_000)
+    slices, now_us = 0, 10_000
+    while (due_us := searching.ahead.next_wake()) is not None:
+        slices, now_us = slices + 1, max(now_us, due_us)
+        searching.ahead.go_on(now_us)
+    assert slices >= 1
+    (promised,) = bid.program
+    searching.tentative.clear()
+    before = searching.effort.steps
+    expected = at_once.renewed(fetch(), promised, now_us)
+    assert searching.renewed(fetch(), promised, 1_001_000)._replace(kept=expected.kept) == expected != promised
+    assert searching.effort.steps == before, "no search is left for the award"
+    searching.reserve(fetch(), bid, 10_000)
+    searching.tentative.clear()
+    searching.mirror.reservations.reserve(77, [SlotWindow(promised.steps[-1].destination, 0, FOREVER)])
+    searching.renewed(fetch(), promised, 1_001_000)
+    assert searching.effort.steps > before, "what was promised does not hold any more"

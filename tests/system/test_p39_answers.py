@@ -13,8 +13,9 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallKey, NeededAnswers, Proposal, RequestedTerms, SubCallAnswer
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Segment
+from onboard.systems.car_park.alternatives import Solution
 from onboard.systems.car_park.asking import TOLERANCE_US, AskingGeneration
-from onboard.systems.car_park.generation import CarParkGeneration, Solution
+from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.lift_generation import LiftGeneration, Promise
 from onboard.systems.car_park.ride_calls import ride_terms, rides_of
 from onboard.systems.car_park.robot import ParkingRobotFactory

@@ -20,6 +20,7 @@ from onboard.contract.messages import (
     TaskReport,
 )
 from onboard.core.frame import Frame
+from onboard.core.negotiation import CallKey
 from onboard.core.serial import from_bus_ms
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.robot import ParkingRobot
@@ -111,7 +112,7 @@ class Rival:
     simulation: Simulation
     bus: SimulatedBus = field(init=False)
     call: tuple[int, int] | None = None
-    kept: list[dict[tuple[int, int], object]] = field(default_factory=list)
+    kept: list[dict[CallKey, object]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.bus = self.simulation.fleet.attach("rival", 200)
@@ -131,7 +132,7 @@ class Rival:
         self.simulation.loop.call_later(0.01, lambda: self.kept.append(dict(self._tentative)))
 
     @property
-    def _tentative(self) -> dict[tuple[int, int], object]:
+    def _tentative(self) -> dict[CallKey, object]:
         behaviour = self.simulation.controllers[11].holon.behaviour
         assert isinstance(behaviour, ParkingRobot) and isinstance(behaviour.generation, CarParkGeneration)
         return dict(behaviour.generation.tentative)

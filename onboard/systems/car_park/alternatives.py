@@ -1,9 +1,10 @@
-"""What was weighed before a bid was made, for the log and for comparisons."""
+"""What a robot weighs before it bids, and what it bids with."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from onboard.core.site import Station
+from onboard.core.site import Segment, Station
+from onboard.systems.car_park.program import CarStep
 
 
 class Alternative(NamedTuple):
@@ -29,3 +30,14 @@ def weighed(alternatives: Iterable[Alternative]) -> str:
         else:
             blocked += 1
     return f"weighed: {', '.join(told)}; no sooner: {bounded}; out of reach: {blocked}"
+
+
+class Solution(NamedTuple):
+    """The operating sequence for one call: new steps after the ``kept`` ones, from ``origin`` at ``start_us``."""
+
+    kept: int
+    origin: Segment
+    start_us: int
+    steps: tuple[CarStep, ...]
+    finish_us: int
+    place: Station

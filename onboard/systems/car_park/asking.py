@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from onboard.contract.messages import CallForProposals
 from onboard.core.negotiation import NeededAnswers, Proposal, SubCallAnswer
 from onboard.core.serial import from_bus_ms, to_bus_ms
-from onboard.systems.car_park.alternatives import Alternative
-from onboard.systems.car_park.generation import CarParkGeneration, Solution
+from onboard.systems.car_park.alternatives import Alternative, Solution
+from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.program import CarStep
 from onboard.systems.car_park.ride_calls import answer_for, ride_terms, rides_of
 from onboard.ways.lift_uses import ride_us

@@ -22,6 +22,10 @@ from onboard.ways.sipp import NoRoute, planning
 MAX_EXPANSIONS = 4_000
 
 
+#: Others' plans, and what all occupy, as they were when a search began.
+Seen = tuple[Mapping[int, BegunItinerary], Reservations]
+
+
 @dataclass(frozen=True)
 class Clearance:
     """One robot's look at what its plan would ask of the others. All times are bus time in us."""
@@ -57,16 +61,18 @@ class Clearance:
         answers = {node: self.mirror.order.makes_way(plan, node, now_us) for node in held}
         return [n for n, yes in answers.items() if yes], [n for n, yes in answers.items() if yes is False]
 
-    def still_free(self, plan: BegunItinerary, before: Reservations, now_us: int) -> Callable[[], bool]:
-        """Tells, when it is asked, whether nobody new is in a plan's way since ``before``, and it ends in a refuge."""
+    def still_free(self, plan: BegunItinerary, seen: Seen, now_us: int) -> Callable[[], bool]:
+        """Tells, when it is asked, whether a plan ends in a refuge, and nobody is in its way but as was ``seen``."""
         windows = itinerary_windows(self.site, plan.itinerary, now_us, plan.first_begin_us)
+        plans, before = seen
         met = set(before.conflicts(self.node, windows))
         end = final_position(self.site, plan.itinerary)
 
         def is_free() -> bool:
             if end not in open_refuges(self.site, self.mirror.others_standing()):
                 return False
-            return met.issuperset(self.mirror.reservations.conflicts(self.node, windows))
+            meets = self.mirror.reservations.conflicts(self.node, windows)
+            return met.issuperset(meets) and all(self.mirror.plans.get(one) is plans.get(one) for _, one in meets)
 
         return is_free
 

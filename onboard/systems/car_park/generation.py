@@ -8,15 +8,15 @@ chooses the place itself and evaluates all its solutions (row P46).
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 from onboard.contract.codes import Criterion, Grade, LegAction, Operation
 from onboard.contract.messages import CallForProposals, Itinerary, Stamp
-from onboard.core.negotiation import NeededAnswers, Proposal
+from onboard.core.negotiation import CallKey, NeededAnswers, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine, Segment, Station
-from onboard.systems.car_park.alternatives import Alternative
-from onboard.systems.car_park.clearance import MAX_EXPANSIONS, Clearance
+from onboard.systems.car_park.ahead import Ahead, Checked, key_of
+from onboard.systems.car_park.alternatives import Alternative, Solution
+from onboard.systems.car_park.clearance import MAX_EXPANSIONS, Clearance, Seen
 from onboard.systems.car_park.program import (
     MAX_STEPS,
     STAMP_AHEAD_US,
@@ -60,17 +60,6 @@ WORTH_US = 2_000_000
 Estimate = Proposal | NeededAnswers | None
 
 
-class Solution(NamedTuple):
-    """The operating sequence for one call: new steps after the ``kept`` ones, from ``origin`` at ``start_us``."""
-
-    kept: int
-    origin: Segment
-    start_us: int
-    steps: tuple[CarStep, ...]
-    finish_us: int
-    place: Station
-
-
 @dataclass
 class CarParkGeneration:
     """Estimates and operating sequences for one robot. Implements the negotiation's ``Estimator``."""
@@ -79,14 +68,17 @@ class CarParkGeneration:
     machine: Machine
     mirror: WayMirror
     program: Program
-    tentative: dict[tuple[int, int], Solution] = field(default_factory=dict)
+    tentative: dict[CallKey, Solution] = field(default_factory=dict)
     #: A person has a hand in (row M38): no new tasks.
     is_held: bool = False
     #: What all its searches cost, and whether they are sliced.
     effort: Effort = field(default_factory=Effort)
     clearance: Clearance = field(init=False)
+    #: What is worked out for bids that stand best, where searches are sliced.
+    ahead: Ahead = field(init=False)
 
     def __post_init__(self) -> None:
+        self.ahead = Ahead(self.effort)
         self.clearance = Clearance(self.site, self.mirror, self.machine.node_id, self.effort)
 
     # --- the Estimator -----------------------------------------------------------------------------------------
@@ -144,24 +136,39 @@ class CarParkGeneration:
 
     def _estimate_aside(self, call: CallForProposals, now_us: int) -> Search[Estimate]:
         """The same around what all plan now, whatever they plan meanwhile; the bid asks whether it stands."""
-        reservations = self.mirror.reservations.copy()
+        plans, reservations = dict(self.mirror.plans), self.mirror.reservations.copy()
         found = yield from self._estimate(call, now_us, reservations)
         if not isinstance(found, Proposal):
             return found
         (solution,) = found.program
-        return found._replace(stands=self._standing(call, solution, reservations, now_us))
+        return found._replace(stands=self._standing(call, solution, (plans, reservations), now_us))
+
+    def reserve(self, call: CallForProposals, proposal: Proposal, now_us: int) -> None:
+        """My bid stands best: other bids come behind it, and what takes long to work out for it is begun."""
+        (solution,) = proposal.program
+        self.tentative[key_of(call)] = solution
+        if proposal.stands is not None:
+            search = self._renew_aside(call, now_us)
+            self.ahead.begin(key_of(call), Checked(solution, proposal.stands), search, now_us)
+
+    def _renew_aside(self, call: CallForProposals, now_us: int) -> Search[Checked | None]:
+        seen = dict(self.mirror.plans), self.mirror.reservations.copy()
+        solution, _ = yield from self._solve(call, now_us, seen[1], behind_bids=False)
+        if solution is None:
+            return None
+        return Checked(solution, self._standing(call, solution, seen, now_us, behind_bids=False))
 
     def _standing(
-        self, call: CallForProposals, solution: Solution, reservations: Reservations, now_us: int
+        self, call: CallForProposals, solution: Solution, seen: Seen, now_us: int, *, behind_bids: bool = True
     ) -> Callable[[int], bool]:
-        """Whether a solution still holds at a time: this machine, its place and its way are as free as they were."""
+        """Whether a solution still holds at a time: this machine, its place and its way are as free as was ``seen``."""
         plan = BegunItinerary(self._offer(call, solution._replace(kept=0)), solution.start_us)
-        is_free = self.clearance.still_free(plan, reservations, now_us)
+        is_free = self.clearance.still_free(plan, seen, now_us)
 
         def stands(then_us: int) -> bool:
             if not self._is_able or solution.place not in self._candidates(call, then_us):
                 return False
-            _, origin, start_us = self._start(call, then_us)
+            _, origin, start_us = self._free_from(then_us, behind_bids=behind_bids)
             return origin == solution.origin and start_us <= solution.start_us and is_free()
 
         return stands
@@ -174,6 +181,9 @@ class CarParkGeneration:
 
     def renewed(self, call: CallForProposals, promised: Solution, now_us: int) -> Solution:
         """Second request, once the call is awarded: what is really carried out, around what is known by now."""
+        found = self.ahead.end(key_of(call), now_us)
+        if found is not None:
+            return found._replace(kept=self.program.branch(now_us)[0])
         solution, _ = self.solve(call, now_us, behind_bids=False)
         return promised if solution is None else solution
 
@@ -313,13 +323,17 @@ class CarParkGeneration:
         return sorted((bounds[one.segment], n, one) for n, one in enumerate(places))
 
     def _start(self, call: CallForProposals, now_us: int, *, behind_bids: bool = True) -> tuple[int, Segment, int]:
+        kept, segment, start_us = self._free_from(now_us, behind_bids=behind_bids)
+        earliest_us = max(self._deadline_us(call, now_us), now_us) + AWARD_LATENCY_US
+        return kept, segment, max(start_us, earliest_us)
+
+    def _free_from(self, now_us: int, *, behind_bids: bool) -> tuple[int, Segment, int]:
         kept, segment, start_us = self.program.branch(now_us)
         for solution in self.tentative.values() if behind_bids else ():
             # What I may win before counts as won: one robot does one thing after the other.
             if solution.finish_us > start_us:
                 segment, start_us = solution.place.segment, solution.finish_us
-        earliest_us = max(self._deadline_us(call, now_us), now_us) + AWARD_LATENCY_US
-        return kept, segment, max(start_us, earliest_us)
+        return kept, segment, start_us
 
     def _route(
         self,
@@ -427,15 +441,15 @@ class CarParkGeneration:
     def _candidates(self, call: CallForProposals, now_us: int) -> list[Station]:
         """Stations that the bidder may choose: free places nobody is on the way to, or the one that the call names."""
         car_class = open_class(call)
-        return self._all_candidates(call) if car_class is None else self.free_places(now_us, car_class)
+        return self._all_candidates(call) if car_class is None else self.free_places(now_us, car_class, key_of(call))
 
-    def free_places(self, now_us: int, car_class: int) -> list[Station]:
+    def free_places(self, now_us: int, car_class: int, bid: CallKey | None = None) -> list[Station]:
         """Places for a class of car at which none stands and that nobody has promised, in the site's order."""
-        promised = self._promised(now_us)
+        promised = self._promised(now_us, bid)
         free = [place for place in self.mirror.free_places() if place.number not in promised]
         return self.site.best_for(car_class, free)
 
-    def _promised(self, now_us: int) -> set[int]:
+    def _promised(self, now_us: int, bid: CallKey | None) -> set[int]:
         """Places at which somebody's plan, or mine, will work: two parkings never aim at one place (row P42)."""
         promised = {
             Station(leg.track, leg.to_index, leg.side).number
@@ -445,7 +459,7 @@ class CarParkGeneration:
             if leg.action is LegAction.WORK and from_bus_ms(leg.end_ms, now_us) > now_us - PROMISE_GRACE_US
         }
         promised |= {work.station.number for work in self.program.works()}
-        promised |= {solution.place.number for solution in self.tentative.values()}
+        promised |= {solution.place.number for key, solution in self.tentative.items() if key != bid}
         return promised
 
     def _steps(self, call: CallForProposals, place: Station, route: Route) -> tuple[CarStep, ...]:

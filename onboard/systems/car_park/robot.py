@@ -32,9 +32,9 @@ from onboard.core.negotiation import (
 )
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park import custody
-from onboard.systems.car_park.alternatives import weighed
+from onboard.systems.car_park.alternatives import Solution, weighed
 from onboard.systems.car_park.asking import AskingGeneration
-from onboard.systems.car_park.generation import CarParkGeneration, Solution
+from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.giving_way import GivingWay, YieldDecision
 from onboard.systems.car_park.going_around import GoingAround
 from onboard.systems.car_park.handling import ShuttleWork, handle
@@ -238,12 +238,12 @@ class ParkingRobot:
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """Pre-assignment keeps a tentative solution, being outbid drops it, an award makes it firm (row P47)."""
         match event:
-            case PreAssigned(call_key=key, proposal=proposal):
-                (solution,) = proposal.program
-                self.generation.tentative[key] = solution
+            case PreAssigned(call=call, proposal=proposal):
+                self.generation.reserve(call, proposal, now_us)
                 return [Report(weighed(proposal.alternatives))]
             case Released(call_key=key):
                 self.generation.tentative.pop(key, None)
+                self.generation.ahead.end(key, now_us)
                 return []
             case Awarded(call_key=key, call=call, proposal=proposal, award=award):
                 self.generation.tentative.pop(key, None)
@@ -294,6 +294,7 @@ class ParkingRobot:
             return self.going_around.say_again(now_us) + self.holding.come_to_rest(now_us)
         if not self.starting.is_over:
             return self.starting.advance(now_us)
+        self.generation.ahead.go_on(now_us)
         effects = self.going_around.watch_drive(now_us)
         effects += self.going_around.advance(now_us)
         # A step can end without a word on any bus, and the next is to begin in the same moment.
@@ -324,7 +325,7 @@ class ParkingRobot:
             return min((one for one in (self.carriage.next_wake(), self.going_around.next_word()) if one), default=None)
         if not self.starting.is_over:
             return min((one for one in (self.carriage.next_wake(), self.starting.next_wake()) if one), default=None)
-        times = [self.carriage.next_wake(), self.going_around.next_wake()]
+        times = [self.carriage.next_wake(), self.going_around.next_wake(), self.generation.ahead.next_wake()]
         step = self.program.step
         if step is not None and self._begun:
             times.append(step.end_us if step.action is LegAction.STAND else self._latest_us(step) + OVERDUE_US)

@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 
 from bus_sim.systems.car_park.compare.prospect import Prospect, serves_customer_us
 from onboard.contract.messages import CallForProposals
-from onboard.systems.car_park.generation import Solution
+from onboard.systems.car_park.alternatives import Solution
 from onboard.ways.reservations import FOREVER
 
 #: What a task counts for which nobody waits: somebody may come. In customers (1 decides alike).

@@ -11,7 +11,8 @@ from onboard.contract.codes import Grade, LegAction, Operation
 from onboard.contract.messages import CallForProposals, Stamp
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment, Station
-from onboard.systems.car_park.generation import CarParkGeneration, Solution
+from onboard.systems.car_park.alternatives import Solution
+from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.program import Program, to_itinerary
 from onboard.ways.mirror import WayMirror
 from onboard.ways.occupancy import itinerary_windows, lift_uses
