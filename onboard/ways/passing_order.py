@@ -69,6 +69,17 @@ class _Way:
             if turn.to_come < self.in_hand or (turn.to_come == self.in_hand and segment not in self.left):
                 yield turn
 
+    def go_on(self, known: "_Way", more: int) -> None:
+        """With the leg that was in hand in the plan told before, of which this one has ``more`` moving legs behind it.
+
+        A wait before it only tells when it began.
+        """
+        legs = range(len(self.itinerary.legs))
+        in_hand = known.in_hand + more
+        leg = next((leg for leg in legs if self.to_come(leg) == in_hand), None)
+        if leg is not None:
+            self.in_hand, self.leg, self.body, self.left = in_hand, leg, known.body, known.left
+
     def to_come(self, leg: int) -> int:
         """How many moving legs come behind leg number ``leg``."""
         return sum(moves(one) for one in self.itinerary.legs[leg + 1 :])
@@ -92,8 +103,8 @@ class PassingOrder:
         way = self._way(plan, now_us)
         continued = known is not None and known.moves[len(known.moves) - len(way.moves) :] == way.moves
         before, same = (0, 0) if known is None or continued else _shared(known, way)
-        if known is not None and (known.in_hand == way.in_hand if continued else same and known.in_hand == before - 1):
-            way.body, way.left = known.body, known.left
+        if known is not None and (continued or same):
+            way.go_on(known, 0 if continued else len(way.moves) - before)
         self._ways[node] = way
         if same:
             self._lead_on(node, before, same, len(way.moves))

@@ -213,11 +213,11 @@ class Compartment:
         return self.stewardship.won(job.car, winner, job.task, job.version)
 
     def _call_again(self, job: BayTask, now_us: int) -> list[Effect]:
-        """Its winner gave the task back, or is lost: it is called anew under a raised version."""
-        outcome = self.fleet.negotiation.abandon(job.task, Reason.NODE_SILENT, now_us)
-        effects: list[Effect] = [item for item in outcome if not isinstance(item, EVENT_TYPES)]
+        """Its winner gave the task back, or is lost: it is called anew under a raised version, noted before said."""
         job.winner, job.version, self._robot_waits = 0, successor(job.version, TASK_VERSION_BITS), False
-        effects += self.stewardship.won(job.car, 0, job.task, job.version)
+        effects = self.stewardship.won(job.car, 0, job.task, job.version)
+        outcome = self.fleet.negotiation.abandon(job.task, Reason.NODE_SILENT, now_us)
+        effects += [item for item in outcome if not isinstance(item, EVENT_TYPES)]
         return effects + self._call_for(job, now_us)
 
     def _call_for(self, job: BayTask, now_us: int) -> list[Effect]:
