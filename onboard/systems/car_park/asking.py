@@ -36,11 +36,11 @@ class AskingGeneration(CarParkGeneration):
         """The bid where the best solution rides no lift; else what the lifts must be asked."""
         return self._next(call, solution, alternatives, (), 1, now_us)
 
-    def renewed(self, call: CallForProposals, promised: Solution, now_us: int) -> Solution:
+    def renewed(self, call: CallForProposals, promised: Solution, now_us: int) -> Solution | None:
         """What was promised, as the lifts hold it for that, unless the robot or the others have moved meanwhile."""
-        kept, origin, _ = self._start(call, now_us, behind_bids=False)
-        if origin == promised.origin and now_us <= promised.start_us and not self._is_taken(call, promised, now_us):
-            return promised._replace(kept=kept)
+        following = self.following(promised, now_us)
+        if following is not None and now_us <= promised.start_us and not self._is_taken(call, promised, now_us):
+            return following
         return super().renewed(call, promised, now_us)
 
     def _is_taken(self, call: CallForProposals, promised: Solution, now_us: int) -> bool:

@@ -179,13 +179,23 @@ class CarParkGeneration:
         """What a solution comes to: a bid."""
         return self.proposal(call, solution, alternatives)
 
-    def renewed(self, call: CallForProposals, promised: Solution, now_us: int) -> Solution:
-        """Second request, once the call is awarded: what is really carried out, around what is known by now."""
-        found = self.ahead.end(key_of(call), now_us)
+    def renewed(self, call: CallForProposals, promised: Solution, now_us: int) -> Solution | None:
+        """Second request, once the call is awarded: what is really carried out, around what is known by now.
+
+        None where there is nothing, and what was promised does not follow on what is in hand by now.
+        """
+        ahead = self.ahead.end(key_of(call), now_us)
+        found = None if ahead is None else self.following(ahead, now_us)
         if found is not None:
-            return found._replace(kept=self.program.branch(now_us)[0])
+            return found
         solution, _ = self.solve(call, now_us, behind_bids=False)
-        return promised if solution is None else solution
+        return solution or self.following(promised, now_us)
+
+    def following(self, promised: Solution, now_us: int) -> Solution | None:
+        """What was promised, behind the work in hand; None where it begins elsewhere, or all is too long to be told."""
+        kept, origin, _ = self.program.branch(now_us)
+        follows = origin == promised.origin and kept + len(promised.steps) <= MAX_STEPS
+        return promised._replace(kept=kept) if follows else None
 
     def proposal(self, call: CallForProposals, solution: Solution, alternatives: list[Alternative]) -> Proposal:
         """A solution as a bid; its itinerary is told with the award, and with the bid only where the site says so."""
@@ -230,7 +240,15 @@ class CarParkGeneration:
             alternatives += more
             if best is not None and not self._have_room(best, now_us):
                 best = None
+        if best is not None and behind_bids and not self._can_tell(best):
+            best = None
         return best, alternatives
+
+    def _can_tell(self, solution: Solution) -> bool:
+        """Whether one itinerary can tell it with what may be won before it, whose ways back are then given up."""
+        before = [[step.work is not None for step in one.steps] for one in self.tentative.values()]
+        steps = sum(len(works) - works[::-1].index(True) if True in works else len(works) for works in before)
+        return solution.kept + steps + len(solution.steps) <= MAX_STEPS
 
     def _have_room(self, solution: Solution, now_us: int) -> bool:
         """Whether each machine that only stands in the way finds another refuge in time, around this and all plans."""

@@ -385,6 +385,9 @@ class ParkingRobot:
         Its firm itinerary is all that a lift needs to know of a ride: nobody calls for what that holds already.
         """
         solution = self.generation.renewed(call, promised, now_us)
+        if solution is None:
+            # It came behind what was won or lasts longer since: no plan holds both.
+            return self.going_around.forfeit(call.task, Reason.IMPOSSIBLE, now_us)
         kept = self.program.remaining[: solution.kept]
         if not kept:
             self._begun = False
