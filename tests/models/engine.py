@@ -370,14 +370,38 @@ class Engine:
         found.spent_s = time.process_time() - began_s
         return found
 
+    def way(self, state: State) -> list[tuple[State, Step]]:
+        """The states on the shortest way to one, each with what was done in it."""
+        found = []
+        while state in self.came_from:
+            state, step = self.came_from[state]
+            found.append((state, step))
+        return found[::-1]
+
+    def crashes(self, state: State) -> list[tuple[int, dict[str, str | int], bool]]:
+        """The crashes on the way to a state: of which node, at which line of its journal, and whether that was written.
+
+        The line is the next of what it was doing, else the last that it had written.
+        """
+        found = []
+        for before, (what, i, about, most) in self.way(state):
+            if what != "crashes" and most < 0:
+                continue
+            doing: tuple[Deed, ...] = ()
+            mind = before.minds[i]
+            if most >= 0:
+                event = about if what != "starts" else None
+                _, deeds = self.starts(i, before.lasting[i]) if mind is None else self._does(i, mind, event)
+                doing = self._deeds.things[deeds]
+            following = [deed for deed in doing[max(most, 0) :] if isinstance(deed, tuple)]
+            written = [*self._lasting.things[before.lasting[i]].journal, *doing[: max(most, 0)]]
+            lines = following[:1] or [deed for deed in written if isinstance(deed, tuple)][-1:]
+            found.append((self.nodes[i], dict(lines[0]), not following))
+        return found
+
     def told(self, state: State) -> str:
         """How a state was come to, and what it is, for a person."""
-        steps = []
-        at = state
-        while at in self.came_from:
-            at, step = self.came_from[at]
-            steps.append(self._told_step(step))
-        lines = steps[::-1]
+        lines = [self._told_step(step) for _, step in self.way(state)]
         for i, node in enumerate(self.nodes):
             mind = state.minds[i]
             lines.append(f"node {node}: {'down' if mind is None else self._views[mind]}")

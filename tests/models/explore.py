@@ -2,8 +2,10 @@
 
 import argparse
 from collections.abc import Callable
+from pathlib import Path
 
 from tests.models import engine
+from tests.models.as_scenario import as_scenario
 from tests.models.award import AwardPart
 from tests.models.custody import CustodyPart
 from tests.models.explorer import Explorer, Limits
@@ -27,17 +29,18 @@ def main() -> None:
     parser.add_argument("--old-copies", type=int, default=0, help="tokens: starts from an old copy of a journal")
     parser.add_argument("--ghost", action="store_true", help="tokens: a node that the site does not have speaks")
     parser.add_argument("--calls", type=int, default=2, help="award, taking, leaving: most calls in one life")
+    parser.add_argument("--scenario", type=Path, help="a counterexample is written here, for `bus-sim run --scenario`")
     options = parser.parse_args()
     if options.part != "tokens":
         limits = engine.Limits(options.crashes, most_s=options.most_s)
-        explore_part(PARTS[options.part](options.nodes, options.calls), limits)
+        explore_part(PARTS[options.part](options.nodes, options.calls), limits, options.scenario)
         return
     explore_tokens(
         Limits(options.nodes, options.versions, options.crashes, options.old_copies, options.ghost, options.most_s)
     )
 
 
-def explore_part(part: engine.Part, limits: engine.Limits) -> None:
+def explore_part(part: engine.Part, limits: engine.Limits, file: Path | None) -> None:
     """Explore one part, and tell the shortest way to what is wrong."""
     explorer = engine.Engine(part, limits)
     found = explorer.run()
@@ -48,6 +51,8 @@ def explore_part(part: engine.Part, limits: engine.Limits) -> None:
     state = found.wrong or found.trap
     if state is not None:
         print(explorer.told(state))
+        if file is not None:
+            file.write_text(as_scenario(explorer, state).to_toml(explorer.told(state)), encoding="utf-8")
 
 
 def explore_tokens(limits: Limits) -> None:

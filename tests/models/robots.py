@@ -14,8 +14,8 @@ from onboard.core.effects import Actuate, Effect
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Proposal
 from onboard.core.site import Machine, Segment, Site, Station
-from onboard.systems.car_park.alternatives import Alternative
-from onboard.systems.car_park.generation import CarParkGeneration, Solution
+from onboard.systems.car_park.alternatives import Alternative, Solution
+from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.program import CarHandling, CarStep, Program, StationWork
 from onboard.systems.car_park.robot import ParkingRobot, ParkingRobotFactory
 from onboard.systems.car_park.site import car_park

@@ -23,9 +23,9 @@ BUGS = [("award", bug) for bug in planted.AWARD] + [("leaving", bug) for bug in 
     ("part", "limits", "at_least"),
     [
         ("award", Limits(crashes=0), 30_000),
-        ("award", Limits(crashes=1, most_states=3_000), 4_000),
-        ("taking", Limits(crashes=1, most_states=3_000), 4_000),
-        ("leaving", Limits(crashes=1, most_states=5_000), 7_000),
+        ("award", Limits(crashes=1, most_states=2_000), 2_500),
+        ("taking", Limits(crashes=1, most_states=2_000), 2_500),
+        ("leaving", Limits(crashes=1, most_states=2_000), 2_500),
     ],
     ids=["award-without-crash", "award", "taking", "leaving"],
 )

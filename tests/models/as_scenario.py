@@ -1,0 +1,55 @@
+"""A counterexample of an exploration as a scenario that ``bus-sim run --scenario`` plays: the crash at the same effect.
+
+What was explored happens somewhere in a run of the same machines on `level1`: a car is parked and fetched. The power
+fails there at the same line of the journal, before or behind it. That frames are late or lost is not told: a run says
+words in their order, and most counterexamples do with those that the crash itself leaves unsaid.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from bus_sim.campaign.trial import stage_of
+from bus_sim.faults.injection import Injection
+from bus_sim.faults.scenario import FaultScenario
+from bus_sim.run import run_until
+from bus_sim.sites import find_site
+from bus_sim.systems.car_park.demand import Arrivals
+from bus_sim.virtual_time import VirtualTimeLoop, run_on
+from tests.models.engine import Engine, State
+
+#: One car, parked and fetched: who it is by the nodes of `tests.sites.one_floor`, as here.
+SCENE = FaultScenario("level1", 1, 1_200.0, Arrivals(1, 60.0, 20.0, 100.0))
+#: The power is back before anybody takes the machine for lost, s: so it is where no while passes.
+RESTART_S = 1.0
+#: By these lines of one kind are told apart.
+_TELLING = ("record", "operation", "kind", "handling", "phase")
+
+
+def as_scenario(engine: Engine, state: State) -> FaultScenario:
+    """The crashes on the way to a state. Raises ``ValueError`` where one of them is not at a line of a journal."""
+    return SCENE.with_faults(_crash(node, line, durable=durable) for node, line, durable in engine.crashes(state))
+
+
+def _crash(node: int, line: Mapping[str, Any], *, durable: bool) -> Injection:
+    site = find_site(SCENE.site)
+    told = {key: line[key] for key in _TELLING if key in line}
+    written = _written(node)
+    alike = [number for number, entry in enumerate(written, start=1) if told.items() <= entry.items()]
+    if not alike:
+        raise ValueError(f"the scene's node {node} writes no line with {told}")
+    settings = {"write": alike[-1], "durable": "yes" if durable else "no", "restart_s": RESTART_S}
+    return Injection("crash", {"target": site.machines[node].name, "at_s": 0, **settings})
+
+
+def _written(node: int) -> list[Mapping[str, Any]]:
+    """What a machine writes in the scene without any fault."""
+    loop = VirtualTimeLoop()
+    stage = stage_of(find_site(SCENE.site), SCENE, loop)
+
+    async def play() -> None:
+        stage.run.start()
+        await run_until(stage.run, lambda: stage.is_over, round(SCENE.limit_s * 1e6), 1_000_000)
+        stage.run.close()
+
+    run_on(loop, play())
+    return list(stage.run.journals[node].entries)
