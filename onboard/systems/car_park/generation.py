@@ -27,7 +27,7 @@ from onboard.systems.car_park.program import (
     steps_of,
     to_itinerary,
 )
-from onboard.systems.car_park.site import CarPark, class_of_end
+from onboard.systems.car_park.site import CarPark, class_of_end, end_at, one_a_segment, open_class
 from onboard.ways.effort import Effort, Search
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayMirror
@@ -415,7 +415,7 @@ class CarParkGeneration:
         """
         bounds: dict[Segment, int] = {}
         begun: tuple[int, Visit, Visit] | None = None
-        for place in _one_a_segment(places):
+        for place in one_a_segment(places):
             if begun is None or class_of_end(call.from_station) is not None:
                 # Otherwise the car is taken at the same time and left in as long a time at whatever place.
                 take, leave = self._visits(call, place, start_us)
@@ -448,7 +448,7 @@ class CarParkGeneration:
 
     def ends(self, call: CallForProposals, place: Station) -> tuple[Station, Station]:
         """Where the car is taken and where it is left; ``place`` stands for the end that the call leaves open."""
-        return _end(call.from_station, place), _end(call.to_station, place)
+        return end_at(call.from_station, place), end_at(call.to_station, place)
 
     def _all_candidates(self, call: CallForProposals) -> list[Station]:
         car_class = open_class(call)
@@ -494,21 +494,6 @@ class CarParkGeneration:
         return deadline_us if deadline_us <= now_us + STAMP_AHEAD_US else now_us
 
 
-def open_class(call: CallForProposals) -> int | None:
-    """The class of car for which a call leaves an end open, None where it names both."""
-    found = [class_of_end(end) for end in (call.from_station, call.to_station)]
-    return next((one for one in found if one is not None), None)
-
-
 def _stamp(call: CallForProposals) -> Stamp:
     """What gives a plan for a call its place among the others'."""
     return Stamp(call.deadline_ms, call.sender, call.call & 0xFF)
-
-
-def _end(station: int, place: Station) -> Station:
-    return Station.from_number(station) if class_of_end(station) is None else place
-
-
-def _one_a_segment(places: list[Station]) -> list[Station]:
-    """The first of each segment's places: both sides are reached and served alike."""
-    return list({place.segment: place for place in reversed(places)}.values())

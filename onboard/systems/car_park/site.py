@@ -6,6 +6,7 @@ from enum import Enum
 from typing import ClassVar
 
 from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import CallForProposals
 from onboard.core.site import MotionNeeds, Site, Station
 from onboard.ways.site import Axis, WaySite
 from onboard.work.timing import DeviceTiming
@@ -66,6 +67,22 @@ def class_of_end(station: int) -> int | None:
     if station == ANY_STATION:
         return ANY_CLASS
     return station - _OPEN_END if _OPEN_END < station <= _OPEN_END + MOST_CLASSES else None
+
+
+def open_class(call: CallForProposals) -> int | None:
+    """The class of car for which a call leaves an end open, None where it names both."""
+    found = [class_of_end(end) for end in (call.from_station, call.to_station)]
+    return next((one for one in found if one is not None), None)
+
+
+def end_at(end: int, place: Station) -> Station:
+    """The station that an end of a call means: its own, or ``place`` where it is open."""
+    return Station.from_number(end) if class_of_end(end) is None else place
+
+
+def one_a_segment(places: list[Station]) -> list[Station]:
+    """The first of each segment's places: both sides are reached and served alike."""
+    return list({place.segment: place for place in reversed(places)}.values())
 
 
 class RideCalls(Enum):
