@@ -77,17 +77,36 @@ def test_of_two_ways_back_that_of_the_younger_stamp_goes_first() -> None:
     assert back.hears(younger.told()) is YieldDecision.ANEW
 
 
+def done(award_ms: int = 1) -> Robot:
+    """It has no work: it leaves 10 for 3 at 200 ms."""
+    return robot(LINE, FIRST, [stand(10, 0, 200), travel(10, 3, 200, 290)], award_ms=award_ms)
+
+
+def mover(award_ms: int = 90) -> Robot:
+    """It has no work: it leaves 5 for 1 at 245 ms, right after the other two would come by."""
+    return robot(LINE, SECOND, [stand(5, 0, 245), travel(5, 1, 245, 285)], award_ms=award_ms)
+
+
 @pytest.mark.parametrize("award_ms", [1, 95])
 def test_of_two_ways_back_that_of_whoever_works_still_goes_first(award_ms: int) -> None:
-    done = robot(LINE, FIRST, [stand(10, 0, 200), travel(10, 3, 200, 290)], award_ms=award_ms)
-    busy = behind()
-    assert busy.hears(done.told()) is YieldDecision.NOTHING
-    assert done.hears(busy.told()) is YieldDecision.ANEW
+    idle, busy = done(award_ms), behind()
+    assert busy.hears(idle.told()) is YieldDecision.NOTHING
+    assert idle.hears(busy.told()) is YieldDecision.ANEW
+
+
+@pytest.mark.parametrize("award_ms", [1, 50, 90])
+@pytest.mark.parametrize("one", [empty, done])
+@pytest.mark.parametrize("two", [carrier, behind, mover])
+def test_of_two_that_meet_without_an_order_exactly_one_turns(
+    one: Callable[[int], Robot], two: Callable[[int], Robot], award_ms: int
+) -> None:
+    mine, theirs = one(award_ms), two(50)
+    answers = [mine.hears(theirs.told()), theirs.hears(mine.told())]
+    assert sorted(answer.name for answer in answers) == ["ANEW", "NOTHING"]
 
 
 def test_of_two_moves_without_work_the_lower_stamp_keeps_its_windows() -> None:
-    one = robot(LINE, FIRST, [stand(10, 0, 200), travel(10, 3, 200, 290)], award_ms=1)
-    two = robot(LINE, SECOND, [stand(5, 0, 245), travel(5, 1, 245, 285)], award_ms=90)
+    one, two = done(), mover()
     assert two.hears(one.told()) is YieldDecision.ANEW
     assert one.hears(two.told()) is YieldDecision.NOTHING
 
