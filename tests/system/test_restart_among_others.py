@@ -175,6 +175,16 @@ def test_who_wins_one_more_task_keeps_its_place_in_the_order_on_the_way_that_it_
     assert report.verdict is RunVerdict.SERVED, report.why()
 
 
+def test_a_lift_lets_in_by_a_gate_that_came_back_from_the_ride_before_only_then() -> None:
+    """It was started again while its robot gave platform and gate back, and the platform came first.
+
+    Two crashes a seed on `small`, seed 6254.
+    """
+    crash = "crash:at_s=333.643285,target=ER1,restart_s=14.199,write=7,durable=yes"
+    report = played("small", 6254, Arrivals(6, 20, 10, 200), crash)
+    assert report.verdict is RunVerdict.SERVED, report.why()
+
+
 def test_a_winner_that_is_not_noted_yet_is_believed_when_all_are_asked() -> None:
     """The power failed between the award and its record; the task was called anew, and awarded to a second robot.
 
