@@ -205,7 +205,8 @@ class PassingOrder:
     def who_yields(self, node: int, other: int, meetings: Sequence[Meeting]) -> int:
         """Of ``node`` and ``other``, who meet without an order, the one on its way back while the other works.
 
-        NOBODY where both do, or neither. A move that clears the way for work counts as that work.
+        Where both are on their ways back, the one without work, else the older stamp: of two that work still only the
+        younger can have counted on that. NOBODY where both work. A move that clears the way counts as that work.
         """
         mine, theirs = self._ways[node], self._ways[other]
         pairs = [(meeting.mine, meeting.theirs) for meeting in meetings]
@@ -240,6 +241,10 @@ class PassingOrder:
         """Whether the first of two machines yields, the second (False), or neither by this rule (None)."""
         first = all(self._is_voluntary(one, turn, two) for turn, _ in pairs)
         second = all(self._is_voluntary(two, turn, one) for _, turn in pairs)
+        if first and second and has_work(two.itinerary):
+            return not has_work(one.itinerary) or ranks_before(one.itinerary.stamp, two.itinerary.stamp)
+        if first and second and has_work(one.itinerary):
+            return False
         return None if first == second else first
 
     def _is_voluntary(self, way: _Way, turn: Turn, other: _Way) -> bool:

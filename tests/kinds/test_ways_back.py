@@ -1,5 +1,6 @@
 """A way back yields to work, a move that makes room does not, and what is begun is told again."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -64,12 +65,61 @@ def test_work_does_not_yield_to_work_under_a_younger_stamp() -> None:
     assert first.hears(busy.told()) is YieldDecision.NOTHING
 
 
+def behind(award_ms: int = 90) -> Robot:
+    """It works at 5 until 245 ms, where the empty one comes by right after that, and goes back the same way."""
+    return robot(LINE, SECOND, [work(5, 100, 245), travel(5, 1, 245, 285)], award_ms=award_ms)
+
+
+def test_of_two_ways_back_that_of_the_younger_stamp_goes_first() -> None:
+    # Work under the younger stamp may have been planned on that; without it, the car waits or goes elsewhere.
+    back, younger = empty(), behind()
+    assert younger.hears(back.told()) is YieldDecision.NOTHING
+    assert back.hears(younger.told()) is YieldDecision.ANEW
+
+
+def done(award_ms: int = 1) -> Robot:
+    """It has no work: it leaves 10 for 3 at 200 ms."""
+    return robot(LINE, FIRST, [stand(10, 0, 200), travel(10, 3, 200, 290)], award_ms=award_ms)
+
+
+def mover(award_ms: int = 90) -> Robot:
+    """It has no work: it leaves 5 for 1 at 245 ms, right after the other two would come by."""
+    return robot(LINE, SECOND, [stand(5, 0, 245), travel(5, 1, 245, 285)], award_ms=award_ms)
+
+
+@pytest.mark.parametrize("award_ms", [1, 95])
+def test_of_two_ways_back_that_of_whoever_works_still_goes_first(award_ms: int) -> None:
+    idle, busy = done(award_ms), behind()
+    assert busy.hears(idle.told()) is YieldDecision.NOTHING
+    assert idle.hears(busy.told()) is YieldDecision.ANEW
+
+
+@pytest.mark.parametrize("award_ms", [1, 50, 90])
+@pytest.mark.parametrize("one", [empty, done])
+@pytest.mark.parametrize("two", [carrier, behind, mover])
+def test_of_two_that_meet_without_an_order_exactly_one_turns(
+    one: Callable[[int], Robot], two: Callable[[int], Robot], award_ms: int
+) -> None:
+    mine, theirs = one(award_ms), two(50)
+    answers = [mine.hears(theirs.told()), theirs.hears(mine.told())]
+    assert sorted(answer.name for answer in answers) == ["ANEW", "NOTHING"]
+
+
+def test_of_two_moves_without_work_the_lower_stamp_keeps_its_windows() -> None:
+    one, two = done(), mover()
+    assert two.hears(one.told()) is YieldDecision.ANEW
+    assert one.hears(two.told()) is YieldDecision.NOTHING
+
+
 @pytest.mark.parametrize(("waited_ms", "yields"), [(AGES_AFTER_MS, True), (AGES_AFTER_MS + 1, False)])
 @pytest.mark.parametrize("early_ms", [1, BUS_MS_MODULUS - 1_000])
-def test_a_way_back_that_has_waited_for_long_yields_no_more(waited_ms: int, yields: bool, early_ms: int) -> None:
+@pytest.mark.parametrize("younger", [carrier, behind])
+def test_a_way_back_that_has_waited_for_long_yields_no_more(
+    waited_ms: int, yields: bool, early_ms: int, younger: Callable[[int], Robot]
+) -> None:
     # Also where bus time wraps in between.
     late_ms = (early_ms + waited_ms) % BUS_MS_MODULUS
-    back, busy = empty(early_ms), carrier(late_ms)
+    back, busy = empty(early_ms), younger(late_ms)
     now_us = (early_ms + waited_ms) * MS
     for one in (back, busy):
         one.program.shift(now_us)
@@ -191,6 +241,17 @@ def test_a_car_beside_its_compartment_is_not_carried_around_an_empty_machine() -
     assert solution.finish_us < 1_150_000 + 50_000_000
     bid, _ = carrier_at(site, plan).solve(fetch(), 0)
     assert bid is not None and bid.finish_us > solution.finish_us, "who wins is found without that"
+
+
+def test_a_car_is_not_parked_a_minute_later_because_two_ways_back_meet() -> None:
+    # It stands at p(1,3)F at 64 s; the other's way back would come by as this one goes back, to the same lift.
+    site = two_lifts()
+    source, sink = Station(1, 3, Side.NEAR), Station(1, 3, Side.FAR)
+    park = replace(fetch(), operation=Operation.PARK, from_station=source.number, to_station=sink.number)
+    for works_s in (55, 60, 66, 70):
+        carrier = carrier_at(site, way_back(site, works_s=works_s), Segment(2, 3))
+        solution, _ = carrier.solve(park, 0, behind_bids=False)
+        assert solution is not None and solution.finish_us // 1_000_000 == 64, works_s
 
 
 def test_a_plan_counts_on_no_way_back_that_is_begun_or_has_aged() -> None:
