@@ -50,6 +50,9 @@ class Roads:
         self._touched: dict[Segment, list[Segment]] = {}
         self._longest: dict[int, tuple[Sweep, ...]] = {}
         self._swept: dict[tuple[int, int], tuple[tuple[Sweep, ...], int]] = {}
+        #: How runs end: direction and last sweeps, with offsets and times counted from where and when they arrive.
+        self.tails: list[tuple[int, tuple[Sweep, ...]]] = []
+        self._tails: dict[tuple[int, tuple[Sweep, ...]], int] = {}
         self._ways_us: dict[frozenset[Segment], WaysToGoals] = {}
         self._to_goals: dict[frozenset[Segment], _Ways] = {}
         for track in site.tracks.values():
@@ -116,17 +119,25 @@ class Roads:
         return found
 
     def runs(self, here: Segment, step: int) -> "tuple[_Run, ...]":
-        """Runs from a position along its track to lower (``step`` -1) or higher indices (1), the shortest first.
-
-        With each how many of its first sweeps it shares with the longest run of the track.
-        """
+        """Runs from a position along its track to lower (``step`` -1) or higher indices (1), the shortest first."""
         found = self._runs.get((here, step))
         if found is None:
-            moves = self._find_runs(here, step)
-            found = self._runs[here, step] = tuple(
-                (move, self.swept(here.track, abs(move.destination.index - here.index))[1]) for move in moves
-            )
+            found = self._runs[here, step] = tuple(self._run(here, move, step) for move in self._find_runs(here, step))
         return found
+
+    def _run(self, here: Segment, move: Move, step: int) -> "_Run":
+        there, end_us = move.destination, move.duration_us
+        sweeps, alike = self.swept(here.track, abs(there.index - here.index))
+        reach, last = -sweeps[0].offset, sweeps[-1].offset + sweeps[0].offset
+        # The sweep of where it ends is among the last ones in any case: there may be a sill.
+        tail = tuple(
+            Sweep(offset - last, enter_us - end_us, leave_us - end_us)
+            for offset, enter_us, leave_us in sweeps[min(alike, reach + last) :]
+        )
+        number = self._tails.setdefault((step, tail), len(self.tails))
+        if number == len(self.tails):
+            self.tails.append((step, tail))
+        return there, end_us, move.distance_mm, alike, number, sweeps[reach].leave_us
 
     def hops(self, here: Segment) -> Sequence[Move]:
         """Hops and rides from a position, in the order of the site's tracks."""
@@ -259,7 +270,9 @@ def _build(site: WaySite) -> Roads:
     return DirectedRoads(site) if any(track.one_way for track in site.tracks.values()) else Roads(site)
 
 
-_Run = tuple[Move, int]
+#: Where it leads, duration, distance in mm, how many of its first sweeps it shares with the longest run of the track,
+#: how it ends (its place among ``Roads.tails``), and when it leaves the segment where it began.
+_Run = tuple[Segment, int, int, int, int, int]
 #: By track: index and time from there to a goal.
 _Ways = dict[int, list[tuple[int, int]]]
 
