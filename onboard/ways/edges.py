@@ -9,7 +9,7 @@ wherever they come from: when one may arrive is worked out once for all of them 
 """
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from onboard.core.site import Segment
 from onboard.ways.arrivals import Arrivals
@@ -52,32 +52,13 @@ Edge = tuple[int, int, int, int, int, int, bool]
 #: What is left of a bound that was looked at.
 NO_EDGE: Edge = (0, 0, 0, 0, 0, 0, True)
 
-#: Begins and ends of the windows that others hold of a segment, and when the move enters and leaves it.
-_Check = tuple[Sequence[int], Sequence[int], int, int]
+#: Departures between which none is safe, both of them excluded.
+_Forbidden = tuple[int, int]
 
 
-def _first_safe(checks: list[_Check], depart_us: int, last_us: int) -> tuple[int, int]:
-    """The first of the departures in ``[depart, last)`` that are safe; FOREVER for none, and the last one behind it.
-
-    It gets later whenever a check meets what is held, until all of them are clear. A whole millisecond.
-    """
-    until_us, count = FOREVER, len(checks)
-    place = clear = 0
-    while clear < count:
-        begins, ends, enter_us, leave_us = checks[place]
-        meets = bisect_right(ends, depart_us + enter_us)
-        if meets < len(ends):
-            clear_us = begins[meets] - leave_us
-            if clear_us < depart_us:
-                depart_us = -((enter_us - ends[meets]) // _MS) * _MS
-                if depart_us >= last_us:
-                    return FOREVER, FOREVER
-                clear, until_us = 0, FOREVER
-                continue
-            until_us = min(until_us, clear_us)
-        clear += 1
-        place = place + 1 if place + 1 < count else 0
-    return depart_us, until_us
+def _forbidden(windows: Held, enter_us: int, leave_us: int) -> list[_Forbidden]:
+    """What others forbid by holding a segment that the move enters and leaves so long after its departure."""
+    return [(begin_us - leave_us, end_us - enter_us) for begin_us, end_us in zip(*windows, strict=True)]
 
 
 class _Shared:
@@ -254,37 +235,44 @@ class Edges:
         ]
 
     def looked_at(self, here: State, edge: Edge) -> list[Edge]:
-        """What a bound comes to: the first departures that are safe, if any, and a bound behind them."""
+        """What a bound comes to: all its departures that are safe."""
         first_us, last_us, until_us, duration_us, number, distance_mm, _ = edge
         there = self.numbered[number].segment
         if here.segment.track == there.track:
-            checks = self._run_checks(here.segment, there)
+            forbidden = self._run_forbidden(here.segment, there)
         else:
-            checks = self._hop_checks(here.segment, there, duration_us, distance_mm)
-        safe_us, clear_us = _first_safe(checks, first_us, last_us)
-        if safe_us >= FOREVER:
-            return []
-        return _cut((safe_us, last_us, until_us, duration_us, number, distance_mm, False), clear_us)
+            forbidden = self._hop_forbidden(here.segment, there, duration_us, distance_mm)
+        found: list[Edge] = []
+        for clear_us, next_us in sorted(forbidden):
+            if clear_us >= last_us or first_us >= last_us:
+                break
+            if next_us > first_us:
+                if clear_us >= first_us:
+                    found.append((first_us, clear_us + 1, until_us, duration_us, number, distance_mm, True))
+                first_us = ceil_ms(next_us)
+        if first_us < last_us:
+            found.append((first_us, last_us, until_us, duration_us, number, distance_mm, True))
+        return found
 
-    def _hop_checks(self, here: Segment, there: Segment, duration_us: int, distance_mm: int) -> list[_Check]:
+    def _hop_forbidden(self, here: Segment, there: Segment, duration_us: int, distance_mm: int) -> list[_Forbidden]:
         lift = None if distance_mm else self._roads.lift_at(here)
         taken = junction_segments(self._roads.site, here, there) if lift is None else [platform(lift[0])]
-        return [(*self.departures.held(segment), 0, duration_us) for segment in taken]
+        return [one for segment in taken for one in _forbidden(self.departures.held(segment), 0, duration_us)]
 
-    def _run_checks(self, here: Segment, there: Segment) -> list[_Check]:
-        """What a run sweeps that others hold; from or to a platform it crosses the sill while the platform is there."""
+    def _run_forbidden(self, here: Segment, there: Segment) -> list[_Forbidden]:
+        """What others hold of what a run sweeps; from or to a platform it crosses the sill while that is there."""
         roads, index, held = self._roads, here.index, self.departures.held_on(here.track)
         step = 1 if there.index > index else -1
         sweeps, _ = roads.swept(here.track, abs(there.index - index))
-        found = [
-            (*held[index + step * offset], enter_us, leave_us)
-            for offset, enter_us, leave_us in sweeps
-            if index + step * offset in held
-        ]
+        found: list[_Forbidden] = []
+        for offset, enter_us, leave_us in sweeps:
+            windows = held.get(index + step * offset)
+            if windows is not None:
+                found += _forbidden(windows, enter_us, leave_us)
         reach = -sweeps[0].offset
         for position, sweep in ((here, sweeps[reach]), (there, sweeps[-1 - reach])):
             if roads.lift_at(position) is not None:
-                found.append((*self.departures.held(position), sweep.enter_us, sweep.leave_us))
+                found += _forbidden(self.departures.held(position), sweep.enter_us, sweep.leave_us)
         return found
 
 
