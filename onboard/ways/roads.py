@@ -19,6 +19,8 @@ from onboard.ways.site import TrackKind, WaySite
 
 #: Goals, and sets of them, whose tables are kept for one site.
 _MAX_GOALS = 1_024
+#: Pairs of positions whose least time is kept: bids ask for those between compartments and places again and again.
+_MAX_SHORTEST = 4_096
 #: Goals whose least times from each position are kept.
 _MAX_WAYS = 32
 
@@ -54,6 +56,7 @@ class Roads:
         self.tails: list[tuple[int, tuple[Sweep, ...]]] = []
         self._tails: dict[tuple[int, tuple[Sweep, ...]], int] = {}
         self._ways_us: dict[frozenset[Segment], WaysToGoals] = {}
+        self._shortest_us: dict[tuple[Segment, Segment], int] = {}
         self._to_goals: dict[frozenset[Segment], _Ways] = {}
         for track in site.tracks.values():
             if track.kind is not TrackKind.LIFT:
@@ -183,7 +186,12 @@ class Roads:
 
     def shortest_us(self, origin: Segment, goal: Segment) -> int:
         """Least time between two positions with nobody in the way and every lift at hand; FOREVER without a way."""
-        return self.nearest_us(origin, frozenset((goal,)))
+        found = self._shortest_us.get((origin, goal))
+        if found is None:
+            if len(self._shortest_us) >= _MAX_SHORTEST:
+                self._shortest_us.clear()
+            found = self._shortest_us[origin, goal] = self.nearest_us(origin, frozenset((goal,)))
+        return found
 
     def nearest_us(self, origin: Segment, goals: frozenset[Segment]) -> int:
         """Least time to any of ``goals`` as in ``shortest_us``."""
