@@ -4,13 +4,15 @@ A state is a safe interval of a position. An edge is a move to one of the safe i
 departure is a bound until somebody asks for it, for most edges are never the best way to where they lead.
 
 Runs in one direction sweep their first segments alike, however far they go: so these are taken one after the other, and
-where they leave no departure all longer runs are out of the question too.
+where they leave no departure all longer runs are out of the question too. They sweep their last ones alike as well,
+wherever they come from: when one may arrive is worked out once for all of them (``arrivals``).
 """
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from onboard.core.site import Segment
+from onboard.ways.arrivals import Arrivals
 from onboard.ways.departures import Departures, Held
 from onboard.ways.kinematics import ceil_ms
 from onboard.ways.lifts import platform
@@ -43,42 +45,20 @@ class State:
 
 
 #: A move that leads from one state to another if it departs during ``[first, last)``: first, last, until, duration, the
-#: number of the state that it leads to, what the carrier drives in mm (nothing on a lift), clear. It pays to make it
-#: only while one stands here before ``until``. Departures are bounds, some may be safe at most, unless clear is
-#: ``SAFE``: until ``clear`` those sweeps are clear that a run shares with all longer ones. A plain tuple of integers:
-#: thousands are kept, and what refers to nothing else the collector of garbage leaves alone.
-Edge = tuple[int, int, int, int, int, int, int]
-SAFE = -1
+#: number of the state that it leads to, what the carrier drives in mm (nothing on a lift), is safe. It pays to make it
+#: only while one stands here before ``until``. Departures are bounds, some may be safe at most, unless all are. A plain
+#: tuple of integers: thousands are kept, and what refers to nothing else the collector of garbage leaves alone.
+Edge = tuple[int, int, int, int, int, int, bool]
 #: What is left of a bound that was looked at.
-NO_EDGE: Edge = (0, 0, 0, 0, 0, 0, SAFE)
-_NEVER_CLEAR = 0
+NO_EDGE: Edge = (0, 0, 0, 0, 0, 0, True)
 
-#: Begins and ends of the windows that others hold of a segment, and when the move enters and leaves it.
-_Check = tuple[Sequence[int], Sequence[int], int, int]
+#: Departures between which none is safe, both of them excluded.
+_Forbidden = tuple[int, int]
 
 
-def _first_safe(checks: list[_Check], depart_us: int, last_us: int) -> tuple[int, int]:
-    """The first of the departures in ``[depart, last)`` that are safe; FOREVER for none, and the last one behind it.
-
-    It gets later whenever a check meets what is held, until all of them are clear. A whole millisecond.
-    """
-    until_us, count = FOREVER, len(checks)
-    place = clear = 0
-    while clear < count:
-        begins, ends, enter_us, leave_us = checks[place]
-        meets = bisect_right(ends, depart_us + enter_us)
-        if meets < len(ends):
-            clear_us = begins[meets] - leave_us
-            if clear_us < depart_us:
-                depart_us = -((enter_us - ends[meets]) // _MS) * _MS
-                if depart_us >= last_us:
-                    return FOREVER, FOREVER
-                clear, until_us = 0, FOREVER
-                continue
-            until_us = min(until_us, clear_us)
-        clear += 1
-        place = place + 1 if place + 1 < count else 0
-    return depart_us, until_us
+def _forbidden(windows: Held, enter_us: int, leave_us: int) -> list[_Forbidden]:
+    """What others forbid by holding a segment that the move enters and leaves so long after its departure."""
+    return [(begin_us - leave_us, end_us - enter_us) for begin_us, end_us in zip(*windows, strict=True)]
 
 
 class _Shared:
@@ -98,33 +78,44 @@ class _Shared:
 
     def take(self, count: int) -> None:
         """Take the first ``count`` sweeps into account."""
-        from_us, clear_us, known = self.from_us, self.clear_us, self.known
-        held, index, step = self._held, self._index, self._step
-        while known < count and from_us < self.to_us:
+        from_us, to_us, known, held = self.from_us, self.to_us, self.known, self._held
+        while known < count and from_us < to_us:
             offset, enter_us, leave_us = self._longest[known]
             known += 1
-            windows = held.get(index + step * offset)
+            windows = held.get(self._index + self._step * offset)
             if windows is None:
                 continue
             begins, ends = windows
             meets = bisect_right(ends, from_us + enter_us)
             if meets == len(ends):
                 continue
-            if begins[meets] - leave_us < from_us:
+            clear_us = begins[meets] - leave_us
+            if clear_us < from_us:
                 from_us = -((enter_us - ends[meets]) // _MS) * _MS
-                known, clear_us = 0, FOREVER
-            else:
-                clear_us = min(clear_us, begins[meets] - leave_us)
-                self._end(windows, enter_us, leave_us)
-        self.from_us, self.clear_us, self.known = from_us, clear_us, known
+                known, self.clear_us = 0, FOREVER
+            elif clear_us < to_us - 1:
+                self.clear_us = min(self.clear_us, clear_us)
+                to_us = _last_safe(windows, enter_us, leave_us, to_us)
+        self.from_us, self.to_us, self.known = from_us, to_us, known
 
-    def _end(self, windows: Held, enter_us: int, leave_us: int) -> None:
-        """The last departure is found as the first one is, from the other side."""
-        begins, ends = windows
-        meets = bisect_right(ends, self.to_us - 1 + enter_us)
-        while meets < len(ends) and begins[meets] - leave_us < self.to_us - 1:
-            self.to_us = begins[meets] - leave_us + 1
-            meets = bisect_right(ends, self.to_us - 1 + enter_us)
+
+def _last_safe(windows: Held, enter_us: int, leave_us: int, to_us: int) -> int:
+    """The end of departures before ``to``, of which the last is safe: found as the first is, from the other side."""
+    begins, ends = windows
+    meets = bisect_right(ends, to_us - 1 + enter_us)
+    while meets < len(ends) and begins[meets] - leave_us < to_us - 1:
+        to_us = begins[meets] - leave_us + 1
+        meets = bisect_right(ends, to_us - 1 + enter_us)
+    return to_us
+
+
+def _cut(edge: Edge, clear_us: int) -> list[Edge]:
+    """A bound of which all departures until ``clear_us`` are safe: these, if any, and the bound behind them."""
+    first_us, last_us, until_us, duration_us, number, distance_mm, _ = edge
+    behind_us = max(first_us, ceil_ms(clear_us + 1))
+    found = [(first_us, min(behind_us, last_us), until_us, duration_us, number, distance_mm, True)]
+    bound = (behind_us, last_us, until_us, duration_us, number, distance_mm, False)
+    return found[: behind_us > first_us] + [bound][: behind_us < last_us]
 
 
 class Edges:
@@ -137,6 +128,7 @@ class Edges:
         self.numbered: list[State] = []
         self._states: dict[Segment, list[State]] = {}
         self._until_us: dict[int, dict[int, int]] = {}
+        self._arrivals = Arrivals(departures, self.states)
 
     def states(self, segment: Segment) -> list[State]:
         """The safe intervals for standing at a position, in order."""
@@ -199,33 +191,43 @@ class Edges:
         """Runs in one direction, the nearest first."""
         found: list[Edge] = []
         here = state.segment
-        held = self.departures.held_on(here.track)
+        held, arrivals = self.departures.held_on(here.track), self._arrivals
         shared = _Shared(self._roads.longest(here.track), held, here.index, step, from_us, state.to_us)
-        for (there, duration_us, distance_mm, _), alike in self._roads.runs(here, step):
+        leaves_by_us = self._leaves_by_us(state)
+        for there, duration_us, distance_mm, alike, tail, leave_us in self._roads.runs(here, step):
             pays_us = until_us.get(there.index, 0)
             if pays_us <= from_us:
                 continue
             if shared.known < alike:
                 shared.take(alike)
-                if shared.from_us >= shared.to_us:
-                    break
-            depart_us, to_us = shared.from_us, shared.to_us
-            for one in self.states(there):
-                last_us = one.to_us - duration_us
-                if depart_us >= last_us:
-                    continue
-                first_us = max(depart_us, -((duration_us - one.from_us) // _MS) * _MS)
+            depart_us, to_us = shared.from_us, min(shared.to_us, leaves_by_us - leave_us + 1)
+            if depart_us >= shared.to_us:
+                break
+            windows, lates_us = arrivals[there, tail]
+            for place in range(bisect_right(lates_us, depart_us + duration_us), len(lates_us)):
+                arrive_us, late_us, number = windows[place]
+                first_us = max(depart_us, -((duration_us - arrive_us) // _MS) * _MS)
                 if first_us >= to_us:
                     break
-                last_us = min(last_us, to_us)
-                if first_us < last_us:
-                    found.append((first_us, last_us, pays_us, duration_us, one.number, distance_mm, shared.clear_us))
+                last_us, clear_us = min(late_us - duration_us, to_us), shared.clear_us
+                if first_us < last_us <= clear_us:
+                    found.append((first_us, last_us, pays_us, duration_us, number, distance_mm, True))
+                elif first_us < last_us:
+                    found += _cut((first_us, last_us, pays_us, duration_us, number, distance_mm, False), clear_us)
         return found
+
+    def _leaves_by_us(self, state: State) -> int:
+        """When a platform is away after a state there: whoever leaves it has left it then. FOREVER elsewhere."""
+        if self._roads.lift_at(state.segment) is None:
+            return FOREVER
+        begins, ends = self.departures.held(state.segment)
+        away = bisect_right(ends, state.from_us)
+        return begins[away] if away < len(begins) else FOREVER
 
     def _hops(self, state: State, from_us: int) -> list[Edge]:
         """Hops to other tracks and rides on a lift."""
         return [
-            (first_us, last_us, FOREVER, duration_us, one.number, distance_mm, _NEVER_CLEAR)
+            (first_us, last_us, FOREVER, duration_us, one.number, distance_mm, False)
             for there, duration_us, distance_mm, _ in self._roads.hops(state.segment)
             for one in self.states(there)
             if (first_us := max(from_us, ceil_ms(one.from_us - duration_us)))
@@ -233,55 +235,44 @@ class Edges:
         ]
 
     def looked_at(self, here: State, edge: Edge) -> list[Edge]:
-        """What a bound comes to: the first departures that are safe, if any, and a bound behind them."""
-        _, last_us, until_us, duration_us, number, distance_mm, _ = edge
-        safe_us, clear_us = self._safe(here.segment, edge)
-        if safe_us >= FOREVER:
-            return []
-        behind_us = ceil_ms(clear_us + 1)
-        found = [(safe_us, min(behind_us, last_us), until_us, duration_us, number, distance_mm, SAFE)]
-        if behind_us < last_us:
-            found.append((behind_us, last_us, until_us, duration_us, number, distance_mm, _NEVER_CLEAR))
+        """What a bound comes to: all its departures that are safe."""
+        first_us, last_us, until_us, duration_us, number, distance_mm, _ = edge
+        there = self.numbered[number].segment
+        if here.segment.track == there.track:
+            forbidden = self._run_forbidden(here.segment, there)
+        else:
+            forbidden = self._hop_forbidden(here.segment, there, duration_us, distance_mm)
+        found: list[Edge] = []
+        for clear_us, next_us in sorted(forbidden):
+            if clear_us >= last_us or first_us >= last_us:
+                break
+            if next_us > first_us:
+                if clear_us >= first_us:
+                    found.append((first_us, clear_us + 1, until_us, duration_us, number, distance_mm, True))
+                first_us = ceil_ms(next_us)
+        if first_us < last_us:
+            found.append((first_us, last_us, until_us, duration_us, number, distance_mm, True))
         return found
 
-    def _safe(self, here: Segment, edge: Edge) -> tuple[int, int]:
-        """The first departure of an edge that is safe, in whole milliseconds, and the last one behind it.
-
-        FOREVER for none.
-        """
-        first_us, last_us, _, duration_us, number, distance_mm, clear_us = edge
-        there = self.numbered[number].segment
-        if here.track != there.track:
-            return _first_safe(self._hop_checks(here, there, duration_us, distance_mm), first_us, last_us)
-        if first_us <= clear_us:
-            depart_us, until_us = _first_safe(self._run_checks(here, there, True), first_us, last_us)
-            if depart_us <= clear_us or depart_us >= FOREVER:
-                return depart_us, min(until_us, clear_us)
-            first_us = depart_us
-        return _first_safe(self._run_checks(here, there, False), first_us, last_us)
-
-    def _hop_checks(self, here: Segment, there: Segment, duration_us: int, distance_mm: int) -> list[_Check]:
+    def _hop_forbidden(self, here: Segment, there: Segment, duration_us: int, distance_mm: int) -> list[_Forbidden]:
         lift = None if distance_mm else self._roads.lift_at(here)
         taken = junction_segments(self._roads.site, here, there) if lift is None else [platform(lift[0])]
-        return [(*self.departures.held(segment), 0, duration_us) for segment in taken]
+        return [one for segment in taken for one in _forbidden(self.departures.held(segment), 0, duration_us)]
 
-    def _run_checks(self, here: Segment, there: Segment, is_begun: bool) -> list[_Check]:
-        """What a run sweeps that others hold; if it is begun, without what it shares with all longer runs.
-
-        From or to a platform it crosses the lift's sill while the platform is there.
-        """
+    def _run_forbidden(self, here: Segment, there: Segment) -> list[_Forbidden]:
+        """What others hold of what a run sweeps; from or to a platform it crosses the sill while that is there."""
         roads, index, held = self._roads, here.index, self.departures.held_on(here.track)
         step = 1 if there.index > index else -1
-        sweeps, alike = roads.swept(here.track, abs(there.index - index))
-        found = [
-            (*held[index + step * offset], enter_us, leave_us)
-            for offset, enter_us, leave_us in (sweeps[alike:] if is_begun else sweeps)
-            if index + step * offset in held
-        ]
+        sweeps, _ = roads.swept(here.track, abs(there.index - index))
+        found: list[_Forbidden] = []
+        for offset, enter_us, leave_us in sweeps:
+            windows = held.get(index + step * offset)
+            if windows is not None:
+                found += _forbidden(windows, enter_us, leave_us)
         reach = -sweeps[0].offset
         for position, sweep in ((here, sweeps[reach]), (there, sweeps[-1 - reach])):
             if roads.lift_at(position) is not None:
-                found.append((*self.departures.held(position), sweep.enter_us, sweep.leave_us))
+                found += _forbidden(self.departures.held(position), sweep.enter_us, sweep.leave_us)
         return found
 
 

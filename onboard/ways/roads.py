@@ -19,6 +19,8 @@ from onboard.ways.site import TrackKind, WaySite
 
 #: Goals, and sets of them, whose tables are kept for one site.
 _MAX_GOALS = 1_024
+#: Pairs of positions whose least time is kept: bids ask for those between compartments and places again and again.
+_MAX_SHORTEST = 4_096
 #: Goals whose least times from each position are kept.
 _MAX_WAYS = 32
 
@@ -50,7 +52,11 @@ class Roads:
         self._touched: dict[Segment, list[Segment]] = {}
         self._longest: dict[int, tuple[Sweep, ...]] = {}
         self._swept: dict[tuple[int, int], tuple[tuple[Sweep, ...], int]] = {}
+        #: How runs end: direction and last sweeps, with offsets and times counted from where and when they arrive.
+        self.tails: list[tuple[int, tuple[Sweep, ...]]] = []
+        self._tails: dict[tuple[int, tuple[Sweep, ...]], int] = {}
         self._ways_us: dict[frozenset[Segment], WaysToGoals] = {}
+        self._shortest_us: dict[tuple[Segment, Segment], int] = {}
         self._to_goals: dict[frozenset[Segment], _Ways] = {}
         for track in site.tracks.values():
             if track.kind is not TrackKind.LIFT:
@@ -116,17 +122,25 @@ class Roads:
         return found
 
     def runs(self, here: Segment, step: int) -> "tuple[_Run, ...]":
-        """Runs from a position along its track to lower (``step`` -1) or higher indices (1), the shortest first.
-
-        With each how many of its first sweeps it shares with the longest run of the track.
-        """
+        """Runs from a position along its track to lower (``step`` -1) or higher indices (1), the shortest first."""
         found = self._runs.get((here, step))
         if found is None:
-            moves = self._find_runs(here, step)
-            found = self._runs[here, step] = tuple(
-                (move, self.swept(here.track, abs(move.destination.index - here.index))[1]) for move in moves
-            )
+            found = self._runs[here, step] = tuple(self._run(here, move, step) for move in self._find_runs(here, step))
         return found
+
+    def _run(self, here: Segment, move: Move, step: int) -> "_Run":
+        there, end_us = move.destination, move.duration_us
+        sweeps, alike = self.swept(here.track, abs(there.index - here.index))
+        reach, last = -sweeps[0].offset, sweeps[-1].offset + sweeps[0].offset
+        # The sweep of where it ends is among the last ones in any case: there may be a sill.
+        tail = tuple(
+            Sweep(offset - last, enter_us - end_us, leave_us - end_us)
+            for offset, enter_us, leave_us in sweeps[min(alike, reach + last) :]
+        )
+        number = self._tails.setdefault((step, tail), len(self.tails))
+        if number == len(self.tails):
+            self.tails.append((step, tail))
+        return there, end_us, move.distance_mm, alike, number, sweeps[reach].leave_us
 
     def hops(self, here: Segment) -> Sequence[Move]:
         """Hops and rides from a position, in the order of the site's tracks."""
@@ -172,7 +186,12 @@ class Roads:
 
     def shortest_us(self, origin: Segment, goal: Segment) -> int:
         """Least time between two positions with nobody in the way and every lift at hand; FOREVER without a way."""
-        return self.nearest_us(origin, frozenset((goal,)))
+        found = self._shortest_us.get((origin, goal))
+        if found is None:
+            if len(self._shortest_us) >= _MAX_SHORTEST:
+                self._shortest_us.clear()
+            found = self._shortest_us[origin, goal] = self.nearest_us(origin, frozenset((goal,)))
+        return found
 
     def nearest_us(self, origin: Segment, goals: frozenset[Segment]) -> int:
         """Least time to any of ``goals`` as in ``shortest_us``."""
@@ -259,7 +278,9 @@ def _build(site: WaySite) -> Roads:
     return DirectedRoads(site) if any(track.one_way for track in site.tracks.values()) else Roads(site)
 
 
-_Run = tuple[Move, int]
+#: Where it leads, duration, distance in mm, how many of its first sweeps it shares with the longest run of the track,
+#: how it ends (its place among ``Roads.tails``), and when it leaves the segment where it began.
+_Run = tuple[Segment, int, int, int, int, int]
 #: By track: index and time from there to a goal.
 _Ways = dict[int, list[tuple[int, int]]]
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from onboard.contract.codes import LegAction
 from onboard.core.site import Segment
-from onboard.ways.edges import NO_EDGE, SAFE, Edge, Edges, State, edges_of
+from onboard.ways.edges import NO_EDGE, Edge, Edges, State, edges_of
 from onboard.ways.effort import POP_STEPS, Search, at_once
 from onboard.ways.kinematics import ceil_ms
 from onboard.ways.reservations import FOREVER, Reservations
@@ -236,7 +236,7 @@ class _IntervalSearch:
         phase, state, time_us, _, _, _, visit_ends_us, (aboard_us, travel_mm, moves) = node
         best, is_aboard = self._best[phase], self.roads.lift_at(state.segment) is not None
         is_last, is_any_over = phase == len(self.visits), False
-        for place, (first_us, last_us, until_us, duration_us, number, distance_mm, clear_us) in enumerate(edges):
+        for place, (first_us, last_us, until_us, duration_us, number, distance_mm, is_safe) in enumerate(edges):
             depart_us = max(first_us, time_us)
             if depart_us >= last_us or until_us <= time_us:
                 continue
@@ -248,7 +248,7 @@ class _IntervalSearch:
             effort = aboard_us + waited_us, travel_mm + distance_mm, moves + 1
             if known is not None and (arrival_us, *effort, -depart_us) >= known:
                 continue
-            if clear_us != SAFE:
+            if not is_safe:
                 edges += self.edges.looked_at(state, edges[place])
                 edges[place] = NO_EDGE
                 is_any_over = True

@@ -63,8 +63,10 @@ def test_an_award_is_answered_with_what_was_worked_out_while_the_bid_stood() -> 
     (promised,) = bid.program
     searching.tentative.clear()
     before = searching.effort.steps
-    expected = at_once.renewed(fetch(), promised, now_us)
-    assert searching.renewed(fetch(), promised, 1_001_000)._replace(kept=expected.kept) == expected != promised
+    expected, found = at_once.renewed(fetch(), promised, now_us), searching.renewed(fetch(), promised, 1_001_000)
+    assert expected is not None
+    assert found is not None
+    assert found._replace(kept=expected.kept) == expected != promised
     assert searching.effort.steps == before, "no search is left for the award"
     searching.reserve(fetch(), bid, 10_000)
     searching.tentative.clear()
