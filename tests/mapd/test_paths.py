@@ -4,9 +4,10 @@ import random
 
 import pytest
 
-from onboard.systems.mapd.floor import Floor, NetworkLine, flood, grid_floor, lasting_rests, network_floor
+from onboard.systems.mapd.floor import Floor, NetworkLine, grid_floor, network_floor
 from onboard.systems.mapd.paths import Path, Paths
 from onboard.systems.mapd.search import find_path
+from onboard.ways.rests import lasting_rests
 
 ROW = grid_floor(["....."])
 
@@ -76,10 +77,10 @@ def test_a_one_way_line_is_not_passed_backwards() -> None:
 
 
 def test_homes_that_would_shut_others_in_are_not_lasting() -> None:
-    assert lasting_rests(ROW, [2], [0, 4]) == frozenset()
-    assert lasting_rests(ROW, [0, 4], [1, 3]) == {0, 4}
+    assert lasting_rests(ROW.network, [2], [0, 4]) == frozenset()
+    assert lasting_rests(ROW.network, [0, 4], [1, 3]) == {0, 4}
     bay = grid_floor(["...", "@.@"])
-    assert lasting_rests(bay, [4, 1], [0, 2]) == {4}
+    assert lasting_rests(bay.network, [4, 1], [0, 2]) == {4}
 
 
 def earliest(floor: Floor, others: Paths, cell: int, goals: tuple[int, ...], rest: int) -> int | None:
@@ -152,4 +153,4 @@ def test_p59_the_search_is_as_early_as_an_exhaustive_one() -> None:
 def test_steps_are_those_of_the_free_floor() -> None:
     floor = grid_floor(["..@", "@..", "..."])
     assert floor.steps_to(0)[8] == 4
-    assert flood(floor.ways, [0])[2] > 1000
+    assert floor.steps_to(0)[2] > 1000

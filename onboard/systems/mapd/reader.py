@@ -18,9 +18,9 @@ from onboard.systems.mapd.site import (
     TransportTask,
     cell_station,
     grid_floor,
-    lasting_rests,
     network_floor,
 )
+from onboard.ways.rests import lasting_rests
 
 _NOWHERE = Segment(0, 0)
 #: A cell's token is that of a station, of which there are so many (kinds/mapd/rights.py).
@@ -81,7 +81,7 @@ def _stewards(fleet: FleetReader, floor: Floor | None) -> dict[int, int]:
 
 
 def _open(floor: Floor, cell: int) -> bool:
-    return bool(floor.ways[cell] or floor.back[cell])
+    return bool(floor.ways[cell] or floor.network.back[cell])
 
 
 _Network = tuple[tuple[str, ...], tuple[NetworkLine, ...], tuple[tuple[str, ...], ...]]
@@ -234,7 +234,7 @@ def _check_ways(root: TomlTable, floor: Floor, homes: dict[int, int], endpoints:
                 "endpoints", floor.names[cell], f"no way from and to {floor.names[start]}", "join them"
             )
             return
-    rests = lasting_rests(floor, list(homes.values()), endpoints)
+    rests = lasting_rests(floor.network, list(homes.values()), endpoints)
     for node, cell in homes.items():
         if cell not in rests:
             what = f"node {node} at home would shut others in"

@@ -7,7 +7,7 @@ crosses later, one's former path always remains good: a search that finds nothin
 from collections.abc import Sequence
 from heapq import heappop, heappush
 
-from onboard.systems.mapd.floor import FAR, Floor, flood
+from onboard.systems.mapd.floor import FAR, Floor
 from onboard.systems.mapd.paths import Path, Paths
 
 #: Most states that one search may expand: bounded work, the same on every machine.
@@ -27,7 +27,7 @@ def find_path(
     after = [0] * (len(goals) + 1)
     for index in range(len(goals) - 2, -1, -1):
         after[index] = after[index + 1] + fields[index + 1][goals[index]]
-    to_rest = flood(floor.back, rests)
+    to_rest = floor.steps_to_any(rests)
     if any(after_one >= FAR for after_one in after) or (goals and fields[0][cell] >= FAR):
         return None
     limit = others.horizon + floor.size + step
