@@ -10,9 +10,8 @@ from functools import cached_property
 from itertools import pairwise
 
 from onboard.ways.network import Network
+from onboard.ways.steps import FAR
 
-#: Steps to where no way leads; above every real distance.
-FAR = 1 << 20
 #: What a map calls free: floor, endpoints, homes, and MovingAI's other words for ground (swamp, ground).
 FREE = frozenset(".erSG")
 
@@ -28,7 +27,7 @@ class Floor:
     names: tuple[str, ...]
     ways: tuple[tuple[int, ...], ...]
     resources: tuple[int, ...]
-    _fields: dict[frozenset[int], list[int]] = field(default_factory=dict, compare=False, repr=False)
+    _fields: dict[int, list[int]] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def size(self) -> int:
@@ -42,18 +41,17 @@ class Floor:
             {cell: [(to, 1) for to in ways] for cell, ways in enumerate(self.ways)}, dict(enumerate(self.resources))
         )
 
-    def steps_to(self, *goals: int) -> list[int]:
-        """Steps from each cell to the nearest of ``goals``, nobody in the way; ``FAR`` where no way leads. Kept."""
-        return self.steps_to_any(goals)
+    def steps_to(self, goal: int) -> list[int]:
+        """Steps from each cell to a goal, nobody in the way; ``FAR`` where no way leads. Kept."""
+        found = self._fields.get(goal)
+        if found is None:
+            found = self._fields[goal] = self.steps_to_any((goal,))
+        return found
 
     def steps_to_any(self, goals: Iterable[int]) -> list[int]:
-        """As ``steps_to``, for any collection of cells."""
-        key = frozenset(goals)
-        found = self._fields.get(key)
-        if found is None:
-            steps = self.network.costs_to(key)
-            found = self._fields[key] = [steps.get(cell, FAR) for cell in range(self.size)]
-        return found
+        """Steps from each cell to the nearest of ``goals``, as ``steps_to``."""
+        steps = self.network.costs_to(goals)
+        return [steps.get(cell, FAR) for cell in range(self.size)]
 
 
 def grid_floor(rows: Sequence[str]) -> Floor:

@@ -43,7 +43,7 @@ class Knowledge:
     _parts: dict[int, Assembly] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.paths = Paths(self.floor.resources)
+        self.paths = Paths(self.floor.network)
 
     # --- tasks and steps ---------------------------------------------------------------------------------------
 

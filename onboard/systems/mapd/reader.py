@@ -10,7 +10,6 @@ from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.systems.mapd.fields import MOST_WAYS
 from onboard.systems.mapd.site import (
-    FAR,
     FREE,
     Floor,
     Mapd,
@@ -21,6 +20,7 @@ from onboard.systems.mapd.site import (
     network_floor,
 )
 from onboard.ways.rests import lasting_rests
+from onboard.ways.steps import FAR
 
 _NOWHERE = Segment(0, 0)
 #: A cell's token is that of a station, of which there are so many (kinds/mapd/rights.py).

@@ -11,9 +11,10 @@ from pathlib import Path
 
 from bus_sim.systems.mapd.importers.draft import Draft, Loss, TaskLine, draw_tasks
 from onboard.config.problems import Problems
-from onboard.systems.mapd.floor import FAR, FREE, Floor, grid_floor
+from onboard.systems.mapd.floor import FREE, Floor, grid_floor
 from onboard.systems.mapd.reader import BLOCKED, MAX_RELEASE
 from onboard.ways.rests import lasting_rests
+from onboard.ways.steps import FAR
 
 #: Endpoints drawn on a map that marks none: more than robots on the shipped maps.
 ENDPOINTS = 20
