@@ -136,6 +136,45 @@ def test_a_lift_goes_though_its_gate_was_granted_for_a_boarding_that_was_given_u
     assert report.verdict is RunVerdict.SERVED, report.why()
 
 
+def test_who_fetched_a_car_before_is_not_taken_for_the_winner_of_its_next_task() -> None:
+    """Its compartment lost its power before anybody had won the new task, and waited for the winner of the old one.
+
+    Two crashes a seed on `standard`, seed 5126.
+    """
+    crash = "crash:at_s=304.772808,target=IOC3,restart_s=5.548,frame=56"
+    report = played("standard", 5126, Arrivals(8, 15, 7.5, 200), crash, limit_s=3_600)
+    assert report.verdict is RunVerdict.SERVED, report.why()
+
+
+def test_who_stands_though_it_should_drive_is_known_to_be_late_before_its_run_should_be_over() -> None:
+    """The steward of their slots was off; another planned right through where it stood, and neither could go on again.
+
+    Two crashes a seed on `standard`, seed 6180.
+    """
+    crash = "crash:at_s=226.064149,target=IOC3,restart_s=19.376,frame=42"
+    report = played("standard", 6180, Arrivals(8, 15, 7.5, 200), crash, limit_s=3_600)
+    assert report.verdict is RunVerdict.SERVED, report.why()
+
+
+def test_a_run_planned_long_after_its_award_is_not_taken_for_one_that_began_then() -> None:
+    """By its award it was first on all slots ahead, was granted them, and stood behind whoever should have gone first.
+
+    Two crashes a seed on `standard`, seed 6124.
+    """
+    report = played("standard", 6124, Arrivals(8, 15, 7.5, 200), "crash:at_s=391.601428,target=MR1,restart_s=19.983")
+    assert report.verdict is RunVerdict.SERVED, report.why()
+
+
+def test_who_wins_one_more_task_keeps_its_place_in_the_order_on_the_way_that_it_goes_already() -> None:
+    """It was behind another that was late, and first on the same slots with the new task's plan.
+
+    Two crashes a seed on `standard`, seed 6137.
+    """
+    crash = "crash:at_s=479.350538,target=IOC1,restart_s=10.364,write=2,durable=no"
+    report = played("standard", 6137, Arrivals(8, 15, 7.5, 200), crash)
+    assert report.verdict is RunVerdict.SERVED, report.why()
+
+
 def test_a_winner_that_is_not_noted_yet_is_believed_when_all_are_asked() -> None:
     """The power failed between the award and its record; the task was called anew, and awarded to a second robot.
 

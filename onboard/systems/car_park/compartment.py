@@ -326,9 +326,8 @@ class Compartment:
         """After a restart in the middle of a task: journal, tokens and sensors tell how far it has come."""
         assert self.memory.job is not None
         task, operation, car, wheelbase_mm = self.memory.job
-        of_task, version = self.stewardship.tasks.get(car, (task, 1))
-        winner = self.stewardship.winners.get(car, 0)
-        self.job = BayTask(task, operation, car, wheelbase_mm, winner, version if of_task == task else 1)
+        winner, version = self.stewardship.winner_of(car, task)
+        self.job = BayTask(task, operation, car, wheelbase_mm, winner, version)
         self.job.was_granted = self.memory.was_granted
         if self.job.was_granted:
             self._go(BayPhase.SERVING)

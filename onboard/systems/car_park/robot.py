@@ -52,8 +52,8 @@ from onboard.ways.site import TrackKind
 #: A step that ends this much off its planned time makes the rest of the plan move and be told again: below it windows
 #: still hold.
 REPLAN_TOLERANCE_US = 500_000
-#: A step that is not over this long after its planned end is told to be late, by as much again: others plan on with
-#: what they know until then.
+#: A step that is not over, or a run that does not go on, so long after it should is told to be late, by as much again:
+#: others plan on with what they know until then.
 OVERDUE_US = 2_000_000
 
 
@@ -326,7 +326,7 @@ class ParkingRobot:
         times = [self.carriage.next_wake(), self.going_around.next_wake()]
         step = self.program.step
         if step is not None and self._begun:
-            times.append(step.end_us if step.action is LegAction.STAND else step.end_us + OVERDUE_US)
+            times.append(step.end_us if step.action is LegAction.STAND else self._latest_us(step) + OVERDUE_US)
         return min([time for time in times if time is not None], default=None)
 
     def looks_from(self) -> int:
@@ -431,16 +431,16 @@ class ParkingRobot:
             return self.shuttle.phase is HandlingPhase.DONE
         return now_us >= step.end_us
 
+    def _latest_us(self, step: CarStep) -> int:
+        """When a step has to be over, or its run has to go on from where the carrier stands, to end as planned; us."""
+        return step.end_us - (self.carriage.run_us(step.destination) if step.action is LegAction.TRAVEL else 0)
+
     def _tell_delay(self, step: CarStep, now_us: int) -> list[Effect]:
         """A step that takes longer than planned moves the rest of the plan while it still lasts, so others can plan."""
-        late_us = now_us - step.end_us
+        late_us = now_us - self._latest_us(step)
         if late_us < OVERDUE_US:
             return []
-        # The run in hand began where it began: only its end and what follows are later.
-        by_us = late_us + OVERDUE_US
-        self.program.shift(by_us)
-        first = self.program.steps[0]
-        self.program.steps[0] = first._replace(begin_us=first.begin_us - by_us)
+        self.program.lengthen(late_us + OVERDUE_US)
         # Whoever waits for rights in vain may have lost the task: its initiator answers then.
         return self._publish(now_us) + ([] if step.work is None else self._announce_start(step.work))
 

@@ -121,10 +121,15 @@ class Stewardship:
         if memory.job is None:
             return []
         task, _, car, _ = memory.job
-        if report.task != task or report.phase is not TaskPhase.AWARDED or car in self.winners:
+        winner, version = self.winner_of(car, task)
+        if report.task != task or report.phase is not TaskPhase.AWARDED or winner:
             return []
+        return self.won(car, report.sender, task, version)
+
+    def winner_of(self, car: Reference, task: Reference) -> tuple[int, int]:
+        """Who may fetch a car for ``task``, 0 for nobody, and its version; what was won for another does not count."""
         known, version = self.tasks.get(car, (task, 1))
-        return self.won(car, report.sender, task, version if known == task else 1)
+        return (self.winners.get(car, NOBODY), version) if known == task else (NOBODY, 1)
 
     def _is_news(self, car: Reference, award: Award) -> bool:
         """Whether an award says more than is known; an older version of the same task counts no more."""

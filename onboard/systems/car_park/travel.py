@@ -23,6 +23,7 @@ from onboard.systems.car_park.placing import Placing
 from onboard.systems.car_park.sill import SillProof
 from onboard.systems.car_park.stall import Stall
 from onboard.ways.all_or_none import AllOrNone
+from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lifts import GATE_INDEX, MARK_TOLERANCE_MM, gate, platform
 from onboard.ways.mirror import WayFleet
 from onboard.ways.refuges import refuges
@@ -90,6 +91,14 @@ class Carriage:
         if self._stood is None or self._stood[0] is not self.sensed or self._stood[1] != now:
             self._stood = (self.sensed, now, self._mark())
         return self._stood[2]
+
+    def run_us(self, there: Segment) -> int:
+        """How long a run to ``there`` on its track takes from the mark where it stands, us; 0 while it moves."""
+        here = self.standing_at
+        if here is None or here.track != there.track:
+            return 0
+        pitch_mm = self.fleet.site.tracks[here.track].pitch_mm
+        return run_duration_us(abs(there.index - here.index) * pitch_mm, self.fleet.site.carrier)
 
     def _mark(self) -> Segment | None:
         state = self.sensed
