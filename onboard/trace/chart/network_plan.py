@@ -79,7 +79,9 @@ def draw_plan(
         _draw_way(drawing, spots[way.start], spots[way.end], way)
     half = size * scale / 2
     for place, one in places.items():
-        _draw_place(drawing, *spots[place], half, one)
+        drawing.area(_square(*spots[place], half), one.fill, opacity=1, note=one.name)
+    for place, one in places.items():
+        _name_place(drawing, *spots[place], half, one)
     return drawing
 
 
@@ -95,12 +97,14 @@ def _draw_way(drawing: SvgDrawing, start: Spot, end: Spot, way: PlanWay) -> None
         drawing.area(tips, _WAY, opacity=1)
 
 
-def _draw_place(drawing: SvgDrawing, x: float, y: float, half: float, one: PlanPlace) -> None:
-    corners = [(x - half, y - half), (x + half, y - half), (x + half, y + half), (x - half, y + half)]
-    drawing.area(corners, one.fill, opacity=1, note=one.name)
+def _name_place(drawing: SvgDrawing, x: float, y: float, half: float, one: PlanPlace) -> None:
     if one.robots:
         inner = half * 0.7
         drawing.area([(x - inner, y), (x, y - inner), (x + inner, y), (x, y + inner)], _ROBOT, opacity=0.75)
         drawing.text(x, y + half + 11, " ".join(one.robots), anchor="middle", fill=_ROBOT)
     if one.name:
         drawing.text(x, y - half - 3, one.name, anchor="middle")
+
+
+def _square(x: float, y: float, half: float) -> list[Spot]:
+    return [(x - half, y - half), (x + half, y - half), (x + half, y + half), (x - half, y + half)]
