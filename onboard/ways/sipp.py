@@ -20,11 +20,15 @@ from typing import NamedTuple
 from onboard.contract.codes import LegAction
 from onboard.core.site import Segment
 from onboard.ways.edges import NO_EDGE, SAFE, Edge, State, edges_of
+from onboard.ways.effort import POP_STEPS, Search, at_once
 from onboard.ways.kinematics import ceil_ms
 from onboard.ways.moves import Ground, Moves
 from onboard.ways.reservations import FOREVER, Reservations
 from onboard.ways.roads import roads_of
 from onboard.ways.site import WaySite
+
+#: A search may pause after each so many states taken off its queue.
+PAUSE_POPS = 8
 
 
 class Visit(NamedTuple):
@@ -89,7 +93,7 @@ def free_flow_us(site: WaySite, start: Segment, start_us: int, visits: tuple[Vis
     return time_us
 
 
-def plan_route(
+def planning(
     site: WaySite,
     reservations: Reservations,
     owner: int,
@@ -99,7 +103,7 @@ def plan_route(
     refuges: frozenset[Segment],
     max_expansions: int,
     lift_floors: Mapping[int, int] | None = None,
-) -> Route | NoRoute:
+) -> Search[Route | NoRoute]:
     """The route with the earliest end of the last visit, from standing at ``start`` at bus time ``start_us``.
 
     Equal ends go to the earlier arrival in a refuge, then to less time on platforms, less travel, fewer moves and waits
@@ -117,10 +121,10 @@ def plan_route(
     if not roads.knows(start) or free_flow_us(site, start, start_us, visits) >= FOREVER:
         return NoRoute("a visit is out of reach of the start", 0)
     edges = edges_of(roads, reservations, owner, start_us, floors)
-    return find_route(roads, edges, start, start_us, visits, refuges, max_expansions)
+    return (yield from searching(roads, edges, start, start_us, visits, refuges, max_expansions))
 
 
-def find_route(
+def searching(
     ground: Ground,
     moves: Moves,
     start: Segment,
@@ -128,13 +132,19 @@ def find_route(
     visits: tuple[Visit, ...],
     refuges: frozenset[Segment],
     max_expansions: int,
-) -> Route | NoRoute:
-    """As ``plan_route``, over any ground and moves; ``start_us`` in whole milliseconds."""
+) -> Search[Route | NoRoute]:
+    """As ``planning``, over any ground and moves; ``start_us`` in whole milliseconds."""
     state = moves.state_at(start, start_us)
     if state is None:
         return NoRoute(f"the start {start} is reserved by another machine", 0)
     root = _Node(0, state, start_us, None, LegAction.STAND, start_us, (), (0, 0, 0))
-    return _IntervalSearch(ground, moves, visits, refuges).run(root, max_expansions)
+    found = yield from _IntervalSearch(ground, moves, visits, refuges).run(root, max_expansions)
+    yield found.pops % PAUSE_POPS * POP_STEPS
+    return found
+
+
+#: The same at once.
+plan_route, find_route = at_once(planning), at_once(searching)
 
 
 #: What breaks ties: time standing or riding on platforms, which others may want, then distance, then moves.
@@ -191,13 +201,15 @@ class _IntervalSearch:
         #: End of the last visit and arrival in a refuge of the best route found.
         self._found = FOREVER, FOREVER
 
-    def run(self, root: _Node, max_expansions: int) -> Route | NoRoute:
-        """Search from ``root``; see ``plan_route``."""
+    def run(self, root: _Node, max_expansions: int) -> Search[Route | NoRoute]:
+        """Search from ``root``; see ``plan_route``. It may pause after each ``PAUSE_POPS``."""
         self._push(root)
         pops = 0
         while self._queue:
             *_, node = heappop(self._queue)
             pops += 1
+            if not pops % PAUSE_POPS:
+                yield PAUSE_POPS * POP_STEPS
             phase, state = node.phase, node.state
             if self._best[phase][state.number] != node.label or self._is_over(phase):
                 continue

@@ -32,8 +32,9 @@ from onboard.core.negotiation import (
 )
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park import custody
+from onboard.systems.car_park.alternatives import weighed
 from onboard.systems.car_park.asking import AskingGeneration
-from onboard.systems.car_park.generation import CarParkGeneration, Solution, weighed
+from onboard.systems.car_park.generation import CarParkGeneration, Solution
 from onboard.systems.car_park.giving_way import GivingWay, YieldDecision
 from onboard.systems.car_park.going_around import GoingAround
 from onboard.systems.car_park.handling import ShuttleWork, handle
