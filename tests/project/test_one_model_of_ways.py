@@ -12,6 +12,7 @@ SYSTEMS = Path(__file__).parents[2] / "onboard" / "systems"
 TOOLS = frozenset({"heapq", "bisect"})
 #: Files that do it themselves, and why.
 ELSEWHERE = {
+    "car_park/generation.py": "who of those held back gives way to a plan; no places",
     "car_park/reader/joints.py": "which way alleys lie, from those they go off; nobody moves",
     "cell/geometry.py": "motions of an arm in the plane, around corners of what stands there",
     "terminal/routes.py": "several ways each without a circle, through entities with gates (row M25)",
