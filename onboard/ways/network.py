@@ -1,107 +1,127 @@
-"""A site's segments as a directed graph: along tracks as they may be gone, through mouths, by lifts."""
+"""Places and the ways between them: the one form in which planner, refuges and proofs know where machines move.
 
-from collections.abc import Collection, Iterable, Iterator
+A place is whatever can be hashed and ordered: a slot of an alley, a cell of a floor, a direction of an edge on which
+nobody reverses. What a way costs is above 0, in the unit of who made the network (us, mm, steps).
+"""
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cached_property
-
-from onboard.core.site import Segment
-from onboard.ways.kept import Kept
-from onboard.ways.site import TrackKind, WaySite
-
-#: Sets of lost lifts, in each direction, whose steps are kept.
-_MAX_KEPT = 8
+from heapq import heappop, heappush
+from typing import Any, Generic, Protocol, TypeVar
 
 
-class Network:
-    """Built once for a site. Lifts that do not run are left out by the ``lost`` tracks of each question."""
+class _Ordered(Protocol):
+    def __lt__(self, other: Any, /) -> bool: ...
 
-    def __init__(self, site: WaySite) -> None:
-        self._site = site
-        self._on: dict[Segment, tuple[Segment, ...]] = {}
-        self._kept_steps: dict[tuple[frozenset[int], bool], dict[Segment, tuple[Segment, ...]]] = {}
-        for track in site.tracks.values():
-            if track.kind is not TrackKind.LIFT:
-                for index in range(1, track.length + 1):
-                    self._on[Segment(track.number, index)] = tuple(self._next(Segment(track.number, index)))
 
-    def _next(self, here: Segment) -> Iterator[Segment]:
-        """Where one comes from a segment without a lift."""
-        track = self._site.tracks[here.track]
-        for index in (here.index - 1, here.index + 1):
-            if track.goes(here.index, index):
-                there = Segment(here.track, index)
-                mouth = self._site.mouths.get(there)
-                if mouth is not None:
-                    yield mouth
-                elif 1 <= index <= track.length:
-                    yield there
-        for end in self._site.links.get(here, ()):
-            branch = self._site.tracks[end.track]
-            if branch.goes(end.index, branch.inside(end.index).index):
-                yield branch.inside(end.index)
+Place = TypeVar("Place", bound=_Ordered)
+#: What a way costs where it costs no more than else.
+_NOTHING_MORE: Mapping[Any, int] = {}
+
+
+class Network(Generic[Place]):
+    """``ways[place]`` are the places one way away with what it costs; a one-way way is not named back.
+
+    ``takes`` says what standing at a place takes where that is not the place alone: two bodies exclude each other at
+    places that take the same.
+    """
+
+    def __init__(
+        self, ways: Mapping[Place, Sequence[tuple[Place, int]]], takes: Mapping[Place, Place] | None = None
+    ) -> None:
+        self.ways = ways
+        self.takes: Mapping[Place, Place] = takes if takes is not None else {}
 
     @cached_property
-    def _back(self) -> dict[Segment, tuple[Segment, ...]]:
-        found: dict[Segment, list[Segment]] = {}
-        for here, ahead in self._on.items():
-            for there in ahead:
-                found.setdefault(there, []).append(here)
-        return {here: tuple(before) for here, before in found.items()}
-
-    def from_any(
-        self, starts: Iterable[Segment], *, closed: Collection[Segment] = (), lost: Collection[int] = ()
-    ) -> frozenset[Segment]:
-        """Segments to which a carrier can come from any of ``starts``; not those that are closed, nor through them."""
-        return self._search(starts, self._steps(frozenset(lost), is_back=False), closed)
-
-    def to_any(
-        self, goals: Iterable[Segment], *, closed: Collection[Segment] = (), lost: Collection[int] = ()
-    ) -> frozenset[Segment]:
-        """Segments from which a carrier can come to any of ``goals``."""
-        return self._search(goals, self._steps(frozenset(lost), is_back=True), closed)
-
-    def _search(
-        self, starts: Iterable[Segment], steps: dict[Segment, tuple[Segment, ...]], closed: Collection[Segment]
-    ) -> frozenset[Segment]:
-        ahead = [start for start in starts if start in self._on]
-        found: set[Segment] = set()
-        while ahead:
-            here = ahead.pop()
-            if here not in found and here not in closed:
-                found.add(here)
-                ahead += steps[here]
-        return frozenset(found)
-
-    def _steps(self, lost: frozenset[int], *, is_back: bool) -> dict[Segment, tuple[Segment, ...]]:
-        """Where one comes from each segment, or to it, with rides on the lifts that run; kept."""
-        found = self._kept_steps.get((lost, is_back))
-        if found is None:
-            ways = self._back if is_back else self._on
-            rides: dict[Segment, list[Segment]] = {}
-            for boards, leaves in self._rides(lost):
-                for sill in leaves if is_back else boards:
-                    rides.setdefault(sill, []).extend(boards if is_back else leaves)
-            found = {here: (*ways.get(here, ()), *rides.get(here, ())) for here in self._on}
-            if len(self._kept_steps) >= _MAX_KEPT:
-                self._kept_steps.clear()
-            self._kept_steps[lost, is_back] = found
+    def back(self) -> Mapping[Place, Sequence[tuple[Place, int]]]:
+        """The places from which a way leads to each, with what it costs."""
+        found: dict[Place, list[tuple[Place, int]]] = {place: [] for place in self.ways}
+        for here, ahead in self.ways.items():
+            for there, cost in ahead:
+                found[there].append((here, cost))
         return found
 
-    def _rides(self, lost: Collection[int]) -> Iterator[tuple[list[Segment], list[Segment]]]:
-        """Of each lift that runs the sills over which one boards, and over which one leaves."""
-        for lift in self._site.lifts:
-            sills = self._site.tracks[lift].joins if lift not in lost else ()
-            boards = [sill for sill in sills if self._crosses(sill, is_boarding=True)]
-            yield boards, [sill for sill in sills if self._crosses(sill, is_boarding=False)]
+    # --- what is reached ---------------------------------------------------------------------------------------
 
-    def _crosses(self, sill: Segment, *, is_boarding: bool) -> bool:
-        beyond = self._site.beyond(sill)
-        way = (sill.index, beyond.index) if is_boarding else (beyond.index, sill.index)
-        return self._site.tracks[sill.track].goes(*way)
+    def from_any(self, starts: Iterable[Place], *, closed: Collection[Place] = ()) -> frozenset[Place]:
+        """Places to which one comes from any of ``starts``; not those that are closed, nor through them."""
+        return _spread(starts, self.ways, closed)
+
+    def to_any(self, goals: Iterable[Place], *, closed: Collection[Place] = ()) -> frozenset[Place]:
+        """Places from which one comes to any of ``goals``."""
+        return _spread(goals, self.back, closed)
+
+    def ground(self, hub: Collection[Place], *, closed: Collection[Place] = ()) -> frozenset[Place]:
+        """All between which one comes to and fro, any of ``hub`` among them."""
+        return self.from_any(hub, closed=closed) & self.to_any(hub, closed=closed)
+
+    # --- shortest ways -----------------------------------------------------------------------------------------
+
+    def costs_to(self, goals: Mapping[Place, int] | Iterable[Place]) -> dict[Place, int]:
+        """The least cost from each place to any of ``goals``, which may cost something themselves (Dijkstra 1959).
+
+        Places from which no way leads there are left out. Places of one cost are looked at together, so that ways which
+        all cost the same are found as fast as by breadth first.
+        """
+        found: dict[Place, int] = {}
+        costs = goals if isinstance(goals, Mapping) else dict.fromkeys(goals, 0)
+        border: dict[int, list[Place]] = {}
+        for goal, cost in costs.items():
+            border.setdefault(cost, []).append(goal)
+        queue, back = sorted(border), self.back
+        while queue:
+            reached = heappop(queue)
+            for here in border.pop(reached):
+                if here in found:
+                    continue
+                found[here] = reached
+                for before, more in back.get(here, ()):
+                    if before in found:
+                        continue
+                    cost = reached + more
+                    if cost in border:
+                        border[cost].append(before)
+                    else:
+                        border[cost] = [before]
+                        heappush(queue, cost)
+        return found
+
+    def way(
+        self, start: Place, costs_to: Mapping[Place, int], more: Mapping[Place, int] = _NOTHING_MORE
+    ) -> tuple[Place, ...] | None:
+        """The cheapest way to where ``costs_to`` is 0, both ends included; None where no way leads there.
+
+        To come to a place of ``more`` costs so much more. Of ways that cost the same the one by the lowest places. Best
+        first by what is known to be left (A*; Hart, Nilsson and Raphael 1968).
+        """
+        if start not in costs_to:
+            return None
+        queue: list[tuple[int, tuple[Place, ...]]] = [(costs_to[start], (start,))]
+        closed: set[Place] = set()
+        while queue:
+            least, way = heappop(queue)
+            here = way[-1]
+            left = costs_to[here]
+            if not left:
+                return way
+            if here in closed:
+                continue
+            closed.add(here)
+            for there, cost in self.ways[here]:
+                left_there = costs_to.get(there)
+                if left_there is not None and there not in closed:
+                    heappush(queue, (least - left + cost + more.get(there, 0) + left_there, (*way, there)))
+        return None
 
 
-_networks: Kept[WaySite, Network] = Kept(Network)
-
-
-def network_of(site: WaySite) -> Network:
-    """The network of a site, built at the first call for this very object."""
-    return _networks.of(site)
+def _spread(
+    starts: Iterable[Place], ways: Mapping[Place, Sequence[tuple[Place, int]]], closed: Collection[Place]
+) -> frozenset[Place]:
+    ahead = [start for start in starts if start in ways]
+    found: set[Place] = set()
+    while ahead:
+        here = ahead.pop()
+        if here not in found and here not in closed:
+            found.add(here)
+            ahead += [there for there, _ in ways[here]]
+    return frozenset(found)

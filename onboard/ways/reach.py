@@ -8,8 +8,8 @@ from collections.abc import Collection
 
 from onboard.core.site import Segment, Station
 from onboard.ways.kept import Kept
-from onboard.ways.network import network_of
 from onboard.ways.site import BayUse, TrackKind, WaySite
+from onboard.ways.slots import slots_of
 
 
 def reached(site: WaySite, *, lost: Collection[int] = (), standing: Collection[Segment] = ()) -> frozenset[Segment]:
@@ -19,7 +19,7 @@ def reached(site: WaySite, *, lost: Collection[int] = (), standing: Collection[S
     not reached themselves.
     """
     starts = site.fronts(BayUse.ENTRY, BayUse.BOTH)
-    found = network_of(site).from_any(starts, closed=standing, lost=lost)
+    found = slots_of(site, lost).from_any(starts, closed=standing)
     return frozenset(here for here in found if site.tracks[here.track].kind is TrackKind.ALLEY)
 
 

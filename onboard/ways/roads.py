@@ -5,7 +5,7 @@ each alley that it serves, index 0 or length + 1; a ride is a move from one of t
 """
 
 from collections.abc import Collection, Iterator, Sequence
-from heapq import heappop, heappush
+from functools import cached_property
 from typing import NamedTuple
 
 from onboard.core.site import Segment
@@ -13,6 +13,7 @@ from onboard.ways.kept import Kept
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lift_uses import ride_us
 from onboard.ways.lifts import lift_tracks, platform_on
+from onboard.ways.network import Network
 from onboard.ways.occupancy import Sweep, alley_segments, leg_sweeps, turn_in_us
 from onboard.ways.reservations import FOREVER
 from onboard.ways.site import TrackKind, WaySite
@@ -45,7 +46,6 @@ class Roads:
         self._positions: dict[int, dict[int, Segment]] = {}
         self._run_us: dict[int, tuple[int, ...]] = {}
         self._hops: dict[Segment, list[Move]] = {}
-        self._hops_in: dict[Segment, list[tuple[Segment, int]]] = {}
         self._junctions: dict[int, list[Segment]] = {}
         self._platforms: dict[Segment, tuple[int, int]] = {}
         self._runs: dict[tuple[Segment, int], tuple[_Run, ...]] = {}
@@ -95,7 +95,6 @@ class Roads:
 
     def _join(self, here: Segment, hop: Move) -> None:
         self._hops.setdefault(here, []).append(hop)
-        self._hops_in.setdefault(hop.destination, []).append((here, hop.duration_us))
         for end in (here, hop.destination):
             junctions = self._junctions.setdefault(end.track, [])
             if end not in junctions:
@@ -213,31 +212,42 @@ class Roads:
         return found
 
     def _ways_to(self, goals: frozenset[Segment]) -> "_Ways":
-        """Goals and junctions by track, with the least time from each to a goal (Dijkstra 1959, against the moves)."""
+        """Goals and junctions by track, with the least time from each to a goal."""
         found = self._to_goals.get(goals)
         if found is not None:
             return found
         if len(self._to_goals) >= _MAX_GOALS:
             self._to_goals.clear()
         found = self._to_goals[goals] = {}
-        queue = [(0, goal) for goal in sorted(goals) if self.knows(goal)]
-        closed: set[Segment] = set()
-        while queue:
-            time_us, here = heappop(queue)
-            if here in closed:
-                continue
-            closed.add(here)
+        # One comes to a goal from a junction of its track, and to that from everywhere else.
+        starts = {goal: 0 for goal in sorted(goals) if self.knows(goal)}
+        for goal in [*starts]:
+            for junction, run_us in self._junctions_before(goal):
+                starts[junction] = min(run_us, starts.get(junction, FOREVER))
+        times_us = self.network.costs_to(starts)
+        for here, time_us in times_us.items():
             found.setdefault(here.track, []).append((here.index, time_us))
-            for origin, duration_us in self._hops_in.get(here, ()):
-                heappush(queue, (time_us + duration_us, origin))
-            durations = self._run_us[here.track]
-            for junction in self._junctions_before(here):
-                heappush(queue, (time_us + durations[abs(here.index - junction.index)], junction))
         return found
 
-    def _junctions_before(self, here: Segment) -> Collection[Segment]:
-        """Junctions of a position's track from which a run leads to it."""
-        return self._junctions.get(here.track, ())
+    @cached_property
+    def network(self) -> Network[Segment]:
+        """Junctions of all tracks and the moves between them, us: hops, rides, and runs along the track."""
+        ways: dict[Segment, list[tuple[Segment, int]]] = {
+            one: [(hop.destination, hop.duration_us) for hop in self.hops(one)]
+            for on_track in self._junctions.values()
+            for one in on_track
+        }
+        for there in ways:
+            for here, run_us in self._junctions_before(there):
+                if here != there:
+                    ways[here].append((there, run_us))
+        return Network(ways)
+
+    def _junctions_before(self, here: Segment) -> Iterator[tuple[Segment, int]]:
+        """Junctions of a position's track from which a run leads to it, with its duration."""
+        durations = self._run_us[here.track]
+        for one in self._junctions.get(here.track, ()):
+            yield one, durations[abs(here.index - one.index)]
 
 
 class WaysToGoals:
@@ -269,9 +279,9 @@ class DirectedRoads(Roads):
         track = self.site.tracks[here.track]
         return (run for run in super()._find_runs(here, step) if track.goes(here.index, run.destination.index))
 
-    def _junctions_before(self, here: Segment) -> Collection[Segment]:
+    def _junctions_before(self, here: Segment) -> Iterator[tuple[Segment, int]]:
         track = self.site.tracks[here.track]
-        return [one for one in super()._junctions_before(here) if track.goes(one.index, here.index)]
+        return (found for found in super()._junctions_before(here) if track.goes(found[0].index, here.index))
 
 
 def _build(site: WaySite) -> Roads:

@@ -1,9 +1,7 @@
 """How many machines can rest on any network at the same time, where, and what can be reached at all.
 
-A set of resting places is well formed if with a machine at each of them the others still come from every compartment to
-every place and back (Cap, Novak, Kleiner, Selecky 2015, "Prioritized planning algorithms for trajectory coordination",
-section 4): then whoever has a task finds a way whatever the others wait for. Found by taking slots away. At most one
-machine rests on a track; the places of its own track it serves, or lets others past by going to another rest.
+The rule is that of ``onboard.ways.rests``: all come from every compartment to every place and back. At most one machine
+rests on a track; the places of its own track it serves, or lets others past by going to another rest.
 """
 
 from collections.abc import Iterator
@@ -11,9 +9,10 @@ from dataclasses import dataclass
 
 from onboard.core.site import Segment, Station
 from onboard.ways.kept import Kept
-from onboard.ways.network import Network, network_of
 from onboard.ways.occupancy import standing_segments
+from onboard.ways.rests import Rest, cut_off
 from onboard.ways.site import BayUse, TrackKind, WaySite
+from onboard.ways.slots import slots_of
 
 _NEEDED = "is needed by all, so nobody may stand there for ever"
 
@@ -41,7 +40,7 @@ class Room:
 
 def reachable(site: WaySite) -> Reach:
     """What the ways of a site lead to with nobody in the way."""
-    network = network_of(site)
+    network = slots_of(site)
     comes = network.from_any(site.fronts(BayUse.ENTRY, BayUse.BOTH))
     goes = network.to_any(site.fronts(BayUse.EXIT, BayUse.BOTH))
     return Reach(
@@ -60,7 +59,7 @@ class _Finder:
 
     def __init__(self, site: WaySite) -> None:
         self.site = site
-        self.network: Network = network_of(site)
+        self.network = slots_of(site)
         self.fronts = site.fronts(*BayUse)
         self.kept = kept_free(site)
         self.needed = {station.segment for station in site.places} | set(self.fronts)
@@ -103,11 +102,6 @@ class _Finder:
         if stretch:
             yield tuple(stretch)
 
-    def _ground(self, closed: set[Segment]) -> frozenset[Segment]:
-        """All between which one comes to and fro, the first compartment's front among them."""
-        first = self.fronts[:1]
-        return self.network.from_any(first, closed=closed) & self.network.to_any(first, closed=closed)
-
     def _cuts(self, track: int, stretch: tuple[Segment, ...]) -> frozenset[Segment]:
         """What would be needed and could not be reached with a machine there, the resting ones themselves included.
 
@@ -115,20 +109,19 @@ class _Finder:
         whichever they are in.
         """
         taken = {**self.taken, track: [*self.taken.get(track, ()), stretch]}
-        bodies = {
-            number: set().union(*(standing_segments(self.site, one[0]) for one in stretches))
+        rests = [
+            Rest(
+                places=tuple(one[0] for one in stretches),
+                body=frozenset(slot for one in stretches for slot in standing_segments(self.site, one[0])),
+                beside=frozenset(one for one in self.needed if one.track == number),
+            )
             for number, stretches in taken.items()
-        }
-        closed = set().union(*bodies.values())
-        lost = {one for one in self.needed if one.track not in taken} - self._ground(closed)
-        for number, stretches in taken.items():
-            ground = self._ground(closed - bodies[number])
-            beside = {one for one in self.needed if one.track == number}
-            lost |= (beside | {one[0] for one in stretches}) - ground
-        return frozenset(lost)
+        ]
+        elsewhere = [one for one in self.needed if one.track not in taken]
+        return cut_off(self.network, self.fronts[:1], rests, elsewhere)
 
     def _hidden(self, resting: Segment) -> int:
-        ground = self._ground(set(standing_segments(self.site, resting)))
+        ground = self.network.ground(self.fronts[:1], closed=set(standing_segments(self.site, resting)))
         return sum(1 for one in self.needed if one.track == resting.track and one not in ground)
 
     def _why_not(self, track: int) -> str:

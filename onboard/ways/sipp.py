@@ -19,11 +19,12 @@ from typing import NamedTuple
 
 from onboard.contract.codes import LegAction
 from onboard.core.site import Segment
-from onboard.ways.edges import NO_EDGE, Edge, Edges, State, edges_of
+from onboard.ways.edges import NO_EDGE, Edge, State, edges_of
 from onboard.ways.effort import POP_STEPS, Search, at_once
 from onboard.ways.kinematics import ceil_ms
+from onboard.ways.moves import Ground, Moves
 from onboard.ways.reservations import FOREVER, Reservations
-from onboard.ways.roads import Roads, roads_of
+from onboard.ways.roads import roads_of
 from onboard.ways.site import WaySite
 
 #: A search may pause after each so many states taken off its queue.
@@ -120,17 +121,30 @@ def planning(
     if not roads.knows(start) or free_flow_us(site, start, start_us, visits) >= FOREVER:
         return NoRoute("a visit is out of reach of the start", 0)
     edges = edges_of(roads, reservations, owner, start_us, floors)
-    state = edges.state_at(start, start_us)
+    return (yield from searching(roads, edges, start, start_us, visits, refuges, max_expansions))
+
+
+def searching(
+    ground: Ground,
+    moves: Moves,
+    start: Segment,
+    start_us: int,
+    visits: tuple[Visit, ...],
+    refuges: frozenset[Segment],
+    max_expansions: int,
+) -> Search[Route | NoRoute]:
+    """As ``planning``, over any ground and moves; ``start_us`` in whole milliseconds."""
+    state = moves.state_at(start, start_us)
     if state is None:
         return NoRoute(f"the start {start} is reserved by another machine", 0)
     root = _Node(0, state, start_us, None, LegAction.STAND, start_us, (), (0, 0, 0))
-    found = yield from _IntervalSearch(roads, edges, visits, refuges).run(root, max_expansions)
+    found = yield from _IntervalSearch(ground, moves, visits, refuges).run(root, max_expansions)
     yield found.pops % PAUSE_POPS * POP_STEPS
     return found
 
 
 #: The same at once.
-plan_route = at_once(planning)
+plan_route, find_route = at_once(planning), at_once(searching)
 
 
 #: What breaks ties: time standing or riding on platforms, which others may want, then distance, then moves.
@@ -169,7 +183,7 @@ class _IntervalSearch:
     max(t + work, floor) with nobody in the way.
     """
 
-    def __init__(self, roads: Roads, edges: Edges, visits: tuple[Visit, ...], refuges: frozenset[Segment]) -> None:
+    def __init__(self, roads: Ground, edges: Moves, visits: tuple[Visit, ...], refuges: frozenset[Segment]) -> None:
         self.roads = roads
         self.edges = edges
         self.visits = visits
@@ -299,7 +313,7 @@ def _fits(state: State, visit: Visit) -> bool:
     return max(state.from_us, ceil_ms(visit.not_before_us)) + ceil_ms(visit.dwell_us) <= state.to_us
 
 
-def _tails(roads: Roads, visits: tuple[Visit, ...]) -> list[tuple[int, int]]:
+def _tails(roads: Ground, visits: tuple[Visit, ...]) -> list[tuple[int, int]]:
     """For each phase the constants of ``_IntervalSearch``, from the last visit backwards."""
     tails: list[tuple[int, int]] = []
     work_us = floor_us = 0
@@ -313,7 +327,7 @@ def _tails(roads: Roads, visits: tuple[Visit, ...]) -> list[tuple[int, int]]:
     return tails[::-1]
 
 
-def _legs(roads: Roads, node: _Node) -> list[RouteLeg]:
+def _legs(roads: Ground, node: _Node) -> list[RouteLeg]:
     """The legs from the start to ``node``, waits made explicit.
 
     A route that sets off with a hop gets a first leg of no length, so that it tells where the hop begins.
@@ -334,7 +348,7 @@ def _legs(roads: Roads, node: _Node) -> list[RouteLeg]:
     return legs[::-1]
 
 
-def _ride(roads: Roads, node: _Node, here: Segment) -> RouteLeg:
+def _ride(roads: Ground, node: _Node, here: Segment) -> RouteLeg:
     stops = roads.lift_at(here), roads.lift_at(node.state.segment)
     if stops[0] is None or stops[1] is None:
         raise AssertionError(f"a ride from {here} to {node.state.segment}, which are no platforms")

@@ -19,7 +19,7 @@ def test_g09_a_robot_goes_round_rather_than_back() -> None:
     assert Graph({(0, 1): 1, (1, 2): 1}).way(1, 2, 0) is None
 
 
-def test_g12_floyd_gives_what_trying_all_ways_gives() -> None:
+def test_g12_shortest_ways_are_what_trying_all_ways_gives() -> None:
     chance = random.Random(12)
     for _ in range(4):
         lengths = {one: chance.randint(1, 9) for one in grid(2, 4).lengths_mm}

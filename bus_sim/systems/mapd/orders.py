@@ -7,7 +7,8 @@ from bus_sim.systems.mapd.plant import UnitPlant
 from bus_sim.systems.orders import EndedOrder, OrderArrivals, nothing_to_draw, tally
 from bus_sim.systems.stage import Tally
 from onboard.contract.codes import OrderResult
-from onboard.systems.mapd.site import FAR, Mapd, TransportTask
+from onboard.systems.mapd.site import Mapd, TransportTask
+from onboard.ways.steps import FAR
 
 #: So many endpoints are looked at to see how long ways are: enough for a mean, and cheap.
 SAMPLE = 12

@@ -46,7 +46,7 @@ class SteppedDay:
 
     def __post_init__(self) -> None:
         self.robots = [SteppingRobot(number, home) for number, home in enumerate(self.homes)]
-        self.paths = Paths(self.floor.resources)
+        self.paths = Paths(self.floor.network)
         for robot in self.robots:
             self.paths.put(robot.number, Path(0, (robot.home,)))
         self.waiting = sorted(self.tasks, key=lambda task: (task.release, task.number))[::-1]

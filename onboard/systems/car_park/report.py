@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+from onboard.config.site_report import counted, machines_line
 from onboard.contract.codes import KindCode
 from onboard.core.site import Machine, Segment, Station
 from onboard.systems.car_park.room import ranges_text, robots_of, robots_text, room_text
@@ -10,11 +11,7 @@ from onboard.ways.reach import hidden_by, reached, stranded_by
 from onboard.ways.room import reachable
 from onboard.ways.site import BayUse, Track, TrackKind
 
-_KINDS = (
-    (KindCode.COMPARTMENT, "compartment"),
-    (KindCode.LIFT, "lift"),
-    (KindCode.ROBOT, "robot"),
-)
+_KINDS = {KindCode.COMPARTMENT: "compartment", KindCode.LIFT: "lift", KindCode.ROBOT: "robot"}
 
 
 def lines(site: CarPark) -> list[str]:
@@ -24,7 +21,7 @@ def lines(site: CarPark) -> list[str]:
         *_floors_lines(site),
         _places_line(site),
         _reached_line(site),
-        f"machines: {', '.join(_machine_words(site, kind, word) for kind, word in _KINDS if _named(site, kind))}",
+        machines_line(site, _KINDS),
         f"{room_text(site, robots_of(site))}, {robots_text(robots_of(site))}",
         *(_loss_line(site, lift) for lift in lifts),
         *_one_way_lines(site),
@@ -41,7 +38,7 @@ def _floors_lines(site: CarPark) -> list[str]:
     lengths = {track.length for tracks in by_level.values() for track in tracks}
     spurs = sum(1 for track in site.tracks.values() if track.kind is TrackKind.SPUR)
     span = f"{min(lengths)} to {max(lengths)}" if len(lengths) > 1 else f"{max(lengths)}"
-    beside = f", {_counted(spurs, 'spur')}" if spurs else ""
+    beside = f", {counted(spurs, 'spur')}" if spurs else ""
     if all(len(tracks) == 1 for tracks in by_level.values()):
         return [f"floors: {len(by_level)} of {span} positions{beside}"]
     count = sum(map(len, by_level.values()))
@@ -106,19 +103,6 @@ def _next_one_way(site: CarPark, track: Track) -> int | None:
     return next((number for number in off if site.tracks[number].one_way), None)
 
 
-def _machine_words(site: CarPark, kind: KindCode, word: str) -> str:
-    names = _named(site, kind)
-    return f"{_counted(len(names), word)} ({', '.join(names)})"
-
-
-def _named(site: CarPark, kind: KindCode) -> list[str]:
-    return [machine.name for machine in site.machines.values() if machine.kind is kind]
-
-
-def _counted(count: int, word: str) -> str:
-    return f"{count} {word}{'' if count == 1 else 's'}"
-
-
 def _loss_line(site: CarPark, lift: Machine) -> str:
     """What stays possible when a lift is lost while every robot stands at its home."""
     track = lift.home.track
@@ -138,7 +122,7 @@ def _stranded_words(site: CarPark, lost: int, stranded: tuple[Station, ...]) -> 
     found = {segment.track for segment in reached(site, lost=(lost,))}
     robots = [one for one in site.machines.values() if one.kind is KindCode.ROBOT]
     there = [one.name for one in robots if _alley(site, one.home) not in found]
-    words = f"{_counted(len(stranded), 'place')} on floor{'s' if len(floors) > 1 else ''} "
+    words = f"{counted(len(stranded), 'place')} on floor{'s' if len(floors) > 1 else ''} "
     words += f"{ranges_text(floors)} cannot be reached"
     if there:
         words += f", and {', '.join(there)} cannot leave"

@@ -17,8 +17,9 @@ class GraphDiagram(Rows):
     def __init__(self, site: FactoryGraph, from_us: int | None, until_us: int | None) -> None:
         super().__init__(site, from_us, until_us)
         self._site = site
-        nodes = sorted({node for one, other, _ in site.edges for node in (one, other)})
-        order = [nodes[number] for number in by_distance(_ways(site, nodes))]
+        nodes = site.graph.nodes
+        far = [site.graph.nodes_network.costs_to((node,)) for node in nodes]
+        order = [nodes[number] for number in by_distance([[row[node] for node in nodes] for row in far])]
         self._rows = {node: float(row) for row, node in enumerate(order)}
         self._panel = Panel("nodes", [node_name(node) for node in order])
         self.panels = [self._panel]
@@ -76,19 +77,6 @@ class GraphDiagram(Rows):
                 self._panel.lines.append(line)
             if node in self._loading:
                 self._load(node, self._loading[node], time_us)
-
-
-def _ways(site: FactoryGraph, nodes: list[int]) -> list[list[float]]:
-    """The shortest ways between all nodes, mm (Floyd and Warshall)."""
-    far = [[0.0 if one == other else float("inf") for other in nodes] for one in nodes]
-    for one, other, length_mm in site.edges:
-        a, b = nodes.index(one), nodes.index(other)
-        far[a][b] = far[b][a] = float(length_mm)
-    for via in range(len(nodes)):
-        for row in far:
-            for number in range(len(nodes)):
-                row[number] = min(row[number], row[via] + far[via][number])
-    return far
 
 
 DIAGRAM = GraphDiagram

@@ -1,13 +1,14 @@
 """The graph that robots move on, and shortest ways on it (rows G01, G03, G09, G12).
 
 Nodes are numbers 0 to 254; an edge is the pair of its ends, the lower first; a *direction* is an edge with a sense. As
-no robot reverses, ways are sought from direction to direction: Floyd's algorithm (1962) over directions, not nodes.
+no robot reverses, ways are sought from direction to direction, not from node to node.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+
+from onboard.ways.network import Network
 
 #: Ends of an edge, lower node first.
 Edge = tuple[int, int]
@@ -54,73 +55,60 @@ class Graph:
 
     # --- ways --------------------------------------------------------------------------------------------------
 
-    def next_node(self, came_from: int, node: int, goal: int) -> int | None:
-        """Where a robot that comes to ``node`` from ``came_from`` (or ``NOWHERE``) goes next on a shortest way.
+    @cached_property
+    def nodes_network(self) -> Network[int]:
+        """Nodes and edges as places and ways, mm: what is joined, for whoever looks at no robot's nose."""
+        return Network({node: self._ahead(NOWHERE, node) for node in self.nodes})
 
-        Of equal ways the one by the lowest next node. None at the goal, or where there is no way without reversing.
+    @cached_property
+    def network(self) -> Network[Direction]:
+        """Directions, and standing in a node, as places; on each one way to every edge but the one come by, mm."""
+        starts = [(NOWHERE, node) for node in self.nodes]
+        directions = [*self.lengths_mm, *((other, one) for one, other in self.lengths_mm), *starts]
+        ways = {(one, node): [((node, after), mm) for after, mm in self._ahead(one, node)] for one, node in directions}
+        return Network(ways, {here: edge(*here) for here in directions if here[0] != NOWHERE})
+
+    def _ahead(self, came_from: int, node: int) -> list[tuple[int, int]]:
+        return [(after, self.length_mm(node, after)) for after in self.neighbours[node] if after != came_from]
+
+    def to_go_mm(self, goal: int) -> dict[Direction, int]:
+        """How far it is to a node from the end of each direction from which a way leads there; kept."""
+        found = self._to_go.get(goal)
+        if found is None:
+            there = [(one, goal) for one in (NOWHERE, *self.neighbours[goal])]
+            found = self._to_go[goal] = self.network.costs_to(there)
+        return found
+
+    def way(
+        self, came_from: int, node: int, goal: int, extra_mm: Mapping[Direction, int] | None = None
+    ) -> tuple[int, ...] | None:
+        """The nodes of a shortest way from ``node`` to ``goal``, both included; None where there is no way.
+
+        A robot that comes from ``came_from`` (or ``NOWHERE``) does not reverse. ``extra_mm`` is what some directions
+        cost more. Of equal ways the one by the lowest nodes.
         """
+        way = self.network.way((came_from, node), self.to_go_mm(goal), extra_mm or {})
+        return None if way is None else tuple(end for _, end in way)
+
+    def next_node(self, came_from: int, node: int, goal: int) -> int | None:
+        """The node after ``node`` on a shortest way. None at the goal, or where there is no way without reversing."""
         key = (came_from, node, goal)
         if key not in self._next:
-            found = [
-                (self.length_mm(node, after) + rest, after)
-                for after in self.neighbours[node]
-                if after != came_from and (rest := self._to_go.get((node, after), {}).get(goal)) is not None
-            ]
-            self._next[key] = min(found)[1] if found and node != goal else None
+            way = self.way(came_from, node, goal)
+            self._next[key] = way[1] if way is not None and node != goal else None
         return self._next[key]
-
-    def way(self, came_from: int, node: int, goal: int) -> tuple[int, ...] | None:
-        """The nodes of a shortest way from ``node`` to ``goal``, both included; None where there is no way."""
-        nodes = [node]
-        while node != goal:
-            after = self.next_node(came_from, node, goal)
-            if after is None:
-                return None
-            came_from, node = node, after
-            nodes.append(node)
-        return tuple(nodes)
 
     def distance_mm(self, came_from: int, node: int, goal: int) -> int | None:
         """Length of a shortest way; 0 at the goal, None where there is no way."""
-        nodes = self.way(came_from, node, goal)
-        return None if nodes is None else sum(self.length_mm(*ends) for ends in pairwise(nodes))
+        return self.to_go_mm(goal).get((came_from, node))
 
     @cached_property
     def _next(self) -> dict[tuple[int, int, int], int | None]:
         return {}
 
     @cached_property
-    def _to_go(self) -> dict[Direction, dict[int, int]]:
-        """By direction and goal, how far it is from the direction's end on."""
-        return {
-            (start, end): {
-                goal: min(distances[into] for into in distances if into[1] == goal)
-                for goal in {node for _, node in distances}
-            }
-            for (start, end), distances in self._floyd()
-        }
-
-    def _floyd(self) -> Iterator[tuple[Direction, dict[Direction, int]]]:
-        """Floyd's algorithm: for each direction the length from its end to the end of every direction within reach."""
-        directions = [*self.lengths_mm, *((other, one) for one, other in self.lengths_mm)]
-        table: dict[Direction, dict[Direction, int]] = {
-            (one, other): {
-                (other, after): self.length_mm(other, after) for after in self.neighbours[other] if after != one
-            }
-            for one, other in directions
-        }
-        for one, other in directions:
-            table[one, other][one, other] = 0
-        for middle in directions:
-            onward = table[middle].items()
-            for row in table.values():
-                first = row.get(middle)
-                if first is None:
-                    continue
-                for last, length in list(onward):
-                    if first + length < row.get(last, first + length + 1):
-                        row[last] = first + length
-        yield from table.items()
+    def _to_go(self) -> dict[int, dict[Direction, int]]:
+        return {}
 
 
 def ring(nodes: int, length_mm: int = 1) -> Graph:

@@ -5,7 +5,6 @@ paper's rules they do not: those are certified for shortest ways only.
 """
 
 from dataclasses import dataclass, field
-from heapq import heappop, heappush
 from itertools import pairwise
 
 from onboard.contract.codes import Criterion, KindCode, Operation
@@ -16,30 +15,9 @@ from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine
 from onboard.systems.graph.errands import Errand
 from onboard.systems.graph.fields import NO_NODE
-from onboard.systems.graph.network import NOWHERE, Direction, Graph
+from onboard.systems.graph.network import NOWHERE, Direction
 from onboard.systems.graph.rules import Rules
 from onboard.systems.graph.site import FactoryGraph
-
-
-def way_around(
-    graph: Graph, came_from: int, node: int, goal: int, extra_mm: dict[Direction, int]
-) -> tuple[int, ...] | None:
-    """A shortest way without reversing where some directions cost more (Dijkstra 1959); None where there is none."""
-    queue: list[tuple[int, tuple[int, ...]]] = [(0, (came_from, node))]
-    seen: set[Direction] = set()
-    while queue:
-        cost, way = heappop(queue)
-        if way[-1] == goal:
-            return way[1:]
-        last = (way[-2], way[-1])
-        if last in seen:
-            continue
-        seen.add(last)
-        for after in graph.neighbours[way[-1]]:
-            if after != way[-2]:
-                ahead = (way[-1], after)
-                heappush(queue, (cost + graph.length_mm(*ahead) + extra_mm.get(ahead, 0), (*way, after)))
-    return None
 
 
 @dataclass
@@ -87,10 +65,7 @@ class RobotPlanning:
 
     def way(self, goal: int) -> tuple[int, ...] | None:
         """The nodes from the one ahead to a goal, both included; None where there is no way."""
-        here = self.position
-        if self.site.rules is not Rules.EDGE_AND_NODE:
-            return self.site.graph.way(here.behind, here.node, goal)
-        return way_around(self.site.graph, here.behind, here.node, goal, self.extra_mm())
+        return self.site.graph.way(self.position.behind, self.position.node, goal, self.extra_mm())
 
     # --- the Estimator -----------------------------------------------------------------------------------------
 
@@ -121,7 +96,7 @@ class RobotPlanning:
         stops += wanted
         here, behind, length_mm = self.position.node, self.position.behind, 0
         for stop in stops:
-            way = way_around(graph, behind, here, stop, extra_mm)
+            way = graph.way(behind, here, stop, extra_mm)
             if way is None:
                 return None
             for ends in pairwise(way):

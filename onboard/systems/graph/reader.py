@@ -81,13 +81,13 @@ def _check_edges(table: TomlTable, graph: Graph) -> None:
         return
     for node in graph.dead_ends:
         table.bad("edges", node, "a node with one edge", "give it another: robots do not reverse, so none comes out")
-    reached, left = set(graph.nodes[:1]), [graph.nodes[0]]
-    while left:
-        news = [after for after in graph.neighbours[left.pop()] if after not in reached]
-        reached.update(news)
-        left += news
-    if lost := sorted(set(graph.nodes) - reached):
-        table.bad("edges", lost[0], f"cannot be reached from node {graph.nodes[0]}", "join them by an edge")
+    lost = set(graph.nodes) - graph.nodes_network.from_any(graph.nodes[:1])
+    while lost:
+        part = graph.nodes_network.from_any((min(lost),))
+        what = f"cannot be reached from node {graph.nodes[0]}"
+        what += f", nor can {', '.join(map(str, others))}" if (others := sorted(part)[1:]) else ""
+        table.bad("edges", min(lost), what, "join them by an edge")
+        lost -= part
 
 
 def _read_hosts(root: TomlTable, fleet: FleetReader, graph: Graph) -> dict[int, int]:

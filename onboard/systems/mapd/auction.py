@@ -8,7 +8,8 @@ lowest bid of all wins first: it is the one that speaks soonest (design, section
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from onboard.systems.mapd.floor import FAR, Floor
+from onboard.systems.mapd.floor import Floor
+from onboard.ways.steps import FAR
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
-#: Steps to where no way leads; above every real distance.
-FAR = 1 << 20
+from onboard.ways.network import Network
+from onboard.ways.steps import FAR
+
 #: What a map calls free: floor, endpoints, homes, and MovingAI's other words for ground (swamp, ground).
 FREE = frozenset(".erSG")
 
@@ -26,7 +27,7 @@ class Floor:
     names: tuple[str, ...]
     ways: tuple[tuple[int, ...], ...]
     resources: tuple[int, ...]
-    _fields: dict[frozenset[int], list[int]] = field(default_factory=dict, compare=False, repr=False)
+    _fields: dict[int, list[int]] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def size(self) -> int:
@@ -34,46 +35,23 @@ class Floor:
         return len(self.names)
 
     @cached_property
-    def back(self) -> tuple[tuple[int, ...], ...]:
-        """Cells from which one step leads to each."""
-        back: list[list[int]] = [[] for _ in self.names]
-        for cell, ways in enumerate(self.ways):
-            for to in ways:
-                back[to].append(cell)
-        return tuple(tuple(one) for one in back)
+    def network(self) -> Network[int]:
+        """The cells and the steps between them, each of cost 1; what standing in a cell takes is its resource."""
+        return Network(
+            {cell: [(to, 1) for to in ways] for cell, ways in enumerate(self.ways)}, dict(enumerate(self.resources))
+        )
 
-    def steps_to(self, *goals: int) -> list[int]:
-        """Steps from each cell to the nearest of ``goals``, nobody in the way; ``FAR`` where no way leads. Kept."""
-        return self.steps_to_any(goals)
-
-    def steps_to_any(self, goals: Iterable[int]) -> list[int]:
-        """As ``steps_to``, for any collection of cells."""
-        key = frozenset(goals)
-        found = self._fields.get(key)
+    def steps_to(self, goal: int) -> list[int]:
+        """Steps from each cell to a goal, nobody in the way; ``FAR`` where no way leads. Kept."""
+        found = self._fields.get(goal)
         if found is None:
-            found = self._fields[key] = flood(self.back, key)
+            found = self._fields[goal] = self.steps_to_any((goal,))
         return found
 
-
-def flood(ways: Sequence[Sequence[int]], goals: Iterable[int], blocked: frozenset[int] = frozenset()) -> list[int]:
-    """Steps over ``ways`` from the nearest of ``goals`` to each cell; ``blocked`` cells are reached but not passed."""
-    steps = [FAR] * len(ways)
-    border = sorted(goals)
-    for goal in border:
-        steps[goal] = 0
-    distance = 0
-    while border:
-        distance += 1
-        reached = []
-        for cell in border:
-            if distance > 1 and cell in blocked:
-                continue
-            for to in ways[cell]:
-                if steps[to] > distance:
-                    steps[to] = distance
-                    reached.append(to)
-        border = reached
-    return steps
+    def steps_to_any(self, goals: Iterable[int]) -> list[int]:
+        """Steps from each cell to the nearest of ``goals``, as ``steps_to``."""
+        steps = self.network.costs_to(goals)
+        return [steps.get(cell, FAR) for cell in range(self.size)]
 
 
 def grid_floor(rows: Sequence[str]) -> Floor:
@@ -130,37 +108,3 @@ def network_floor(points: Sequence[str], lines: Sequence[NetworkLine], zones: Se
         taken = {resources[cell] for cell in cells}
         resources = [min(taken) if one in taken else one for one in resources]
     return Floor(tuple(names), tuple(tuple(dict.fromkeys(one)) for one in ways), tuple(resources))
-
-
-def lasting_rests(floor: Floor, rests: Sequence[int], goals: Iterable[int]) -> frozenset[int]:
-    """Those of ``rests``, earlier ones first, in which robots may all stand for ever: whoever is left gets everywhere.
-
-    With the rests taken so far blocked, each of them and of ``goals`` reaches each other one (well-formed instances of
-    Ma, Li, Kumar and Koenig, AAMAS 2017). Where all pass together that is asked once. A zone's cells are never rests.
-    """
-    alone = [cell for cell in rests if floor.resources.count(floor.resources[cell]) == 1]
-    needed = list(dict.fromkeys(goals))
-    if _all_reach(floor, frozenset(alone), needed):
-        return frozenset(alone)
-    kept: list[int] = []
-    for cell in alone:
-        if _all_reach(floor, frozenset([*kept, cell]), needed):
-            kept.append(cell)
-    return frozenset(kept)
-
-
-def _all_reach(floor: Floor, rests: frozenset[int], goals: Sequence[int]) -> bool:
-    """Whether all goals and rests reach one another with no rest passed on the way."""
-    needed = {*goals, *rests}
-    if not needed:
-        return True
-    hub = next((cell for cell in sorted(needed) if cell not in rests), None)
-    if hub is None:
-        # Any cell beside a rest will do: all must meet there.
-        ways = [to for to in floor.ways[min(needed)] if to not in rests]
-        if not ways:
-            return len(needed) == 1
-        hub = ways[0]
-    there = flood(floor.ways, [hub], rests)
-    back = flood(floor.back, [hub], rests)
-    return all(there[cell] < FAR and back[cell] < FAR for cell in needed)

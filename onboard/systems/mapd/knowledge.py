@@ -14,6 +14,7 @@ from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.floor import Floor
 from onboard.systems.mapd.moves import Assembly
 from onboard.systems.mapd.paths import Path, Paths
+from onboard.ways.steps import STEP_US, cell_segment
 
 #: The weights that all robots bid by, unless they are told others.
 PLAIN = BidWeights()
@@ -43,7 +44,7 @@ class Knowledge:
     _parts: dict[int, Assembly] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.paths = Paths(self.floor.resources)
+        self.paths = Paths(self.floor.network)
 
     # --- tasks and steps ---------------------------------------------------------------------------------------
 
@@ -175,19 +176,15 @@ class Knowledge:
 
         ``leaving`` is a robot whose present step does not count any more.
         """
-        best: tuple[int, int] | None = None
-        resources = self.floor.resources
-        for robot, path in self.paths.by_robot.items():
+        found: list[tuple[int, int]] = []
+        taken, paths = cell_segment(resource), self.paths
+        for robot, path in paths.by_robot.items():
             state = self.states.get(robot)
             first = path.start if state is None else max(path.start, state.step + (robot == leaving))
-            if best is not None and first >= best[0]:
-                continue
-            for step in range(first, max(first, path.end) + 1):
-                if resources[path.at(step)] == resource:
-                    if best is None or step < best[0]:
-                        best = (step, robot)
-                    break
-        return None if best is None else best[1]
+            begins_us = paths.reservations.first_start(robot, taken, first * STEP_US)
+            if begins_us is not None:
+                found.append((max(first * STEP_US, begins_us), robot))
+        return min(found)[1] if found else None
 
 
 def _is_newer_path(head: PathHead, known: PathHead) -> bool:

@@ -10,7 +10,6 @@ from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.systems.mapd.fields import MOST_WAYS
 from onboard.systems.mapd.site import (
-    FAR,
     FREE,
     Floor,
     Mapd,
@@ -18,9 +17,9 @@ from onboard.systems.mapd.site import (
     TransportTask,
     cell_station,
     grid_floor,
-    lasting_rests,
     network_floor,
 )
+from onboard.ways.rests import lasting_rests
 
 _NOWHERE = Segment(0, 0)
 #: A cell's token is that of a station, of which there are so many (kinds/mapd/rights.py).
@@ -81,7 +80,7 @@ def _stewards(fleet: FleetReader, floor: Floor | None) -> dict[int, int]:
 
 
 def _open(floor: Floor, cell: int) -> bool:
-    return bool(floor.ways[cell] or floor.back[cell])
+    return bool(floor.ways[cell] or floor.network.back[cell])
 
 
 _Network = tuple[tuple[str, ...], tuple[NetworkLine, ...], tuple[tuple[str, ...], ...]]
@@ -227,16 +226,20 @@ def _read_tasks(
 
 def _check_ways(root: TomlTable, floor: Floor, homes: dict[int, int], endpoints: tuple[int, ...]) -> None:
     """That all robots but one may stay at home for ever and the last one still gets everywhere."""
-    start = next(iter(homes.values()))
-    for cell in endpoints:
-        if floor.steps_to(cell)[start] >= FAR or floor.steps_to(start)[cell] >= FAR:
-            root.table("demand").bad(
-                "endpoints", floor.names[cell], f"no way from and to {floor.names[start]}", "join them"
-            )
-            return
-    rests = lasting_rests(floor, list(homes.values()), endpoints)
-    for node, cell in homes.items():
+    first = next(iter(homes.values()))
+    ground = floor.network.ground((first,))
+    what = f"no way from and to {floor.names[first]}"
+    for number, cell in enumerate(endpoints):
+        if cell not in ground:
+            root.table("demand").bad("endpoints", floor.names[cell], what, "join them", item=number)
+    for number, cell in enumerate(homes.values()):
+        if cell not in ground:
+            root.bad("robots", floor.names[cell], what, "join them", item=number)
+    if root.problems.found:
+        return
+    rests = lasting_rests(floor.network, list(homes.values()), endpoints)
+    for number, (node, cell) in enumerate(homes.items()):
         if cell not in rests:
             what = f"node {node} at home would shut others in"
-            root.bad("robots", floor.names[cell], what, "let it live where nobody must pass, or have fewer robots")
-            return
+            remedy = "let it live where nobody must pass, or have fewer robots"
+            root.bad("robots", floor.names[cell], what, remedy, item=number)

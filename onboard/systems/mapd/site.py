@@ -8,11 +8,11 @@ from typing import ClassVar
 from onboard.contract.codes import KindCode
 from onboard.core.site import MotionNeeds, Site
 from onboard.systems.mapd.auction import TransportTask
-from onboard.systems.mapd.floor import FAR, FREE, Floor, NetworkLine, grid_floor, lasting_rests, network_floor
+from onboard.systems.mapd.floor import FREE, Floor, NetworkLine, grid_floor, network_floor
 from onboard.systems.mapd.rights import cell_station
+from onboard.ways.rests import lasting_rests
 
 __all__ = [
-    "FAR",
     "FREE",
     "Floor",
     "Mapd",
@@ -20,7 +20,6 @@ __all__ = [
     "TransportTask",
     "cell_station",
     "grid_floor",
-    "lasting_rests",
     "network_floor",
 ]
 
@@ -55,7 +54,7 @@ class Mapd(Site):
     @cached_property
     def rests(self) -> frozenset[int]:
         """Where robots may stand for ever: homes first, then endpoints, as many as shut nobody in."""
-        return lasting_rests(self.floor, [*self.homes.values(), *self.endpoints], self.endpoints)
+        return lasting_rests(self.floor.network, [*self.homes.values(), *self.endpoints], self.endpoints)
 
     @property
     def step_us(self) -> int:

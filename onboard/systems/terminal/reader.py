@@ -11,6 +11,7 @@ from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.systems.terminal.missions_reader import read_blockages, read_missions, read_presses
 from onboard.systems.terminal.site import Box, Entity, EntityKind, StationKind, Terminal
+from onboard.ways.network import Network
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,15}")
 #: Entity numbers are the tracks of tokens: 8 bits, without 0 and 255.
@@ -20,7 +21,7 @@ MOST_BOXES = 65_535
 
 
 @dataclass
-class Network:
+class NamedEntities:
     """Entities read so far with their tables, by name."""
 
     numbers: dict[str, int] = field(default_factory=dict)
@@ -113,8 +114,8 @@ def _clock(planning: TomlTable) -> int:
     return int(found.group(1)) * 3600 + int(found.group(2)) * 60
 
 
-def _read_network(root: TomlTable, speed_mm_s: int) -> Network:
-    network = Network()
+def _read_network(root: TomlTable, speed_mm_s: int) -> NamedEntities:
+    network = NamedEntities()
     for table in root.tables("lanes"):
         length_mm = table.integer("length_mm", 1_000, 5_000_000)
         network.add(
@@ -147,7 +148,7 @@ def _read_network(root: TomlTable, speed_mm_s: int) -> Network:
     return network
 
 
-def _join(network: Network, number: int, table: TomlTable) -> None:
+def _join(network: NamedEntities, number: int, table: TomlTable) -> None:
     """What an entity leads to, and the durations of single ways through it."""
     entity = network.entities[number]
     if entity.kind is EntityKind.STATION:
@@ -179,7 +180,7 @@ def _join(network: Network, number: int, table: TomlTable) -> None:
     network.entities[number] = replace(network.entities[number], leads_to=(*leads, *stations), turns=tuple(turns))
 
 
-def _read_machines(root: TomlTable, network: Network) -> tuple[FleetReader, dict[int, TomlTable]]:
+def _read_machines(root: TomlTable, network: NamedEntities) -> tuple[FleetReader, dict[int, TomlTable]]:
     fleet, homes = FleetReader(), {}
     for table in root.tables("desks"):
         fleet.add(table, KindCode.DESK, Segment(0, 0))
@@ -192,7 +193,7 @@ def _read_machines(root: TomlTable, network: Network) -> tuple[FleetReader, dict
     return fleet, homes
 
 
-def _read_boxes(root: TomlTable, network: Network) -> tuple[Box, ...]:
+def _read_boxes(root: TomlTable, network: NamedEntities) -> tuple[Box, ...]:
     found: dict[str, Box] = {}
     standing: dict[int, int] = {}
     for table in root.tables("boxes"):
@@ -214,7 +215,7 @@ def _read_boxes(root: TomlTable, network: Network) -> tuple[Box, ...]:
     return tuple(found.values())
 
 
-def _read_stewards(table: TomlTable, network: Network, fleet: FleetReader, first: int) -> dict[int, int]:
+def _read_stewards(table: TomlTable, network: NamedEntities, fleet: FleetReader, first: int) -> dict[int, int]:
     """Which desk holds the rights to which entity at first: the one named, else the lowest."""
     stewards = dict.fromkeys(network.entities, first)
     for name in sorted(network.numbers):
@@ -234,8 +235,9 @@ def _check_ways(root: TomlTable, site: Terminal, homes: dict[int, TomlTable]) ->
     if not stations:
         root.bad("stations", None, "no station", "add at least one [[stations]] table")
     areas = sorted(set(homes) | {one.area for one in stations})
+    network = _network(site)
     for origin in areas:
-        reached = _reached(site, origin)
+        reached = network.from_any((origin,))
         lost = [one.name for one in stations if one.number not in reached]
         if lost:
             what = f"no way from {site.entities[origin].name} to {lost[0]}"
@@ -243,11 +245,6 @@ def _check_ways(root: TomlTable, site: Terminal, homes: dict[int, TomlTable]) ->
             return
 
 
-def _reached(site: Terminal, origin: int) -> set[int]:
-    found, open_ends = {origin}, [origin]
-    while open_ends:
-        for after in site.entities[open_ends.pop()].leads_to:
-            if after not in found:
-                found.add(after)
-                open_ends.append(after)
-    return found
+def _network(site: Terminal) -> Network[int]:
+    """Entities and where they lead to; what a crossing takes depends on where it goes, and is not asked here."""
+    return Network({number: [(after, 1) for after in one.leads_to] for number, one in site.entities.items()})

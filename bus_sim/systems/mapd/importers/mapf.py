@@ -11,8 +11,10 @@ from pathlib import Path
 
 from bus_sim.systems.mapd.importers.draft import Draft, Loss, TaskLine, draw_tasks
 from onboard.config.problems import Problems
-from onboard.systems.mapd.floor import FAR, FREE, Floor, grid_floor, lasting_rests
+from onboard.systems.mapd.floor import FREE, Floor, grid_floor
 from onboard.systems.mapd.reader import BLOCKED, MAX_RELEASE
+from onboard.ways.rests import lasting_rests
+from onboard.ways.steps import FAR
 
 #: Endpoints drawn on a map that marks none: more than robots on the shipped maps.
 ENDPOINTS = 20
@@ -142,7 +144,7 @@ def _draw(floor: Floor, wanted: DrawnDemand, problems: Problems) -> tuple[list[s
         for cell in others:
             if len(homes) == robots:
                 break
-            if len(lasting_rests(floor, [*homes, cell], endpoints)) == len(homes) + 1:
+            if len(lasting_rests(floor.network, [*homes, cell], endpoints)) == len(homes) + 1:
                 homes.append(cell)
         if len(homes) == robots:
             return [floor.names[cell] for cell in homes], [floor.names[cell] for cell in endpoints]

@@ -10,8 +10,9 @@ from bus_sim.systems.mapd.importers.draft import Draft, Loss, draw_tasks, machin
 from bus_sim.systems.mapd.importers.mapf import DrawnDemand
 from bus_sim.systems.mapd.importers.xml_tree import XmlElement, parse_xml
 from onboard.config.problems import Problems, nearest
-from onboard.systems.mapd.floor import NetworkLine, lasting_rests, network_floor
+from onboard.systems.mapd.floor import NetworkLine, network_floor
 from onboard.systems.mapd.reader import MAX_STEPS
+from onboard.ways.rests import lasting_rests
 
 _LONGEST_MM = 10_000_000
 
@@ -180,7 +181,7 @@ def _add_robots(model: OpenTcsModel, draft: Draft, wanted: DrawnDemand) -> None:
     parking = [name for name, one in model.points.items() if one.attributes.get("type") == "PARK_POSITION"]
     others = [name for name in draft.points if name not in parking and name not in draft.endpoints]
     cells = [number[name] for name in [*parking, *others]]
-    rests = lasting_rests(floor, cells, [number[name] for name in draft.endpoints])
+    rests = lasting_rests(floor.network, cells, [number[name] for name in draft.endpoints])
     homes = [floor.names[cell] for cell in cells if cell in rests]
     vehicles = list(model.vehicles)[: wanted.robots]
     if len(homes) < len(vehicles):

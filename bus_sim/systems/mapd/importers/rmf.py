@@ -12,8 +12,9 @@ from bus_sim.systems.mapd.importers.draft import Draft, Loss, draw_tasks, machin
 from bus_sim.systems.mapd.importers.mapf import DrawnDemand
 from bus_sim.systems.mapd.importers.yaml_tree import Value, parse_yaml
 from onboard.config.problems import Problems
-from onboard.systems.mapd.floor import NetworkLine, lasting_rests, network_floor
+from onboard.systems.mapd.floor import NetworkLine, network_floor
 from onboard.systems.mapd.reader import MAX_STEPS
+from onboard.ways.rests import lasting_rests
 
 #: A robot's step, mm, and how long it takes, ms: tinyRobot and deliveryRobot of the demos go at half a metre a second.
 STEP_MM, STEP_MS = 1_000, 2_000
@@ -207,7 +208,7 @@ class _RmfReader:
         ends = [number[one] for one in self.draft.endpoints]
         for robot, home in robots:
             at = [*(number[one] for _, one in self.draft.robots), number[home]]
-            if home not in linked or len(lasting_rests(floor, at, ends)) < len(at):
+            if home not in linked or len(lasting_rests(floor.network, at, ends)) < len(at):
                 self.draft.losses.append(Loss(f"robot {robot} at {home}", "it would shut others in, or be shut in"))
                 continue
             fit = machine_name(robot, [one for one, _ in self.draft.robots])
