@@ -58,7 +58,7 @@ class BusDeviceLink:
         self._decoder = decoder
         self._node_id = node_id
         self._handlers: list[MessageHandler] = []
-        self._answers: list[Callable[[], None]] = []
+        self.answers: list[Callable[[], None]] = []
         bus.subscribe(self._on_frame)
 
     def send(self, message: Message) -> None:
@@ -76,7 +76,7 @@ class BusDeviceLink:
 
     def answer(self, say: Callable[[], None]) -> None:
         """One more device that says how it stands when it is asked."""
-        self._answers.append(say)
+        self.answers.append(say)
 
     def _on_frame(self, frame: Frame, time_us: int) -> None:
         message = self._decoder.feed(frame, time_us)
@@ -84,7 +84,7 @@ class BusDeviceLink:
             return
         if isinstance(message, StateRequest):
             # Sensors answer it: what keeps orders from the actuators does not keep this from them.
-            for say in self._answers:
+            for say in self.answers:
                 say()
             return
         if self.incoming:
