@@ -30,6 +30,7 @@ from onboard.ports.broker import BrokerError
 from onboard.ports.telemetry import Telemetry
 from onboard.systems.contract import codecs_for
 from onboard.systems.registry import compaction_for, condition_for, factory_for, system_of
+from onboard.ways.effort import SLICE_STEPS, Searching
 from onboard.web.address import is_installed as is_web_installed
 from onboard.wire.codec import Codec
 
@@ -209,6 +210,9 @@ async def run(
             entries=entries,
             journal=condition_for(config.site, journal.condition, entries, journal.name),
         )
+        estimator = holon.negotiation.estimator
+        if isinstance(estimator, Searching):
+            estimator.effort.slice_steps = SLICE_STEPS
         buses = await life.open_buses(fleet_settings, BusSettings.of(config.device_bus))
         if buses is None:
             await journal.close()

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from bus_sim.attacks.launch import attack
 from bus_sim.demand import DemandError
-from bus_sim.faults import bus, controllers, devices, operators
+from bus_sim.faults import bus, controllers, devices, operators, slowness
 from bus_sim.faults.bus import FRAME_FAULTS
 from bus_sim.faults.holon import FaultyHolon
 from bus_sim.faults.injection import AnyFault, Injection
@@ -25,6 +25,7 @@ ACTIONS: Final[dict[str, Action]] = {
     "attack": attack,
     "crash": controllers.crash,
     "pause": controllers.pause,
+    "slow": slowness.slow,
     "slow_node": controllers.slow_node,
     "disk_full": controllers.disk_full,
     "power_cut": controllers.power_cut,

@@ -181,6 +181,16 @@ KINDS: Final[Mapping[str, Kind]] = {
         "a processor that needs long for each frame",
         _one(for_s=_seconds(60.0), processing_us=_count("microseconds from 1 to 100000", 2_000, low=1, high=100_000)),
     ),
+    "slow": Kind(
+        Group.CONTROLLER,
+        "a processor so many times slower: searching takes time, from at_s on for for_s (0: to the end)",
+        {
+            "target": _MACHINES,
+            "factor": FaultSetting(float, "a number from 0.1 to 1000", 8.0, 0.1, 1_000.0),
+            "at_s": _seconds(0.0),
+            "for_s": _seconds(0.0),
+        },
+    ),
     "disk_full": Kind(
         Group.CONTROLLER,
         "no journal entry can be written; the power is switched off and on when there is room again",

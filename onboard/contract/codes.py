@@ -239,6 +239,7 @@ class DeskText(IntEnum):
     UNKNOWN_TICKET = 6
     LEAVE_COMPARTMENT = 7
     OUT_OF_ORDER = 8
+    NO_CHARGING = 9
 
 
 class DriveMode(IntEnum):
@@ -279,6 +280,7 @@ class DeskInput(IntEnum):
     KEY = 0
     TICKET = 1
     CANCEL = 2
+    CHARGING_KEY = 3
 
 
 class OrderResult(IntEnum):

@@ -184,6 +184,9 @@ class BayState(Message):
     person_inside: bool
     #: 1: a carrier stands before the output door.
     carrier_in_front: bool
+    #: Width of the car without its mirrors, 0 where there is none, or where the site limits none and nothing measures
+    #: it. 0 to 4095 mm.
+    width_mm: int
 
 
 @message(frozen=True, slots=True)

@@ -51,6 +51,9 @@ class Controller:
         self._fewer = ports.fewer
         self._queue_drops: Counter[Reason] = Counter()
         self.stopped: asyncio.Future[str] | None = None
+        #: For how long the processor was taken, in loop us, by what was decided since this was asked last; None on a
+        #: board, where that time passes by itself.
+        self.taken_us: Callable[[], int] | None = None
         #: Why it has halted; None while it has not, or where the journal could not be written.
         self.halted_for: Reason | None = None
         self._codecs = (fleet, device)
@@ -184,7 +187,7 @@ class Controller:
 
     def _carry_out(self) -> None:
         """Carry out effects and waiting events in order, as far as no journal write stands in between."""
-        if self._outbox or self._inbox:
+        if self._outbox or self._inbox or self.taken_us is not None:
             self._guarded(self._work_off)
         if self._writing is None and self._may_compact():
             self._writing = self._loop.create_task(self._compact())
@@ -200,7 +203,9 @@ class Controller:
     def _work_off(self) -> tuple[()]:
         """Until a journal write begins or nothing is left; whatever is decided on the way is carried out as well."""
         while self._writing is None:
-            if self._outbox:
+            if self.taken_us is not None and (taken_us := self.taken_us()):
+                self._writing = self._loop.create_task(self._think(taken_us))
+            elif self._outbox:
                 self._perform(self._outbox.popleft())
             elif self._inbox:
                 handle, frame, time_us = self._inbox.popleft()
@@ -233,6 +238,12 @@ class Controller:
             # What cannot be made durable must not be said: the machine stops where its authority still holds.
             self._outbox.clear()
             self._halt(f"the journal cannot be written: {error}", None)
+        self._writing = None
+        self._carry_out()
+
+    async def _think(self, taken_us: int) -> None:
+        """What was decided is carried out once it is thought out; whatever happens meanwhile waits."""
+        await asyncio.sleep(taken_us / 1_000_000)
         self._writing = None
         self._carry_out()
 

@@ -12,6 +12,7 @@ All times are bus time in us. Pure: plans, progress and grants in, an order out.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 from typing import NamedTuple
 
 from onboard.contract.codes import LegAction, Reason
@@ -68,6 +69,17 @@ class _Way:
             if turn.to_come < self.in_hand or (turn.to_come == self.in_hand and segment not in self.left):
                 yield turn
 
+    def go_on(self, known: "_Way", more: int) -> None:
+        """With the leg that was in hand in the plan told before, of which this one has ``more`` moving legs behind it.
+
+        A wait before it only tells when it began.
+        """
+        legs = range(len(self.itinerary.legs))
+        in_hand = known.in_hand + more
+        leg = next((leg for leg in legs if self.to_come(leg) == in_hand), None)
+        if leg is not None:
+            self.in_hand, self.leg, self.body, self.left = in_hand, leg, known.body, known.left
+
     def to_come(self, leg: int) -> int:
         """How many moving legs come behind leg number ``leg``."""
         return sum(moves(one) for one in self.itinerary.legs[leg + 1 :])
@@ -90,12 +102,25 @@ class PassingOrder:
         known = self._ways.get(node)
         way = self._way(plan, now_us)
         continued = known is not None and known.moves[len(known.moves) - len(way.moves) :] == way.moves
-        if known is not None and continued and known.in_hand == way.in_hand:
-            way.body, way.left = known.body, known.left
+        before, same = (0, 0) if known is None or continued else _shared(known, way)
+        if known is not None and (continued or same):
+            way.go_on(known, 0 if continued else len(way.moves) - before)
         self._ways[node] = way
+        if same:
+            self._lead_on(node, before, same, len(way.moves))
         for other in self._ways:
             if other != node:
-                self._agree(node, other, keep=continued)
+                self._agree(node, other, keep=continued or same > 0)
+
+    def _lead_on(self, node: int, before: int, same: int, now: int) -> None:
+        """A plan of ``before`` moving legs leads elsewhere behind the first ``same``: of these the order stays."""
+        for pair, agreed in self._agreed.items():
+            if node in pair:
+                kept: Turns = {}
+                for segment, turns in agreed[pair.index(node)].items():
+                    shared = [turn for turn in turns if turn.to_come >= before - same]
+                    kept[segment] = [turn._replace(to_come=turn.to_come + now - before) for turn in shared]
+                self._agreed[pair] = (kept, agreed[1]) if pair[0] == node else (agreed[0], kept)
 
     def drop(self, node: int) -> None:
         """A machine is an obstacle: it passes nothing until it tells a plan, so nobody comes behind it."""
@@ -303,6 +328,15 @@ class PassingOrder:
             for index in range(leg.from_index, leg.to_index, step)
             if (rear_mm - index * pitch_mm) * step >= pitch_mm // 2
         }
+
+
+def _shared(known: _Way, way: _Way) -> tuple[int, int]:
+    """How many moving legs of ``known``, from that with which ``way`` begins, and how many of these ``way`` has too."""
+    for start in range(max(0, len(known.moves) - known.in_hand - 1), len(known.moves)):
+        if known.moves[start : start + 1] == way.moves[:1]:
+            pairs = zip(known.moves[start:], way.moves, strict=False)
+            return len(known.moves) - start, sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
+    return 0, 0
 
 
 def _moves(itinerary: Itinerary) -> tuple[Leg, ...]:

@@ -20,10 +20,14 @@ from typing import NamedTuple
 from onboard.contract.codes import LegAction
 from onboard.core.site import Segment
 from onboard.ways.edges import NO_EDGE, SAFE, Edge, Edges, State, edges_of
+from onboard.ways.effort import POP_STEPS, Search, at_once
 from onboard.ways.kinematics import ceil_ms
 from onboard.ways.reservations import FOREVER, Reservations
 from onboard.ways.roads import Roads, roads_of
 from onboard.ways.site import WaySite
+
+#: A search may pause after each so many states taken off its queue.
+PAUSE_POPS = 8
 
 
 class Visit(NamedTuple):
@@ -88,7 +92,7 @@ def free_flow_us(site: WaySite, start: Segment, start_us: int, visits: tuple[Vis
     return time_us
 
 
-def plan_route(
+def planning(
     site: WaySite,
     reservations: Reservations,
     owner: int,
@@ -98,7 +102,7 @@ def plan_route(
     refuges: frozenset[Segment],
     max_expansions: int,
     lift_floors: Mapping[int, int] | None = None,
-) -> Route | NoRoute:
+) -> Search[Route | NoRoute]:
     """The route with the earliest end of the last visit, from standing at ``start`` at bus time ``start_us``.
 
     Equal ends go to the earlier arrival in a refuge, then to less time on platforms, less travel, fewer moves and waits
@@ -120,7 +124,13 @@ def plan_route(
     if state is None:
         return NoRoute(f"the start {start} is reserved by another machine", 0)
     root = _Node(0, state, start_us, None, LegAction.STAND, start_us, (), (0, 0, 0))
-    return _IntervalSearch(roads, edges, visits, refuges).run(root, max_expansions)
+    found = yield from _IntervalSearch(roads, edges, visits, refuges).run(root, max_expansions)
+    yield found.pops % PAUSE_POPS * POP_STEPS
+    return found
+
+
+#: The same at once.
+plan_route = at_once(planning)
 
 
 #: What breaks ties: time standing or riding on platforms, which others may want, then distance, then moves.
@@ -177,13 +187,15 @@ class _IntervalSearch:
         #: End of the last visit and arrival in a refuge of the best route found.
         self._found = FOREVER, FOREVER
 
-    def run(self, root: _Node, max_expansions: int) -> Route | NoRoute:
-        """Search from ``root``; see ``plan_route``."""
+    def run(self, root: _Node, max_expansions: int) -> Search[Route | NoRoute]:
+        """Search from ``root``; see ``plan_route``. It may pause after each ``PAUSE_POPS``."""
         self._push(root)
         pops = 0
         while self._queue:
             *_, node = heappop(self._queue)
             pops += 1
+            if not pops % PAUSE_POPS:
+                yield PAUSE_POPS * POP_STEPS
             phase, state = node.phase, node.state
             if self._best[phase][state.number] != node.label or self._is_over(phase):
                 continue

@@ -278,6 +278,18 @@ ONE_MISTAKE = {
         "s.toml:41: classes[0].max_length_mm = 6000: no such car comes in: cars.max_length_mm is 5300; make one of "
         "both fit",
     ),
+    "class of wider cars than come in": (
+        "[[classes]]\n",
+        "[cars]\nmax_width_mm = 1_900\n\n[[classes]]\nmax_width_mm = 2_000\n",
+        "s.toml:43: classes[0].max_width_mm = 2000: no such car comes in: cars.max_width_mm is 1900; make one of "
+        "both fit",
+    ),
+    "cars wider than their carrier": (
+        "max_length_mm = 4_300",
+        "max_width_mm = 2_350",
+        "s.toml:41: classes[0].max_width_mm = 2350: wider than a carrier is long along the alley (2300 mm); make it "
+        "smaller, or carrier.length_mm and the pitches larger",
+    ),
     "place of two classes": (
         'places = ["p(2,*,*)"]',
         'places = ["p(2,*,*)"]\n\n[[classes]]\nname = "low"\nmax_height_mm = 1_600\nplaces = ["p(2,3-4)F"]',

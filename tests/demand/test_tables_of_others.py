@@ -325,6 +325,19 @@ def test_hours_of_one_day_need_no_date(tmp_path: Path) -> None:
     assert by_hour([stay.departure_us or 0 for stay in demand.stays]) == [0, 2, 0]
 
 
+def test_so_many_of_who_come_in_an_hour_ask_to_charge(tmp_path: Path) -> None:
+    head = "hour,arrivals,departures,charging\n"
+    demand = asked(tmp_path, head + "07:00,6,4,2\n8,5,8,\n9,4,0,4\n", kind="counts")
+    charging = [stay.arrival_us for stay in demand.stays if stay.car.charging]
+    assert [time_us // (60 * MINUTE_US) for time_us in charging] == [7, 7, 9, 9, 9, 9]
+    plain = asked(tmp_path, "hour,arrivals,departures\n07:00,6,4\n8,5,8\n9,4,0\n", kind="counts")
+    assert [stay.arrival_us for stay in plain.stays] == [stay.arrival_us for stay in demand.stays]
+    assert not any(stay.car.charging for stay in plain.stays)
+    assert refused(tmp_path, head + "7,3,1,4\n", kind="counts")[0].startswith(
+        "table.csv:2: charging '4' is out of range; write a whole number from 0 to 3"
+    )
+
+
 def test_an_hour_that_the_clock_showed_twice_is_counted_twice(tmp_path: Path) -> None:
     text = "hour,arrivals,departures\n2019-10-27 02:00,1,0\n2019-10-27 02:00,1,0\n2019-10-27 03:00,1,0\n"
     demand = asked(tmp_path, text, *BERLIN, kind="counts")

@@ -181,7 +181,7 @@ def test_a_robot_killed_before_it_said_done_says_so_when_it_knows_where_it_is(ha
 def test_who_presses_again_inside_gets_the_ticket_that_the_power_failed_to_print() -> None:
     bay = machine(BAY, [token_entry("token_held", 1, BAY), PARKING])
     bay.sense(DoorState(BAY, DoorPosition.OPEN, DoorPosition.LOCKED, LightColour.GREEN), 10)
-    first = bay.sense(BayState(BAY, 1_500, 4_300, 1_500, WHEELBASE_MM, True, False), 20)
+    first = bay.sense(BayState(BAY, 1_500, 4_300, 1_500, WHEELBASE_MM, True, False, 0), 20)
     assert CarAt(BAY, CAR, HERE, 1, WHEELBASE_MM) in said(first), "nor had it been said that the car is here"
     assert tickets(first) == []
     assert tickets(bay.sense(DeskEvent(BAY, 1, DeskInput.KEY, Reference(0, 0)), 30)) == [CAR]
@@ -193,7 +193,7 @@ def test_a_car_that_its_driver_took_out_while_the_bay_was_off_is_called_for_by_n
     bay, words = machine(BAY, entries), list[Message]()
     for now_us in range(100_000, 20_000_000, 100_000):
         doors = DoorState(BAY, DoorPosition.LOCKED, DoorPosition.LOCKED, LightColour.RED)
-        for sensed in (doors, BayState(BAY, 0, 0, 0, 0, False, False)):
+        for sensed in (doors, BayState(BAY, 0, 0, 0, 0, False, False, 0)):
             words += said(bay.sense(sensed, now_us))
         words += said(bay.wake(now_us))
     assert not any(isinstance(word, CallForProposals) for word in words)

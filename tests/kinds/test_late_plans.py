@@ -52,7 +52,7 @@ def test_a_stamp_from_which_the_plan_cannot_be_told_is_made_anew() -> None:
         program.stamp = Stamp(award_s * 1000, 7, 3)
         told = program.itinerary(11, now_us)
         assert told.stamp == Stamp(100_000_000, 7, 3)
-        assert [leg.end_ms for leg in told.legs] == [100_010_000, 100_020_000]
+        assert [leg.end_ms for leg in told.legs[-2:]] == [100_010_000, 100_020_000]
 
 
 def test_a_stamp_of_hours_ago_keeps_its_rank() -> None:

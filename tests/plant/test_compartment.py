@@ -129,9 +129,9 @@ def test_the_output_door_does_not_close_on_the_shuttle() -> None:
 
 def test_the_bay_senses_car_and_carrier() -> None:
     bench = Bench()
-    assert bench.links[COMPARTMENT].last(BayState) == BayState(COMPARTMENT, 0, 0, 0, 0, False, False)
+    assert bench.links[COMPARTMENT].last(BayState) == BayState(COMPARTMENT, 0, 0, 0, 0, False, False, 0)
     bench.world.car_enters(COMPARTMENT, CAR)
-    assert bench.links[COMPARTMENT].last(BayState) == BayState(COMPARTMENT, 1400, 4300, 1500, 2700, False, False)
+    assert bench.links[COMPARTMENT].last(BayState) == BayState(COMPARTMENT, 1400, 4300, 1500, 2700, False, False, 0)
     bench.drive_to_index(4, 1)
     seen = bench.links[COMPARTMENT].all(BayState)
     # Not while the carrier only passes or is still moving: 8 segments at 1500 mm/s take 12.8 + 3 s.

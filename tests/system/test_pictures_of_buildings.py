@@ -8,7 +8,8 @@ import pytest
 from bus_sim.cli import main
 from bus_sim.sites import find_site, layout_names
 from bus_sim.systems.car_park.show_plan import draw_plans
-from onboard.contract.codes import Side
+from onboard.contract.codes import DeskText, Side
+from onboard.contract.messages import DeskOrder, Reference
 from onboard.core.site import Station
 from onboard.systems.car_park.building import draw
 from onboard.systems.car_park.outlines import Outlines
@@ -79,3 +80,16 @@ def test_a_drawing_is_svg_with_the_highest_floor_first(capsys: pytest.CaptureFix
 @pytest.mark.parametrize("name", ["level1", "standard"])
 def test_a_straight_building_is_drawn_as_well(name: str) -> None:
     assert str(draw(car_park(find_site(name)))).endswith("</svg>\n")
+
+
+def test_the_page_is_told_classes_places_to_charge_and_what_desks_show() -> None:
+    site = car_park(find_site("sizes"))
+    scene = CarParkScene(site, SiteView(site))
+    layout = scene.layout()
+    (plug,) = [number for number, one in enumerate(site.classes, start=1) if one.charging]
+    assert set(layout["charging"]) == {place for place, number in site.place_class.items() if number == plug}
+    assert {layout["classes"][place] for place in layout["charging"]} == {"charging"}
+    assert set(layout["classes"]) == set(site.place_class)
+    bay = next(iter(site.compartments))
+    scene.feed_device(bay, DeskOrder(bay, 1, DeskText.NO_CHARGING, Reference(0, 0)), 0)
+    assert scene.machine(bay, 0)["desk"] == "no charging"

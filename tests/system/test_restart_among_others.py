@@ -156,6 +156,35 @@ def test_who_stands_though_it_should_drive_is_known_to_be_late_before_its_run_sh
     assert report.verdict is RunVerdict.SERVED, report.why()
 
 
+def test_a_run_planned_long_after_its_award_is_not_taken_for_one_that_began_then() -> None:
+    """By its award it was first on all slots ahead, was granted them, and stood behind whoever should have gone first.
+
+    Two crashes a seed on `standard`, seed 6124.
+    """
+    report = played("standard", 6124, Arrivals(8, 15, 7.5, 200), "crash:at_s=391.601428,target=MR1,restart_s=19.983")
+    assert report.verdict is RunVerdict.SERVED, report.why()
+
+
+def test_who_wins_one_more_task_keeps_its_place_in_the_order_on_the_way_that_it_goes_already() -> None:
+    """It was behind another that was late, and first on the same slots with the new task's plan.
+
+    Two crashes a seed on `standard`, seed 6137.
+    """
+    crash = "crash:at_s=479.350538,target=IOC1,restart_s=10.364,write=2,durable=no"
+    report = played("standard", 6137, Arrivals(8, 15, 7.5, 200), crash)
+    assert report.verdict is RunVerdict.SERVED, report.why()
+
+
+def test_a_lift_lets_in_by_a_gate_that_came_back_from_the_ride_before_only_then() -> None:
+    """It was started again while its robot gave platform and gate back, and the platform came first.
+
+    Two crashes a seed on `small`, seed 6254.
+    """
+    crash = "crash:at_s=333.643285,target=ER1,restart_s=14.199,write=7,durable=yes"
+    report = played("small", 6254, Arrivals(6, 20, 10, 200), crash)
+    assert report.verdict is RunVerdict.SERVED, report.why()
+
+
 def test_a_winner_that_is_not_noted_yet_is_believed_when_all_are_asked() -> None:
     """The power failed between the award and its record; the task was called anew, and awarded to a second robot.
 

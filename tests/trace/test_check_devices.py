@@ -1,5 +1,7 @@
 """Rules that need device buses, and rules about life."""
 
+from dataclasses import replace
+
 import pytest
 
 from onboard.contract.codes import (
@@ -31,7 +33,9 @@ from onboard.contract.messages import (
     ShuttleState,
     Waiting,
 )
+from onboard.systems.car_park.site import SizeClass
 from onboard.ways.site import way_site
+from tests.sites import one_floor
 from tests.trace.checking import CAR, MR1, MR2, Tape, at, award, bid, call, car_at, one_alley, power_up, report
 
 OPEN, LOCKED, CLOSING = DoorPosition.OPEN, DoorPosition.LOCKED, DoorPosition.CLOSING
@@ -50,7 +54,7 @@ def order(action: ShuttleAction, wheelbase_mm: int = 2700, side: Side = Side.NEA
 
 
 def bay(load_kg: int = 0, *, person: bool = False) -> BayState:
-    return BayState(1, load_kg, 4000, 1500, 2700, person_inside=person, carrier_in_front=False)
+    return BayState(1, load_kg, 4000, 1500, 2700, person_inside=person, carrier_in_front=False, width_mm=0)
 
 
 def doors(outer: DoorPosition, inner: DoorPosition) -> DoorState:
@@ -161,6 +165,30 @@ def test_full_means_full() -> None:
     assert Tape(one_alley(), disturbed=True).say(1, word(DeskText.FULL)).broken() == {}
     gone = Tape(one_alley()).say(1, car_at(1, 0x0104, 1), car_at(1, OUTSIDE, 1), word(DeskText.FULL))
     assert gone.broken() == {"full-means-full": 1}
+
+
+def test_full_means_full_for_the_class_of_the_car_before_the_desk() -> None:
+    site = one_floor(2)
+    long, plug, *short = site.places
+    classes = (
+        SizeClass("short", 3_900, 1_600, 2_000),
+        SizeClass("long", 4_500, 1_600, 2_000),
+        SizeClass("plug", 4_500, 1_600, 2_000, charging=True),
+    )
+    of_place = {**{place.number: 1 for place in short}, long.number: 2, plug.number: 3}
+    site = replace(site, classes=classes, place_class=of_place)
+    other, charging = Reference(1, 9), DeskEvent(1, 1, DeskInput.CHARGING_KEY, Reference(0, 0))
+
+    def is_true(*taken: Message, pressed: DeskEvent, text: DeskText) -> bool:
+        tape = Tape(site).say(1, *taken, bay(1400), pressed).say(2, word(text))
+        return "full-means-full" not in tape.broken()
+
+    both = (car_at(1, long.number, 1), car_at(1, plug.number, 1, other))
+    # It is 4,000 mm long; who does not charge may stand where one can.
+    assert is_true(*both, pressed=key(), text=DeskText.FULL)
+    assert not is_true(both[0], pressed=key(), text=DeskText.FULL)
+    assert is_true(both[1], pressed=charging, text=DeskText.NO_CHARGING)
+    assert not is_true(both[0], pressed=charging, text=DeskText.NO_CHARGING)
 
 
 # --- life

@@ -52,6 +52,17 @@ def test_the_plans_times_give_the_order() -> None:
     assert order.predecessor(BOB, Segment(1, 3)) is None
 
 
+def test_who_is_to_go_on_elsewhere_keeps_its_place_in_the_order_on_the_way_in_hand() -> None:
+    """Both are late, and Alice wins one more task: by the times alone she would be first now."""
+    order = order_of(plan(BOB, [(6, 2, 20)]), plan(ALICE, [(10, 10, 25), (10, 4, 40)]))
+    assert order.predecessor(ALICE, Segment(1, 5)) == BOB
+    tell(order, plan(BOB, [(6, 2, 60)], version=2, begin_s=45))
+    assert order.predecessor(ALICE, Segment(1, 5)) == BOB
+    tell(order, plan(ALICE, [(10, 10, 25), (10, 4, 55), (4, 12, 90)], version=2))
+    assert order.predecessor(ALICE, Segment(1, 5)) == BOB
+    assert order.predecessor(BOB, Segment(1, 5)) == NOBODY
+
+
 def test_only_its_own_word_or_token_ends_a_machines_turn() -> None:
     order = passing()
     order.on_progress(progress(ALICE, 0, 8))

@@ -5,6 +5,7 @@ import os
 import sys
 import termios
 import tty
+from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
@@ -28,11 +29,11 @@ class StreetByHand:
         self._seed = seed
         self._came = 0
 
-    def car_in(self) -> str:
-        """A car comes now; its name."""
+    def car_in(self, *, charging: bool = False) -> str:
+        """A car comes now, and asks for a place to charge or not; its name."""
         self._came += 1
         now_us = round(asyncio.get_running_loop().time() * 1_000_000)
-        car = random_car(f"by hand {self._came}", self._seed)
+        car = replace(random_car(f"by hand {self._came}", self._seed), charging=charging)
         self._street.add(Stay(now_us, None, car))
         return car.name
 

@@ -10,6 +10,8 @@ from bus_sim.systems.car_park.csv_rows import CsvRow, CsvTable, Readable
 from bus_sim.systems.car_park.moments import CellError, MomentForm
 
 NEEDED = ("hour", "arrivals", "departures")
+#: How many of the arrivals ask for a place to charge; 0 without the column, and in an empty cell.
+OPTIONAL = ("charging",)
 #: More in an hour is a mistake: a compartment serves some hundred at most.
 MOST_AN_HOUR = 10_000
 HOUR_US = 3_600_000_000
@@ -23,6 +25,7 @@ class HourCount(NamedTuple):
     hour: datetime | int
     arrivals: int
     departures: int
+    charging: int = 0
 
 
 class DrawnStay(NamedTuple):
@@ -30,13 +33,14 @@ class DrawnStay(NamedTuple):
 
     arrival_us: int | None
     departure_us: int | None
+    charging: bool = False
 
 
 def read_counts(source: Readable, table: CsvTable) -> list[HourCount]:
     """All good rows; bad rows are noted. Raises ``DemandError`` where the file cannot be read or lacks a column."""
     counts: list[HourCount] = []
     lines: dict[datetime | int, int] = {}
-    for row in table.rows(source, NEEDED, ()):
+    for row in table.rows(source, NEEDED, OPTIONAL):
         try:
             hours, text = _hours(row, table.form.moments), row.text("hour")
             # An hour that the clock showed twice is the first of both where it is there once.
@@ -45,7 +49,9 @@ def read_counts(source: Readable, table: CsvTable) -> list[HourCount]:
                 raise CellError(f"hour {text!r} is that of line {lines[hours[0]]} too; leave one out")
             if counts and isinstance(hour, int) is not isinstance(counts[0].hour, int):
                 raise CellError(f"hour {text!r}: others are written in another way; write all with a date, or none")
-            count = HourCount(hour, *(row.number(column, 0, MOST_AN_HOUR) for column in ("arrivals", "departures")))
+            arrivals, departures = (row.number(column, 0, MOST_AN_HOUR) for column in ("arrivals", "departures"))
+            charging = row.number("charging", 0, arrivals) if "charging" in row.cells else 0
+            count = HourCount(hour, arrivals, departures, charging)
         except CellError as error:
             table.note(row, error)
             continue
@@ -110,21 +116,23 @@ def drawn_stays(counts: list[HourCount], inside: int, seed: int) -> list[DrawnSt
     Times are drawn in each hour, all alike likely. Each departure fetches one of the cars inside, by chance, that came
     ``MIN_STAY_US`` before or was inside at the start; where there is none it waits for the next that is, so that it can
     be so long after its hour. So many are inside at the start as would leave before they came, by the sums at the end
-    of each hour, and at least ``inside``.
+    of each hour, and at least ``inside``. Who charges is drawn from those who come in each hour.
     """
-    chance, zero = random.Random(f"counts:{seed}"), day_zero(counts)
+    chance, wishes, zero = random.Random(f"counts:{seed}"), random.Random(f"charging:{seed}"), day_zero(counts)
     come: list[int] = []
     go: list[int] = []
+    charging: set[int] = set()
     lacking = 0
     for count in counts:
         begin_us = _begin_us(count.hour, zero)
+        charging.update(wishes.sample(range(len(come), len(come) + count.arrivals), count.charging))
         come += sorted(begin_us + chance.randrange(HOUR_US) for _ in range(count.arrivals))
         go += sorted(begin_us + chance.randrange(HOUR_US) for _ in range(count.departures))
         lacking = max(lacking, len(go) - len(come))
     first = max(inside, lacking)
     leaving = _matched(first, come, go, chance)
     arrivals: list[int | None] = [*[None] * first, *come]
-    return [DrawnStay(arrival_us, leaving.get(car)) for car, arrival_us in enumerate(arrivals)]
+    return [DrawnStay(arrival_us, leaving.get(car), car - first in charging) for car, arrival_us in enumerate(arrivals)]
 
 
 def _matched(inside: int, come: list[int], go: list[int], chance: random.Random) -> dict[int, int]:

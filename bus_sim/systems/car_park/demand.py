@@ -113,7 +113,10 @@ class Demand:
         if not chosen:
             raise no_counts(source.name, counts, day, until or day)
         drawn = drawn_stays(chosen, inside, seed)
-        cars = [random_car(f"car {number}", seed) for number in range(1, len(drawn) + 1)]
+        cars = [
+            replace(random_car(f"car {number}", seed), charging=one.charging)
+            for number, one in enumerate(drawn, start=1)
+        ]
         stays = [Stay(one.arrival_us or 0, one.departure_us, car) for one, car in zip(drawn, cars, strict=True)]
         held = sum(one.arrival_us is None for one in drawn)
         if held > inside:

@@ -14,6 +14,7 @@ from onboard.contract.codes import Reason
 from onboard.contract.messages import Blocked, Clear
 from onboard.core.site import Segment
 from onboard.ports.bus import Bus
+from onboard.systems.car_park.site import car_park
 from onboard.ways.site import TrackKind, way_site
 from onboard.web.app import CommandError, number
 from onboard.wire.codec import fleet_codec
@@ -31,6 +32,8 @@ class CarParkSource(RunSource):
             "block": self._block,
             "clear": self._clear,
         }
+        if any(one.charging for one in car_park(simulation.site).classes):
+            acts["car_in_charging"] = self._car_in_charging
         super().__init__(simulation, zero, acts)
         self._simulation = simulation
         self._hand = StreetByHand(simulation.plant.street, simulation.options.seed)
@@ -46,6 +49,9 @@ class CarParkSource(RunSource):
 
     def _car_in(self, _: Arguments) -> str:
         return f"{self._hand.car_in()} comes in"
+
+    def _car_in_charging(self, _: Arguments) -> str:
+        return f"{self._hand.car_in(charging=True)} comes in to charge"
 
     def _car_out(self, _: Arguments) -> str:
         name = self._hand.car_out()

@@ -34,6 +34,8 @@ WINDOW_LINE_US = 300_000_000
 
 #: A customer who is hurried does not walk or drive: these states end at once.
 _HURRIED = (CustomerState.DRIVING_IN, CustomerState.WALKING_OUT)
+#: Whoever is so sent away was told why.
+_TOLD_WHY = (VisitOutcome.FULL, VisitOutcome.TOO_LARGE, VisitOutcome.NO_CHARGING, VisitOutcome.TICKET_UNKNOWN)
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,7 @@ class CarParkStage(SystemStage[Plant]):
         still = (CustomerState.COMING, CustomerState.PARKED, CustomerState.GONE)
         return Tally(
             outcomes[VisitOutcome.SERVED] + outcomes[VisitOutcome.CANCELLED],
-            sum(outcomes[one] for one in (VisitOutcome.FULL, VisitOutcome.TOO_LARGE, VisitOutcome.TICKET_UNKNOWN)),
+            sum(outcomes[one] for one in _TOLD_WHY),
             sum(one.state not in still and not looks_for_ticket(one) for one in customers),
             max((*summary.in_wait_us, *summary.out_wait_us), default=0) / 1e6,
             outcomes[VisitOutcome.FULL],
@@ -213,6 +215,7 @@ class CarParkStage(SystemStage[Plant]):
             inside=street.inside,
             refused_full=street.refused_full,
             refused_too_large=street.refused_too_large,
+            refused_no_charging=street.refused_no_charging,
             unserved=unserved(street),
             wait_in=Durations.of(street.in_wait_us),
             wait_out=Durations.of(street.out_wait_us),

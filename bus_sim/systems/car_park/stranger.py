@@ -16,7 +16,8 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Proposal
 from onboard.core.serial import from_bus_ms, successor, to_bus_ms
 from onboard.core.site import Machine, Site
-from onboard.systems.car_park.generation import Alternative, CarParkGeneration, Solution
+from onboard.systems.car_park.alternatives import Alternative
+from onboard.systems.car_park.generation import CarParkGeneration, Solution
 from onboard.systems.car_park.program import Program
 from onboard.systems.car_park.robot import ParkingRobotFactory
 from onboard.systems.car_park.site import car_park

@@ -40,6 +40,7 @@ class RunSummary:
     inside: int
     refused_full: int
     refused_too_large: int
+    refused_no_charging: int
     unserved: int
     wait_in: Durations
     wait_out: Durations
@@ -93,9 +94,10 @@ class RunSummary:
         )
 
     def _customers(self) -> list[str]:
+        unchargeable = f", no place to charge {self.refused_no_charging}" if self.refused_no_charging else ""
         text = [
             f"cars         in {self.cars_in}   out {self.cars_out}   inside {self.inside}   refused: full "
-            f"{self.refused_full}, too large {self.refused_too_large}   waiting now {self.unserved}",
+            f"{self.refused_full}, too large {self.refused_too_large}{unchargeable}   waiting now {self.unserved}",
             f"waiting in   {self.wait_in}",
             f"waiting out  {self.wait_out}",
         ]

@@ -138,7 +138,7 @@ def pack_desk_order(message: DeskOrder) -> bytes:
 def unpack_desk_order(sender: int, data: bytes) -> DeskOrder | None:
     sequence, word_1 = _UNPACK_BIXXX(data)
     text = word_1 & 0xF
-    if text > 8:
+    if text > 9:
         return None
     car_origin = word_1 >> 4 & 0xFF
     car_number = word_1 >> 12 & 0xFFFF
@@ -243,8 +243,6 @@ def pack_desk_event(message: DeskEvent) -> bytes:
 def unpack_desk_event(sender: int, data: bytes) -> DeskEvent | None:
     sequence, word_1 = _UNPACK_BIXXX(data)
     event = word_1 & 0x3
-    if event > 2:
-        return None
     car_origin = word_1 >> 2 & 0xFF
     car_number = word_1 >> 10 & 0xFFFF
     return DeskEvent(sender, sequence, _DESK_INPUT[event], _new(Reference, (car_origin, car_number)))
@@ -263,13 +261,17 @@ def pack_bay_state(message: BayState) -> bytes:
     wheelbase_mm = message.wheelbase_mm
     if wheelbase_mm < 0 or wheelbase_mm > 8191:
         raise OutOfRangeError("BayState.wheelbase_mm", wheelbase_mm, 0, 8191)
-    return (
-        load_kg
-        + length_mm * 0x1000
-        + (height_mm + wheelbase_mm * 0x1000) * 0x2000000
-        + (0x4000000000000 if message.person_inside else 0)
-        + (0x8000000000000 if message.carrier_in_front else 0)
-    ).to_bytes(8, "little")
+    try:
+        return (
+            load_kg
+            + length_mm * 0x1000
+            + (height_mm + wheelbase_mm * 0x1000) * 0x2000000
+            + (0x4000000000000 if message.person_inside else 0)
+            + (0x8000000000000 if message.carrier_in_front else 0)
+            + message.width_mm * 0x10000000000000
+        ).to_bytes(8, "little")
+    except OverflowError as error:
+        raise refusal(message, ("BayState.width_mm", 0, 4095)) from error
 
 
 def unpack_bay_state(sender: int, data: bytes) -> BayState | None:
@@ -278,6 +280,7 @@ def unpack_bay_state(sender: int, data: bytes) -> BayState | None:
     length_mm = word_0 >> 12 & 0x1FFF
     height_mm = word_0 >> 25 & 0xFFF
     wheelbase_mm = word_0 >> 37 & 0x1FFF
+    width_mm = word_0 >> 52
     return BayState(
         sender,
         load_kg,
@@ -286,6 +289,7 @@ def unpack_bay_state(sender: int, data: bytes) -> BayState | None:
         wheelbase_mm,
         word_0 & 0x4000000000000 != 0,
         word_0 & 0x8000000000000 != 0,
+        width_mm,
     )
 
 

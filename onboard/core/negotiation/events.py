@@ -30,6 +30,8 @@ class Proposal(NamedTuple):
     detail: tuple[Message, ...] = ()
     #: What the bid names where it rests on no itinerary: the round of a call that stands.
     version: int = 0
+    #: Whether it still holds at a bus time, us, where finding it took so long that it may not: else it is not said.
+    stands: "Callable[[int], bool] | None" = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +75,7 @@ class NeededAnswers(NamedTuple):
     """The cost cannot be named before others have answered ``parts``; it will be ``cost`` or more, as far as is known.
 
     ``combine`` gets all answers so far, of earlier rounds too, and the time (bus us): the proposal, or what else is
-    needed, or None where there is no solution with these answers.
+    needed, or None where there is no solution with these answers. Without ``parts`` it is a search that goes on so.
     """
 
     cost: int

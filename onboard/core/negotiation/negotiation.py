@@ -158,8 +158,6 @@ class Negotiation:
     def wake(self, now_us: int) -> Outcome:
         """Do what has fallen due in any call."""
         outcome: Outcome = []
-        if not self.participants and not self.initiators:
-            return outcome
         for participant in list(self.participants.values()):
             outcome += self._spread(participant.wake(now_us), now_us)
         for initiator in list(self.initiators):

@@ -74,7 +74,7 @@ class ParticipantEvent(Enum):
     IMPOSSIBLE = "the search found no solution"
     BEATEN = "a better bid is on the bus than I can make or made"
     DEADLINE = "it is too late to bid, or the call's deadline has passed"
-    CHANGED = "a bid or task of my own in another call makes what I searched stale"
+    CHANGED = "a bid or task of my own in another call, or what others plan, makes what I searched stale"
     LAPSE = "the award is overdue, or the option is over"
     OPTION_ME = "the initiator holds my bid as an option"
     AWARD_ME = "the initiator awards me"
@@ -197,7 +197,10 @@ class Participant:
         # A search may owe no further delay, so being due can follow being due; the table ends that after two.
         while self.due_us is not None and min(self.due_us, self.last_bid_us) <= now_us:
             self.due_us = None
-            due = ParticipantEvent.DUE if self.needs is None else ParticipantEvent.NEED
+            is_found = self.state is ParticipantState.WAITING_COST
+            due = ParticipantEvent.NEED if is_found and self.needs is not None else ParticipantEvent.DUE
+            if is_found and self.proposal is not None and self.proposal.stands and not self.proposal.stands(now_us):
+                due = ParticipantEvent.CHANGED
             outcome += self._fire(due if now_us < self.last_bid_us else ParticipantEvent.DEADLINE, now_us)
         if now_us >= self.deadline_us:
             outcome += self._fire(ParticipantEvent.DEADLINE, now_us)
@@ -397,9 +400,9 @@ class Participant:
         return heard_us if heard_us > due_us and self.subs.may_ask(heard_us) else due_us
 
 
-def _essence(found: Proposal | NeededAnswers) -> tuple[object, ...]:
+def _essence(one: Proposal | NeededAnswers) -> tuple[object, ...]:
     """What two searches must have in common for the answers to the first to do for the second."""
-    return (found.cost, found.parts) if isinstance(found, NeededAnswers) else (found.cost, found.program)
+    return (one.cost, one.parts or one.combine) if isinstance(one, NeededAnswers) else (one.cost, one.program)
 
 
 #: States in which nothing more is hoped for from a call.

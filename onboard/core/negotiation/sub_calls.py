@@ -56,6 +56,8 @@ class SubCalls:
 
     def ask(self, parts: tuple[RequestedTerms, ...], now_us: int) -> Outcome | None:
         """Open a sub-call for each part; None where depth, part numbers or time do not allow any."""
+        if not parts:
+            return []
         deadline_us = inner_deadline_us(self.deadline_us, now_us, self.timing)
         if deadline_us is None or self.call.depth >= MAX_DEPTH or len(self.asked) + len(parts) > MAX_PARTS:
             return None

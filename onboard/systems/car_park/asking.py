@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from onboard.contract.messages import CallForProposals
 from onboard.core.negotiation import NeededAnswers, Proposal, SubCallAnswer
 from onboard.core.serial import from_bus_ms, to_bus_ms
-from onboard.systems.car_park.generation import Alternative, CarParkGeneration, Solution
+from onboard.systems.car_park.alternatives import Alternative
+from onboard.systems.car_park.generation import CarParkGeneration, Solution
 from onboard.systems.car_park.program import CarStep
 from onboard.systems.car_park.ride_calls import answer_for, ride_terms, rides_of
 from onboard.ways.lift_uses import ride_us
@@ -29,11 +30,10 @@ MAX_ROUNDS = 2
 class AskingGeneration(CarParkGeneration):
     """As its base, but an estimate with rides in it needs the lifts' answers first."""
 
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
+    def answer(
+        self, call: CallForProposals, solution: Solution, alternatives: list[Alternative], now_us: int
+    ) -> Proposal | NeededAnswers:
         """The bid where the best solution rides no lift; else what the lifts must be asked."""
-        solution, alternatives = self.solve(call, now_us)
-        if solution is None:
-            return None
         return self._next(call, solution, alternatives, (), 1, now_us)
 
     def renewed(self, call: CallForProposals, promised: Solution, now_us: int) -> Solution:

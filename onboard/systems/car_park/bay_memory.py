@@ -25,6 +25,7 @@ from onboard.systems.car_park.records import (
     TicketRecord,
     WinnerRecord,
 )
+from onboard.systems.car_park.site import ANY_CLASS
 from onboard.ways.mirror import WayFleet
 from onboard.ways.tokens import car_token
 
@@ -49,9 +50,11 @@ def ticket_record(car: Reference, *, urgent: bool) -> Record:
     return Record(TicketRecord(car, urgent))
 
 
-def job_record(task: Reference, operation: Operation, car: Reference, wheelbase_mm: int) -> Record:
+def job_record(
+    task: Reference, operation: Operation, car: Reference, wheelbase_mm: int, car_class: int = ANY_CLASS
+) -> Record:
     """The journal's word that a task of the bay begins."""
-    return Record(BayJobRecord(task, operation, car, wheelbase_mm))
+    return Record(BayJobRecord(task, operation, car, wheelbase_mm, car_class))
 
 
 def job_over_record() -> Record:
@@ -98,6 +101,8 @@ class BayMemory:
     number: int = 0
     #: Task, operation, car and wheelbase of the task in hand, or None.
     job: tuple[Reference, Operation, Reference, int] | None = None
+    #: Class of its car, where that is to be parked.
+    car_class: int = ANY_CLASS
     #: Whether the winner has had the bay since the task began.
     was_granted: bool = False
 
@@ -131,6 +136,7 @@ class BayMemory:
         match record:
             case BayJobRecord(operation=operation, car=car):
                 self.job, self.was_granted = (record.task, operation, car, record.wheelbase_mm), False
+                self.car_class = record.car_class
                 if operation is Operation.RETRIEVE and car in self.tickets:
                     self.tickets.remove(car)
             case NumberRecord():

@@ -38,6 +38,8 @@ DESK_INPUT = {
     OperatorAction.CANCEL: DeskInput.CANCEL,
     OperatorAction.URGENT_TICKET: DeskInput.TICKET,
 }
+#: The keys of who brings a car.
+KEYS = (DeskInput.KEY, DeskInput.CHARGING_KEY)
 #: The custodian's word that the winner is lost is answered so often with the newest award, before it counts: it may
 #: have missed the first.
 REMINDERS = 3
@@ -59,7 +61,10 @@ class BayPhase(Enum):
 
 @dataclass
 class BayTask:
-    """The task. ``version`` (16 bits) is raised each time that it is called anew; ``call`` is the one last awarded."""
+    """The task. ``version`` (16 bits) is raised each time that it is called anew; ``call`` is the one last awarded.
+
+    ``car_class`` is that of a car to be parked, as it was let in.
+    """
 
     task: Reference
     operation: Operation
@@ -74,6 +79,7 @@ class BayTask:
     #: How often nobody could, one after the other, and why the last time; its driver may leave before anybody is asked.
     refusals: int = 0
     reason: Reason = Reason.CANCELLED
+    car_class: int = ANY_CLASS
 
     @property
     def is_given_back(self) -> bool:
@@ -151,7 +157,8 @@ def fits(bay: BayState, limits: CarLimits) -> bool:
     """Whether the car in the bay is one that the park takes (row P33)."""
     small = bay.length_mm <= limits.max_length_mm and bay.height_mm <= limits.max_height_mm
     grips = limits.min_wheelbase_mm <= bay.wheelbase_mm <= limits.max_wheelbase_mm
-    return small and grips and bay.load_kg <= limits.max_load_kg
+    narrow = not limits.max_width_mm or bay.width_mm <= limits.max_width_mm
+    return small and grips and narrow and bay.load_kg <= limits.max_load_kg
 
 
 def forget_tickets(tickets: deque[Reference], mirror: WayMirror) -> None:
@@ -160,23 +167,32 @@ def forget_tickets(tickets: deque[Reference], mirror: WayMirror) -> None:
         tickets.remove(car)
 
 
-def turned_away(bay: BayState, park: CarPark, mirror: WayMirror) -> DeskText | None:
-    """What the driver of a car is told that the park does not take; None for one that it takes."""
-    if not fits(bay, park.cars) or not any(park.takes(place, class_in(bay, park)) for place in park.places):
+def admitted(bay: BayState, park: CarPark, mirror: WayMirror, *, charging: bool) -> int | DeskText:
+    """The class under which a car is let in; for one that the park does not take what its driver is told."""
+    car_class = class_in(bay, park, charging=charging)
+    suited = (class_in(bay, park), car_class)
+    if not fits(bay, park.cars) or not any(park.takes(place, one) for place in park.places for one in suited):
         return DeskText.CAR_TOO_LARGE
-    return None if has_room(bay, park, mirror) else DeskText.FULL
+    return car_class if has_room(car_class, park, mirror) else full_text(car_class, park)
 
 
-def refusal_text(bay: BayState | None, park: CarPark, mirror: WayMirror) -> DeskText:
+def full_text(car_class: int, park: CarPark) -> DeskText:
+    """What is said where no place is free for a class: full is full for the class."""
+    return DeskText.NO_CHARGING if park.charges(car_class) else DeskText.FULL
+
+
+def refusal_text(car_class: int, park: CarPark, mirror: WayMirror) -> DeskText:
     """What a customer is told whom nobody can serve; that nobody can although there is room is not called full."""
-    return DeskText.OUT_OF_ORDER if has_room(bay, park, mirror) else DeskText.FULL
+    return DeskText.OUT_OF_ORDER if has_room(car_class, park, mirror) else full_text(car_class, park)
 
 
-def class_in(bay: BayState | None, park: CarPark) -> int:
+def class_in(bay: BayState | None, park: CarPark, *, charging: bool = False) -> int:
     """The class of the car in a bay, by its sensors; ``ANY_CLASS`` before they have said anything."""
-    return ANY_CLASS if bay is None else park.car_class(bay.length_mm, bay.height_mm, bay.load_kg)
+    if bay is None:
+        return ANY_CLASS
+    return park.car_class(bay.length_mm, bay.height_mm, bay.load_kg, bay.width_mm, charging=charging)
 
 
-def has_room(bay: BayState | None, park: CarPark, mirror: WayMirror) -> bool:
-    """Whether a place is free for the class of the car in a bay."""
-    return any(park.takes(place, class_in(bay, park)) for place in mirror.free_places())
+def has_room(car_class: int, park: CarPark, mirror: WayMirror) -> bool:
+    """Whether a place is free for a class of car."""
+    return any(park.takes(place, car_class) for place in mirror.free_places())

@@ -57,6 +57,7 @@ class _Building:
         for number, one in enumerate(self.site.classes):
             self.drawing.area(_corners(at, 27, 12, 10), colour(number), opacity=0.45)
             words = f"{one.name}: to {one.max_length_mm} mm, {one.max_height_mm} mm high"
+            words += f", {one.max_width_mm} mm wide" if one.max_width_mm else ""
             words += ", charging" if one.charging else ""
             self.drawing.text(at + 16, 36, words)
             at += 40 + 6.2 * len(words)

@@ -1,7 +1,7 @@
 """Whether the others can make room for a plan: who stands in its way, and whose way back it counts on to yield."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from onboard.contract.codes import Grade, KindCode
 from onboard.contract.messages import Stamp
@@ -9,13 +9,14 @@ from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment
 from onboard.systems.car_park.program import standing_itinerary, steps_of, to_itinerary
 from onboard.systems.car_park.site import CarPark
+from onboard.ways.effort import Effort
 from onboard.ways.mirror import WayMirror
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
 from onboard.ways.passing import BegunItinerary
 from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import Reservations
 from onboard.ways.retreats import HeldBack, held_back
-from onboard.ways.sipp import NoRoute, plan_route
+from onboard.ways.sipp import NoRoute, planning
 
 #: Bound of one route search, in expansions (a wall-time bound would not replay).
 MAX_EXPANSIONS = 4_000
@@ -28,6 +29,7 @@ class Clearance:
     site: CarPark
     mirror: WayMirror
     node: int
+    effort: Effort = field(default_factory=Effort)
 
     def held_back(self, stamp: Stamp, from_us: int, now_us: int) -> dict[int, HeldBack]:
         """Plans whose ways back would yield to work under ``stamp``, without what of them begins after ``from_us``."""
@@ -54,6 +56,19 @@ class Clearance:
         """Machines of ``held`` whose ways back ``plan`` meets: those that yield to it, and those that do not."""
         answers = {node: self.mirror.order.makes_way(plan, node, now_us) for node in held}
         return [n for n, yes in answers.items() if yes], [n for n, yes in answers.items() if yes is False]
+
+    def still_free(self, plan: BegunItinerary, before: Reservations, now_us: int) -> Callable[[], bool]:
+        """Tells, when it is asked, whether nobody new is in a plan's way since ``before``, and it ends in a refuge."""
+        windows = itinerary_windows(self.site, plan.itinerary, now_us, plan.first_begin_us)
+        met = set(before.conflicts(self.node, windows))
+        end = final_position(self.site, plan.itinerary)
+
+        def is_free() -> bool:
+            if end not in open_refuges(self.site, self.mirror.others_standing()):
+                return False
+            return met.issuperset(self.mirror.reservations.conflicts(self.node, windows))
+
+        return is_free
 
     def standing_in(self, plan: BegunItinerary, now_us: int) -> dict[int, tuple[Segment, int]] | None:
         """Machines that stand for ever in a plan's way, each with where and since when; None where one has no plan."""
@@ -83,7 +98,8 @@ class Clearance:
             start_us = max(now_us, since_us)
             refuges = open_refuges(self.site, [end for end in ends if end is not None])
             floors = self.mirror.lift_floors(now_us, start_us, taken)
-            route = plan_route(self.site, taken, node, place, start_us, (), refuges, MAX_EXPANSIONS, floors)
+            search = planning(self.site, taken, node, place, start_us, (), refuges, MAX_EXPANSIONS, floors)
+            route = self.effort.whole(search)
             if isinstance(route, NoRoute):
                 return None
             stamp, steps = Stamp(to_bus_ms(now_us), 0, 0), list(steps_of(route, ()))

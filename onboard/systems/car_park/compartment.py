@@ -78,7 +78,7 @@ class Compartment:
     memory: BayMemory = field(init=False)
     outputs: BayOutputs = field(init=False)
     _desk_sequence: int | None = None
-    _key_pressed: bool = False
+    _key: DeskInput | None = None
     _robot_waits: bool = False
 
     def __post_init__(self) -> None:
@@ -213,15 +213,15 @@ class Compartment:
         return self.stewardship.won(job.car, winner, job.task, job.version)
 
     def _call_again(self, job: BayTask, now_us: int) -> list[Effect]:
-        """Its winner gave the task back, or is lost: it is called anew under a raised version."""
-        outcome = self.fleet.negotiation.abandon(job.task, Reason.NODE_SILENT, now_us)
-        effects: list[Effect] = [item for item in outcome if not isinstance(item, EVENT_TYPES)]
+        """Its winner gave the task back, or is lost: it is called anew under a raised version, noted before said."""
         job.winner, job.version, self._robot_waits = 0, successor(job.version, TASK_VERSION_BITS), False
-        effects += self.stewardship.won(job.car, 0, job.task, job.version)
+        effects = self.stewardship.won(job.car, 0, job.task, job.version)
+        outcome = self.fleet.negotiation.abandon(job.task, Reason.NODE_SILENT, now_us)
+        effects += [item for item in outcome if not isinstance(item, EVENT_TYPES)]
         return effects + self._call_for(job, now_us)
 
     def _call_for(self, job: BayTask, now_us: int) -> list[Effect]:
-        source, sink = self.station.number, open_end(bay_task.class_in(self.bay, self._park))
+        source, sink = self.station.number, open_end(job.car_class)
         if job.operation is Operation.RETRIEVE:
             where = custody.place_of(self.fleet, job.car)
             if where is None:
@@ -287,8 +287,8 @@ class Compartment:
     # --- the desk ----------------------------------------------------------------------------------------------
 
     def _at_desk(self, event: DeskInput, car: Reference, *, urgent: bool = False) -> list[Effect]:
-        if event is DeskInput.KEY:
-            self._key_pressed = True
+        if event in bay_task.KEYS:
+            self._key = event
             return []
         # Whoever cancels wants the car back at once: the same as coming for it.
         return self._take_ticket(car, urgent=urgent)
@@ -319,8 +319,10 @@ class Compartment:
 
     def _park_again(self, left: CarAt, now_us: int) -> list[Effect]:
         """My journal is lost and my rights are new: whatever was meant with the car in my bay, it is parked."""
-        self.stewardship.left, self.memory.job = None, (left.car, Operation.PARK, left.car, left.wheelbase_mm)
-        return [job_record(*self.memory.job), *self._take_up_job(now_us), self.outputs.light_up(LightColour.RED)]
+        self.stewardship.left, self.memory.car_class = None, bay_task.class_in(self.bay, self._park)
+        self.memory.job = (left.car, Operation.PARK, left.car, left.wheelbase_mm)
+        noted = job_record(*self.memory.job, self.memory.car_class)
+        return [noted, *self._take_up_job(now_us), self.outputs.light_up(LightColour.RED)]
 
     def _take_up_job(self, now_us: int) -> list[Effect]:
         """After a restart in the middle of a task: journal, tokens and sensors tell how far it has come."""
@@ -328,7 +330,7 @@ class Compartment:
         task, operation, car, wheelbase_mm = self.memory.job
         winner, version = self.stewardship.winner_of(car, task)
         self.job = BayTask(task, operation, car, wheelbase_mm, winner, version)
-        self.job.was_granted = self.memory.was_granted
+        self.job.was_granted, self.job.car_class = self.memory.was_granted, self.memory.car_class
         if self.job.was_granted:
             self._go(BayPhase.SERVING)
             return self._when_serving(now_us)
@@ -342,7 +344,7 @@ class Compartment:
 
     def _to_free(self) -> list[Effect]:
         over: list[Effect] = [job_over_record()] if self.job is not None else []
-        self.job, self._robot_waits, self._key_pressed = None, False, False
+        self.job, self._robot_waits, self._key = None, False, None
         self._go(BayPhase.FREE)
         return over + self.outputs.door(DoorName.INPUT, DoorAction.OPEN)
 
@@ -352,9 +354,9 @@ class Compartment:
             return []
         if self.stewardship.left is not None and self.bay.load_kg:
             return self._park_again(self.stewardship.left, now_us)
-        if self._key_pressed:
-            self._key_pressed = False
-            return self._admit(now_us)
+        if self._key is not None:
+            key, self._key = self._key, None
+            return self._admit(key, now_us)
         bay_task.forget_tickets(self.tickets, self.fleet.mirror)
         is_empty = not self.bay.load_kg and not self.bay.person_inside
         if self.tickets and is_empty and custody.place_of(self.fleet, self.tickets[0]) is not None:
@@ -363,23 +365,21 @@ class Compartment:
         colour = LightColour.RED if self._use is BayUse.EXIT else LightColour.GREEN
         return [self.outputs.light_up(colour)] if self.outputs.light is not colour and not self.bay.load_kg else []
 
-    def _admit(self, now_us: int) -> list[Effect]:
+    def _admit(self, key: DeskInput, now_us: int) -> list[Effect]:
         """Steps 2 to 5: check the car, print the ticket, call, turn the light red and close the input door."""
-        assert self.bay is not None
         bay = self.bay
-        if not bay.load_kg or self._use is BayUse.EXIT:
+        if bay is None or not bay.load_kg or self._use is BayUse.EXIT:
             return []
-        turned_away = bay_task.turned_away(bay, self._park, self.fleet.mirror)
-        if turned_away is not None:
-            return [self.outputs.show(turned_away, Reference(0, 0))]
+        found = bay_task.admitted(bay, self._park, self.fleet.mirror, charging=key is DeskInput.CHARGING_KEY)
+        if isinstance(found, DeskText):
+            return [self.outputs.show(found, Reference(0, 0))]
         car, number = self.memory.next_reference(self.fleet)
-        self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
+        self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm, car_class=found)
         # The number first: one that is not used is no harm, one used twice would be.
-        effects: list[Effect] = [number]
-        effects += self.fleet.tokens.create(car_token(*car))
-        effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm))
-        effects += custody.state(self.fleet, car, self.station.number, bay.wheelbase_mm)
-        effects.append(self.outputs.show(DeskText.TAKE_TICKET, car))
+        effects: list[Effect] = [number, *self.fleet.tokens.create(car_token(*car))]
+        effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm, found))
+        stated = custody.state(self.fleet, car, self.station.number, bay.wheelbase_mm)
+        effects += [*stated, self.outputs.show(DeskText.TAKE_TICKET, car)]
         effects += self._call_for(self.job, now_us)
         self._go(BayPhase.LOCKING)
         return [*effects, self.outputs.light_up(LightColour.RED)]
@@ -391,7 +391,7 @@ class Compartment:
             return self._when_awaiting(now_us)
         if self.bay.person_inside:
             # Who presses again has no ticket: the power failed before it was printed.
-            asked, self._key_pressed = self._key_pressed, False
+            asked, self._key = self._key is not None, None
             is_new = self.job.operation is Operation.PARK
             return [self.outputs.show(DeskText.TAKE_TICKET, self.job.car)] if asked and is_new else []
         return self.outputs.door(DoorName.INPUT, DoorAction.CLOSE)
@@ -445,7 +445,8 @@ class Compartment:
         text = DeskText.CAR_READY
         if job.is_given_back:
             job.wait(now_us)
-            text = text if job.car in self.tickets else bay_task.refusal_text(self.bay, self._park, self.fleet.mirror)
+            if job.car not in self.tickets:
+                text = bay_task.refusal_text(job.car_class, self._park, self.fleet.mirror)
         return [*self.outputs.door(DoorName.INPUT, DoorAction.OPEN), self.outputs.show(text, job.car)]
 
     def _when_handover(self, now_us: int) -> list[Effect]:

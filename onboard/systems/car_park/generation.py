@@ -6,7 +6,7 @@ others' present and foreseen tasks (rows P21, P28), unlike that of a lathe. Wher
 chooses the place itself and evaluates all its solutions (row P46).
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ from onboard.contract.messages import CallForProposals, Itinerary, Stamp
 from onboard.core.negotiation import NeededAnswers, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine, Segment, Station
+from onboard.systems.car_park.alternatives import Alternative
 from onboard.systems.car_park.clearance import MAX_EXPANSIONS, Clearance
 from onboard.systems.car_park.program import (
     MAX_STEPS,
@@ -27,12 +28,13 @@ from onboard.systems.car_park.program import (
     to_itinerary,
 )
 from onboard.systems.car_park.site import CarPark, class_of_end
+from onboard.ways.effort import Effort, Search
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayMirror
 from onboard.ways.passing import BegunItinerary
 from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import FOREVER, Reservations
-from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
+from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, planning
 
 #: From the deadline to the first motion: award frame, journal writes and the first tokens (measured in tests).
 AWARD_LATENCY_US = 150_000
@@ -54,29 +56,8 @@ HEARD_US = 2_000_000
 WORTH_US = 2_000_000
 
 
-class Alternative(NamedTuple):
-    """One solution that was weighed: the place chosen and when it would be finished (bus us), None where impossible.
-
-    ``bound_us`` stands instead of the date where that was not worked out: it is no earlier than this, and so no better
-    than the solution chosen.
-    """
-
-    station: Station
-    finish_us: int | None
-    bound_us: int | None = None
-
-
-def weighed(alternatives: Iterable[Alternative]) -> str:
-    """What was weighed, in words for the log: dates in bus time, s, and how many places were not worked out, or why."""
-    told, bounded, blocked = [], 0, 0
-    for station, finish_us, bound_us in alternatives:
-        if finish_us is not None:
-            told.append(f"{station} at {finish_us / 1e6:.3f}")
-        elif bound_us is not None:
-            bounded += 1
-        else:
-            blocked += 1
-    return f"weighed: {', '.join(told)}; no sooner: {bounded}; out of reach: {blocked}"
+#: What a request for an estimate comes to.
+Estimate = Proposal | NeededAnswers | None
 
 
 class Solution(NamedTuple):
@@ -101,25 +82,27 @@ class CarParkGeneration:
     tentative: dict[tuple[int, int], Solution] = field(default_factory=dict)
     #: A person has a hand in (row M38): no new tasks.
     is_held: bool = False
+    #: What all its searches cost, and whether they are sliced.
+    effort: Effort = field(default_factory=Effort)
     clearance: Clearance = field(init=False)
 
     def __post_init__(self) -> None:
-        self.clearance = Clearance(self.site, self.mirror, self.machine.node_id)
+        self.clearance = Clearance(self.site, self.mirror, self.machine.node_id, self.effort)
 
     # --- the Estimator -----------------------------------------------------------------------------------------
 
     def floor(self, call: CallForProposals, now_us: int) -> int:
         """Least finishing time (bus ms) that any robot could name, from call and site alone: it stands at the start."""
         start_us = self._deadline_us(call, now_us) + AWARD_LATENCY_US
-        return to_bus_ms(min(self._lower_bounds(call, self._all_candidates(call), None, start_us).values()))
+        bounds = self._lower_bounds(call, self._all_candidates(call), None, start_us)
+        self.effort.steps += len(bounds)
+        return to_bus_ms(min(bounds.values()))
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         """Least finishing time (bus ms) for me if nobody were in my way; None where I cannot do it at all."""
         if call.criterion is not Criterion.FINISH_TIME or call.operation not in (Operation.PARK, Operation.RETRIEVE):
             return None
-        if self.program.standing is None or self.program.unplanned:
-            return None
-        if self.is_held or len(self.program.remaining) + 4 > MAX_STEPS:
+        if not self._is_able:
             return None
         limits = self.site.cars
         # On the bus a wheelbase is rounded down to 10 mm; the desk has measured it to the millimetre.
@@ -127,13 +110,67 @@ class CarParkGeneration:
             return None
         _, segment, start_us = self._start(call, now_us)
         bounds = self._lower_bounds(call, self._candidates(call, now_us), segment, start_us)
+        self.effort.steps += len(bounds)
         least_us = min(bounds.values(), default=FOREVER)
         return to_bus_ms(least_us) if least_us < FOREVER else None
 
+    @property
+    def _is_able(self) -> bool:
+        """Whether this robot can take on any task."""
+        program = self.program
+        is_planned = program.standing is not None and not program.unplanned
+        return is_planned and not self.is_held and len(program.remaining) + 4 <= MAX_STEPS
+
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
-        """First request: the best solution as a bid, or None: silence (row P45)."""
-        solution, alternatives = self.solve(call, now_us)
-        return None if solution is None else self.proposal(call, solution, alternatives)
+        """First request: the best solution as a bid, or None: silence (row P45).
+
+        Where searches are sliced it goes on when it is asked for the answers of nobody.
+        """
+        if self.effort.slice_steps is None:
+            return self.effort.whole(self._estimate(call, now_us, self.mirror.reservations))
+        bound = self.lower_bound(call, now_us)
+        return None if bound is None else self._go_on(bound, self._estimate_aside(call, now_us), now_us)
+
+    def _go_on(self, bound: int, search: Search[Estimate], now_us: int) -> Estimate:
+        over = self.effort.slice(search, now_us)
+        if over is None:
+            return NeededAnswers(bound, (), lambda _, then_us: self._go_on(bound, search, then_us))
+        # Whether it is in time is judged when the time that the slice took is over.
+        return NeededAnswers(bound, (), lambda _, then_us: over[0])
+
+    def _estimate(self, call: CallForProposals, now_us: int, reservations: Reservations) -> Search[Estimate]:
+        solution, alternatives = yield from self._solve(call, now_us, reservations)
+        return None if solution is None else self.answer(call, solution, alternatives, now_us)
+
+    def _estimate_aside(self, call: CallForProposals, now_us: int) -> Search[Estimate]:
+        """The same around what all plan now, whatever they plan meanwhile; the bid asks whether it stands."""
+        reservations = self.mirror.reservations.copy()
+        found = yield from self._estimate(call, now_us, reservations)
+        if not isinstance(found, Proposal):
+            return found
+        (solution,) = found.program
+        return found._replace(stands=self._standing(call, solution, reservations, now_us))
+
+    def _standing(
+        self, call: CallForProposals, solution: Solution, reservations: Reservations, now_us: int
+    ) -> Callable[[int], bool]:
+        """Whether a solution still holds at a time: this machine, its place and its way are as free as they were."""
+        plan = BegunItinerary(self._offer(call, solution._replace(kept=0)), solution.start_us)
+        is_free = self.clearance.still_free(plan, reservations, now_us)
+
+        def stands(then_us: int) -> bool:
+            if not self._is_able or solution.place not in self._candidates(call, then_us):
+                return False
+            _, origin, start_us = self._start(call, then_us)
+            return origin == solution.origin and start_us <= solution.start_us and is_free()
+
+        return stands
+
+    def answer(
+        self, call: CallForProposals, solution: Solution, alternatives: list[Alternative], now_us: int
+    ) -> Proposal | NeededAnswers:
+        """What a solution comes to: a bid."""
+        return self.proposal(call, solution, alternatives)
 
     def renewed(self, call: CallForProposals, promised: Solution, now_us: int) -> Solution:
         """Second request, once the call is awarded: what is really carried out, around what is known by now."""
@@ -166,13 +203,20 @@ class CarParkGeneration:
         there is no solution around machines that only stand there, one that counts on their giving way (design,
         section 5: idle machines yield); they hear of it with the firm itinerary.
         """
+        search = self._solve(call, now_us, self.mirror.reservations, behind_bids=behind_bids)
+        return self.effort.whole(search)
+
+    def _solve(
+        self, call: CallForProposals, now_us: int, reservations: Reservations, *, behind_bids: bool = True
+    ) -> Search[tuple[Solution | None, list[Alternative]]]:
         start = self._start(call, now_us, behind_bids=behind_bids)
-        best, alternatives = self._search(call, now_us, start, self.mirror.reservations)
+        best, alternatives = yield from self._search(call, now_us, start, reservations)
         if alternatives and (best is None or not behind_bids):
-            best, alternatives = self._past_retreats(call, now_us, start, best) or (best, alternatives)
+            past = yield from self._past_retreats(call, now_us, start, best)
+            best, alternatives = past or (best, alternatives)
         if best is None and alternatives:
             asked_us = max(self._deadline_us(call, now_us), now_us) + YIELDING_US
-            best, more = self._search(call, now_us, start, self.mirror.reservations.with_way_given(asked_us))
+            best, more = yield from self._search(call, now_us, start, reservations.with_way_given(asked_us))
             alternatives += more
             if best is not None and not self._have_room(best, now_us):
                 best = None
@@ -189,7 +233,7 @@ class CarParkGeneration:
 
     def _past_retreats(
         self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], best: Solution | None
-    ) -> tuple[Solution, list[Alternative]] | None:
+    ) -> Search[tuple[Solution, list[Alternative]] | None]:
         """A sooner solution than ``best`` that counts on others' ways back to yield; None where there is none.
 
         Those who yield stand where their work ends, which the solution does not touch, and find a way back around it
@@ -200,7 +244,11 @@ class CarParkGeneration:
         horizon_us = max(self._deadline_us(call, now_us), now_us) + AWARD_LATENCY_US + HEARD_US
         held = self.clearance.held_back(stamp, horizon_us, now_us)
         while held:
-            found, tried = self._search(call, now_us, start, self.clearance.without_retreats(held, now_us))
+            taken, plans = self.clearance.without_retreats(held, now_us), [self.mirror.plans[node] for node in held]
+            found, tried = yield from self._search(call, now_us, start, taken)
+            if any(self.mirror.plans.get(node) is not plan for node, plan in zip(held, plans, strict=True)):
+                # Others have planned anew while this was searched.
+                return None
             if found is None or (best is not None and best.finish_us - found.finish_us < WORTH_US):
                 return None
             steps = [*self.program.remaining[: found.kept], *found.steps]
@@ -218,9 +266,9 @@ class CarParkGeneration:
 
     def _search(
         self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], reservations: Reservations
-    ) -> tuple[Solution | None, list[Alternative]]:
+    ) -> Search[tuple[Solution | None, list[Alternative]]]:
         kept, segment, start_us = start
-        bounds = self._bounds(call, now_us, start, reservations)
+        bounds = yield from self._bounds(call, now_us, start, reservations)
         best: Solution | None = None
         alternatives: list[Alternative] = []
         # Places on both sides of a segment are reached and served alike.
@@ -230,7 +278,7 @@ class CarParkGeneration:
                 alternatives.append(Alternative(place, None, bound_us))
                 continue
             if place.segment not in routes:
-                route = self._route(call, place, segment, start_us, now_us, reservations)
+                route = yield from self._route(call, place, segment, start_us, now_us, reservations)
                 routes[place.segment] = route if route is not None and kept + len(route.legs) < MAX_STEPS else None
             route = routes[place.segment]
             if route is None:
@@ -244,7 +292,7 @@ class CarParkGeneration:
 
     def _bounds(
         self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], reservations: Reservations
-    ) -> list[tuple[int, int, Station]]:
+    ) -> Search[list[tuple[int, int, Station]]]:
         """Places that may be chosen, each with a time before which it cannot be finished, the most promising first.
 
         Where there is a choice of places to leave the car at, the search up to taking it is common to all: it is made
@@ -256,11 +304,12 @@ class CarParkGeneration:
         taken_us = None
         if len(places) >= FEW_PLACES and class_of_end(call.from_station) is None:
             take, _ = self._visits(call, places[0], start_us)
-            route = self._plan(reservations, segment, start_us, (take,), now_us)
+            route = yield from self._plan(reservations, segment, start_us, (take,), now_us)
             if route is None:
                 return [(FOREVER, 0, places[0])]
             taken_us = route.finish_us
         bounds = self._lower_bounds(call, places, segment, start_us, taken_us)
+        yield len(bounds)
         return sorted((bounds[one.segment], n, one) for n, one in enumerate(places))
 
     def _start(self, call: CallForProposals, now_us: int, *, behind_bids: bool = True) -> tuple[int, Segment, int]:
@@ -280,13 +329,13 @@ class CarParkGeneration:
         start_us: int,
         now_us: int,
         reservations: Reservations,
-    ) -> Route | None:
+    ) -> Search[Route | None]:
         return self._plan(reservations, origin, start_us, self._visits(call, place, start_us), now_us)
 
     def _plan(
         self, reservations: Reservations, origin: Segment, start_us: int, visits: tuple[Visit, ...], now_us: int
-    ) -> Route | None:
-        route = plan_route(
+    ) -> Search[Route | None]:
+        route = yield from planning(
             self.site,
             reservations,
             self.machine.node_id,
@@ -307,7 +356,7 @@ class CarParkGeneration:
         Without work the way to another refuge: so a machine that only stands gives way.
         """
         visits = tuple(self._work_visit(work, now_us) for work in works)
-        route = self._plan(self.mirror.reservations, origin, start_us, visits, now_us)
+        route = self.effort.whole(self._plan(self.mirror.reservations, origin, start_us, visits, now_us))
         # A few steps may be kept before these.
         return None if route is None or len(route.legs) + 3 > MAX_STEPS else steps_of(route, works)
 
@@ -384,7 +433,7 @@ class CarParkGeneration:
         """Places for a class of car at which none stands and that nobody has promised, in the site's order."""
         promised = self._promised(now_us)
         free = [place for place in self.mirror.free_places() if place.number not in promised]
-        return [place for place in free if self.site.takes(place, car_class)]
+        return self.site.best_for(car_class, free)
 
     def _promised(self, now_us: int) -> set[int]:
         """Places at which somebody's plan, or mine, will work: two parkings never aim at one place (row P42)."""

@@ -238,7 +238,9 @@ class Lift:
         ride = self.ride
         if ride is None or ride.robot != requester:
             return Reason.TOKEN_NOT_GRANTABLE_YET
-        if self.phase is LiftPhase.BOARDING and not self._gate_was_out and self._stands_at(ride.board):
+        is_entered = self._gate_was_out and (self.platform is None or self.platform.carrier_aboard)
+        if self.phase is LiftPhase.BOARDING and not is_entered and self._stands_at(ride.board):
+            # Again where nobody came in by it: it may have come back from the ride before only now.
             self._gate_was_out = True
             return Reason.NONE
         if self.phase is LiftPhase.LEAVING and self._stands_at(ride.leave) and self._onward(now_us) is None:

@@ -15,6 +15,7 @@ from onboard.core.serial import from_bus_ms, successor, to_bus_ms
 from onboard.core.site import Segment, Station
 from onboard.ways.lifts import lift_at, platform_on, sill
 from onboard.ways.occupancy import hop_origins
+from onboard.ways.passing import TOLERANCE_US
 from onboard.ways.sipp import Route
 from onboard.ways.site import WaySite
 
@@ -104,7 +105,7 @@ class Program:
     current: int = 0
     version: int = 0
     stamp: Stamp = field(default_factory=lambda: Stamp(0, 0, 0))
-    #: A leg of no length before the steps, where only it tells through which mouth the first one comes.
+    #: A wait before the steps, where only it tells through which mouth the first one comes, or when it began.
     named: tuple[CarStep, ...] = ()
 
     @property
@@ -200,6 +201,11 @@ class Program:
         """
         self._tell_anew(_later(self.remaining, by_us))
 
+    def lengthen(self, by_us: int) -> None:
+        """The step in hand ends later, and what follows comes later; it began where it began."""
+        first, *rest = _later(self.remaining, by_us)
+        self._tell_anew([first._replace(begin_us=first.begin_us - by_us), *rest])
+
     def delay(self, number: int, by_us: int) -> None:
         """Let remaining step ``number`` begin later by ``by_us`` > 0 and stand before it; that in hand lasts longer.
 
@@ -230,12 +236,21 @@ class Program:
         self.version = successor(self.version, 8)
 
     def _named(self, steps: list[CarStep]) -> tuple[CarStep, ...]:
+        """What the first step does not tell by itself: where a hop comes from, or when a run began if after its award.
+
+        Who hears the plan would have to take the run for one that began with the award, before all others on its way.
+        """
         first = steps[0] if 0 < len(steps) < MAX_STEPS else None
-        hops = first is not None and first.action is LegAction.TRAVEL and first.from_index == first.to_index
-        if first is None or not hops or len(hop_origins(self.site, first.destination)) == 1:
+        if first is None or first.action is not LegAction.TRAVEL:
             return ()
-        here = self._place()
-        return (CarStep(LegAction.STAND, here.track, here.index, here.index, first.begin_us, first.begin_us),)
+        here, begin_us = self._place(), first.begin_us
+        if first.from_index != first.to_index:
+            here = Segment(first.track, first.from_index)
+            if begin_us - from_bus_ms(self.stamp.award_ms, begin_us) <= TOLERANCE_US:
+                return ()
+        elif len(hop_origins(self.site, first.destination)) == 1:
+            return ()
+        return (CarStep(LegAction.STAND, here.track, here.index, here.index, begin_us, begin_us),)
 
     def itinerary(self, sender: int, now_us: int) -> Itinerary:
         """The firm itinerary as it goes on the bus; one STAND leg where nothing is left to do."""

@@ -162,7 +162,7 @@ class TicketRecord(JournalRecord):
 
 @dataclass(frozen=True, slots=True)
 class BayJobRecord(JournalRecord):
-    """A task of the bay begins, for this car."""
+    """A task of the bay begins, for this car; its class matters where it is to be parked."""
 
     NAME = "job"
     RULES = (Keep("job"), RecordEnd(("ticket",), _CAR, ("operation", (Operation.RETRIEVE,))))
@@ -171,6 +171,7 @@ class BayJobRecord(JournalRecord):
     operation: Operation
     car: Reference
     wheelbase_mm: int
+    car_class: int = field(default=0, metadata=UNSAID)
 
 
 @dataclass(frozen=True, slots=True)

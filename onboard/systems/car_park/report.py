@@ -63,7 +63,10 @@ def _places_line(site: CarPark) -> str:
     if not site.classes:
         return f"places: {len(site.places)}"
     numbers = Counter(site.place_class.get(place.number, 0) for place in site.places)
-    parts = [f"{numbers[number]} {one.name}" for number, one in enumerate(site.classes, start=1)]
+    parts = [
+        f"{numbers[number]} {one.name}{' (to charge)' if one.charging else ''}"
+        for number, one in enumerate(site.classes, start=1)
+    ]
     return f"places: {len(site.places)}: {', '.join([*parts, f'{numbers[0]} for any car'])}"
 
 

@@ -32,8 +32,9 @@ from onboard.core.negotiation import (
 )
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park import custody
+from onboard.systems.car_park.alternatives import weighed
 from onboard.systems.car_park.asking import AskingGeneration
-from onboard.systems.car_park.generation import CarParkGeneration, Solution, weighed
+from onboard.systems.car_park.generation import CarParkGeneration, Solution
 from onboard.systems.car_park.giving_way import GivingWay, YieldDecision
 from onboard.systems.car_park.going_around import GoingAround
 from onboard.systems.car_park.handling import ShuttleWork, handle
@@ -440,11 +441,7 @@ class ParkingRobot:
         late_us = now_us - self._latest_us(step)
         if late_us < OVERDUE_US:
             return []
-        # The run in hand began where it began: only its end and what follows are later.
-        by_us = late_us + OVERDUE_US
-        self.program.shift(by_us)
-        first = self.program.steps[0]
-        self.program.steps[0] = first._replace(begin_us=first.begin_us - by_us)
+        self.program.lengthen(late_us + OVERDUE_US)
         # Whoever waits for rights in vain may have lost the task: its initiator answers then.
         return self._publish(now_us) + ([] if step.work is None else self._announce_start(step.work))
 

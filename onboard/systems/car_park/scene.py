@@ -7,7 +7,7 @@ by floor from above, to scale, as ``_building`` arranges it.
 from typing import Any
 
 from onboard.contract.codes import KindCode, LegAction, TokenKind
-from onboard.contract.messages import BayState, DoorState, Message, ShuttleState
+from onboard.contract.messages import BayState, DeskOrder, DoorState, Message, ShuttleState
 from onboard.core.site import Segment
 from onboard.history.history import Fact
 from onboard.systems.car_park.outlines import Outlines, is_elevation
@@ -29,6 +29,7 @@ class CarParkScene:
         self._doors: dict[int, dict[str, str]] = {}
         self._bays: dict[int, dict[str, Any]] = {}
         self._shuttles: dict[int, dict[str, Any]] = {}
+        self._desks: dict[int, str] = {}
 
     def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """The history tells all of it."""
@@ -46,10 +47,16 @@ class CarParkScene:
                 self._bays[node] = {"car": message.load_kg > 0, "person": message.person_inside}
             case ShuttleState():
                 self._shuttles[node] = {"mm": message.extension_mm, "side": int(message.side)}
+            case DeskOrder():
+                self._desks[node] = message.text.name.lower().replace("_", " ")
 
     def layout(self) -> Json:
-        """Tracks and places; ``blockable`` are the segments that a person may name, ``building`` lies in mm."""
-        site = self.site
+        """Tracks and places; ``blockable`` are the segments that a person may name, ``building`` lies in mm.
+
+        ``classes`` are the names of classes by place, ``charging`` the places where one can charge.
+        """
+        site, park = self.site, car_park(self.site)
+        of_place = {place: park.classes[number - 1] for place, number in park.place_class.items()}
         return {
             "carrier_mm": site.carrier_length_mm,
             "tracks": [
@@ -64,7 +71,9 @@ class CarParkScene:
                 for track in site.tracks.values()
             ],
             "places": [place.number for place in site.places],
-            "building": None if is_elevation(car_park(site)) else _building(car_park(site)),
+            "classes": {place: one.name for place, one in of_place.items()},
+            "charging": [place for place, one in of_place.items() if one.charging],
+            "building": None if is_elevation(park) else _building(park),
             "blockable": [
                 str(Segment(track.number, index))
                 for track in site.tracks.values()
@@ -98,6 +107,8 @@ class CarParkScene:
         for name, known in (("doors", self._doors), ("bay", self._bays), ("shuttle", self._shuttles)):
             if node in known:
                 told[name] = known[node]
+        if node in self._desks:
+            told["desk"] = self._desks[node]
         return told
 
     def _where(self, segment: Segment) -> str:

@@ -13,28 +13,34 @@ from onboard.work.timing import DeviceTiming
 
 @dataclass(frozen=True, slots=True)
 class CarLimits:
-    """What cars the park takes (row P33); all in mm and kg."""
+    """What cars the park takes (row P33); all in mm and kg. ``max_width_mm`` 0: the file limits none."""
 
     min_wheelbase_mm: int
     max_wheelbase_mm: int
     max_length_mm: int
     max_height_mm: int
     max_load_kg: int
+    max_width_mm: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class SizeClass:
-    """A class of places and of cars: what fits, in mm and kg, and whether it is charged there."""
+    """A class of places and of cars: what fits, in mm and kg, and whether it is charged there.
+
+    ``max_width_mm`` 0: whatever the park takes.
+    """
 
     name: str
     max_length_mm: int
     max_height_mm: int
     max_load_kg: int
     charging: bool = False
+    max_width_mm: int = 0
 
     def covers(self, other: "SizeClass") -> bool:
         """Whether all that fits ``other`` fits here."""
         fits = self.max_length_mm >= other.max_length_mm and self.max_height_mm >= other.max_height_mm
+        fits = fits and (not self.max_width_mm or 0 < other.max_width_mm <= self.max_width_mm)
         return fits and self.max_load_kg >= other.max_load_kg and (self.charging or not other.charging)
 
 
@@ -42,6 +48,8 @@ class SizeClass:
 ANY_CLASS = 0
 #: Most classes that a site may have: four bits.
 MOST_CLASSES = 15
+#: A car that asks for a place to charge and fits into no such class: no place takes it, and nobody calls for it.
+NO_CLASS = MOST_CLASSES + 1
 
 
 #: Numbers of no station: in a call for parking, wherever a car of class 1, 2 ... can stand, behind this.
@@ -97,20 +105,37 @@ class CarPark(WaySite):
     #: What the file calls alleys beside the one that each floor has by itself, by track number.
     alley_names: dict[int, str] = field(default_factory=dict)
 
-    def car_class(self, length_mm: int, height_mm: int, load_kg: int, *, charging: bool = False) -> int:
-        """The first class that a car fits, ``ANY_CLASS`` where there is none."""
+    @property
+    def measures_width(self) -> bool:
+        """Whether compartments measure how wide a car is: where the file limits it anywhere."""
+        return self.cars.max_width_mm > 0 or any(one.max_width_mm for one in self.classes)
+
+    def car_class(
+        self, length_mm: int, height_mm: int, load_kg: int, width_mm: int = 0, *, charging: bool = False
+    ) -> int:
+        """The first class that a car fits; without one ``ANY_CLASS``, for who asks to charge ``NO_CLASS``."""
         for number, one in enumerate(self.classes, start=1):
             fits = length_mm <= one.max_length_mm and height_mm <= one.max_height_mm and load_kg <= one.max_load_kg
-            if fits and one.charging is charging:
+            if fits and one.charging is charging and (not one.max_width_mm or width_mm <= one.max_width_mm):
                 return number
-        return ANY_CLASS
+        return NO_CLASS if charging else ANY_CLASS
+
+    def charges(self, car_class: int) -> bool:
+        """Whether cars of a class ask for a place to charge."""
+        return car_class == NO_CLASS or (0 < car_class <= len(self.classes) and self.classes[car_class - 1].charging)
 
     def takes(self, place: Station, car_class: int) -> bool:
         """Whether every car of a class can stand at a place."""
         number = self.place_class.get(place.number, ANY_CLASS)
         if number == ANY_CLASS:
-            return not (0 < car_class <= len(self.classes) and self.classes[car_class - 1].charging)
+            return not self.charges(car_class)
         return 0 < car_class <= len(self.classes) and self.classes[number - 1].covers(self.classes[car_class - 1])
+
+    def best_for(self, car_class: int, places: list[Station]) -> list[Station]:
+        """Of these those that take a class, in their order; who does not charge gets a place for it only at last."""
+        taking = [place for place in places if self.takes(place, car_class)]
+        plain = [place for place in taking if not self.charges(self.place_class.get(place.number, ANY_CLASS))]
+        return taking if self.charges(car_class) else plain or taking
 
 
 def car_park(site: Site) -> CarPark:

@@ -198,7 +198,7 @@ class _Story:
             case BayState() if self._changed("front", message.carrier_in_front) and message.carrier_in_front:
                 yield message.sender, "a carrier stands before the bay", self._park(12)
             case DeskEvent() if self._changed("desk", message.sequence):
-                step = 2 if message.event is DeskInput.KEY else 0
+                step = 2 if message.event in (DeskInput.KEY, DeskInput.CHARGING_KEY) else 0
                 self.pressed |= bool(step)
                 yield message.sender, f"desk: {message.event.name.lower()}", self._once("key", step)
             case DeskOrder() if message.text is DeskText.TAKE_TICKET and self._changed("ticket", message.car):

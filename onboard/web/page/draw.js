@@ -22,6 +22,7 @@ export class Stage {
     this.spurs = layout.tracks.filter((track) => track.kind === "spur");
     this.longest = Math.max(1, ...this.alleys.map((alley) => alley.length));
     this.places = new Set(layout.places);
+    this.charging = new Set(layout.charging ?? []);
     this.bays = new Map(layout.machines.filter((one) => one.station !== null).map((one) => [one.station, one]));
     const names = [...this.bays.values()].map((one) => one.name);
     this.common = names.length ? [...names[0]].findIndex((letter, at) => names.some((name) => name[at] !== letter)) : 0;
@@ -197,6 +198,7 @@ export class Stage {
         pen.fillRect(box.x, box.y, box.w, box.h);
       } else {
         pen.strokeRect(box.x, box.y, box.w, box.h);
+        if (this.charging.has(number)) this.text(pen, "\u26a1", box, css("--dim"));
       }
     } else {
       return;

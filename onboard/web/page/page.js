@@ -236,7 +236,8 @@ function placeLines() {
   const { what, id } = state.place;
   if (what === "place") {
     const car = state.snapshot.cars?.[id];
-    return [`place p(${id >> 8},${id & 127})${(id >> 7) & 1 ? "F" : "N"}: ${car ? `car ${car}` : "free"}`];
+    const kind = state.layout.classes?.[id] ? `, ${state.layout.classes[id]}${state.layout.charging.includes(id) ? ", to charge" : ""}` : "";
+    return [`place p(${id >> 8},${id & 127})${(id >> 7) & 1 ? "F" : "N"}${kind}: ${car ? `car ${car}` : "free"}`];
   }
   if (what === "segment") {
     const [track, index] = id.match(/\d+/g).map(Number);
@@ -274,6 +275,7 @@ function machineLines() {
   if (told.holds?.length) lines.push(`holds ${told.holds.map(([track, index]) => `p(${track},${index})`).join(" ")}`);
   for (const [us, words] of told.told ?? []) lines.push(us === null ? words : `${clock(us)}: ${words}`);
   for (const [track, from, to, begin, end] of told.plan ?? []) lines.push(`${clock(begin)} to ${clock(end)}: ${track >= 128 ? "lift or spur" : "floor"} ${track}, ${from} to ${to}`);
+  if (told.desk) lines.push(`the desk shows: ${told.desk}`);
   if (told.doors) lines.push(`street door ${told.doors.input}, alley door ${told.doors.output}, light ${told.doors.light}`);
   const task = snapshot.tasks.find((one) => one.owner === machine.name);
   if (task) lines.push(`works on task ${task.task} (${task.what}, ${task.phase})${task.promised_us ? `, promised for ${clock(task.promised_us)}` : ""}`);

@@ -25,8 +25,10 @@ class CarBody:
     length_mm: int
     height_mm: int
     mass_kg: int
-    #: Without mirrors. No sensor of a compartment measures it.
+    #: Without mirrors. Compartments measure it where the site limits it.
     width_mm: int = WIDTH_MM[2]
+    #: Its driver asks for a place to charge it at.
+    charging: bool = False
 
 
 class Aboard(NamedTuple):

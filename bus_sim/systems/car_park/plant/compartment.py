@@ -58,6 +58,7 @@ class CompartmentPlant:
         self._watchers: list[Callable[[], None]] = []
         self._desk_watchers: list[Callable[[DeskText, Reference], None]] = []
         travel_us = car_park(site).timing.door_us
+        self._sees_width = car_park(site).measures_width
         self.doors = {
             DoorName.INPUT: Door(
                 timers,
@@ -117,9 +118,9 @@ class CompartmentPlant:
 
     # --- what people do at the desk ----------------------------------------------------------------------------
 
-    def press_key(self) -> None:
-        """The key: "park my car"."""
-        self._desk_event(DeskInput.KEY, NO_CAR)
+    def press_key(self, *, charging: bool = False) -> None:
+        """The key: "park my car", or "park it where it is charged"."""
+        self._desk_event(DeskInput.CHARGING_KEY if charging else DeskInput.KEY, NO_CAR)
 
     def insert_ticket(self, car: Reference) -> None:
         """A ticket: "fetch my car"."""
@@ -167,13 +168,17 @@ class CompartmentPlant:
         return DoorState(self.node_id, positions[DoorName.INPUT], positions[DoorName.OUTPUT], self.light)
 
     def bay_state(self) -> BayState:
-        """What load cells, measuring curtain and presence sensors see now."""
+        """What load cells, measuring curtain and presence sensors see now.
+
+        The curtain measures widths where the site limits them.
+        """
         car = self.car
         in_front = self._world.carrier_in_front(self.body.station)
         person = self.body.persons > 0 or self.body.crossing
         if car is None:
-            return BayState(self.node_id, 0, 0, 0, 0, person, in_front)
-        return BayState(self.node_id, car.mass_kg, car.length_mm, car.height_mm, car.wheelbase_mm, person, in_front)
+            return BayState(self.node_id, 0, 0, 0, 0, person, in_front, 0)
+        sizes = (car.mass_kg, car.length_mm, car.height_mm, car.wheelbase_mm)
+        return BayState(self.node_id, *sizes, person, in_front, car.width_mm if self._sees_width else 0)
 
     def _is_locked(self, door: DoorName) -> bool:
         return self.body.doors[door] is DoorPosition.LOCKED

@@ -55,6 +55,7 @@ class CustomerEvent(Enum):
     TICKET = "ticket"
     FULL = "full"
     TOO_LARGE = "too large"
+    NO_CHARGING = "no place to charge"
     LEAVE = "leave"
     CANCEL = "cancel"
     WAIT = "please wait"
@@ -70,6 +71,7 @@ class VisitOutcome(Enum):
     SERVED = "served"
     FULL = "refused: full"
     TOO_LARGE = "refused: too large"
+    NO_CHARGING = "refused: no place to charge"
     CANCELLED = "cancelled"
     TICKET_UNKNOWN = "ticket unknown"
     WRONG_CAR = "wrong car"
@@ -84,9 +86,12 @@ TABLE: dict[tuple[CustomerState, CustomerEvent], tuple[CustomerState, str]] = {
     (CustomerState.AWAITING_TICKET, CustomerEvent.TICKET): (CustomerState.WALKING_OUT, "walk_out"),
     (CustomerState.AWAITING_TICKET, CustomerEvent.FULL): (CustomerState.DRIVING_OUT, "turn_back"),
     (CustomerState.AWAITING_TICKET, CustomerEvent.TOO_LARGE): (CustomerState.DRIVING_OUT, "turn_back_too_large"),
+    (CustomerState.AWAITING_TICKET, CustomerEvent.NO_CHARGING): (CustomerState.DRIVING_OUT, "turn_back_unchargeable"),
     (CustomerState.WALKING_OUT, CustomerEvent.FULL): (CustomerState.DRIVING_OUT, "turn_back"),
+    (CustomerState.WALKING_OUT, CustomerEvent.NO_CHARGING): (CustomerState.DRIVING_OUT, "turn_back_unchargeable"),
     (CustomerState.WALKING_OUT, CustomerEvent.TIMER): (CustomerState.PARKED, "walk_away"),
     (CustomerState.PARKED, CustomerEvent.FULL): (CustomerState.AWAITING_DOOR, "come_back"),
+    (CustomerState.PARKED, CustomerEvent.NO_CHARGING): (CustomerState.AWAITING_DOOR, "come_back_unchargeable"),
     (CustomerState.PARKED, CustomerEvent.LEAVE): (CustomerState.AT_DESK, "insert_ticket"),
     (CustomerState.PARKED, CustomerEvent.CANCEL): (CustomerState.AT_DESK, "cancel"),
     (CustomerState.AT_DESK, CustomerEvent.TIMER): (CustomerState.AT_DESK, "insert_ticket"),
@@ -219,7 +224,7 @@ class Customer:
     def _press_key(self) -> None:
         # Patience first: the answer may come before the call returns.
         self._wait(PATIENCE_US)
-        self._place.press_key()
+        self._place.press_key(charging=self.stay.car.charging)
 
     def _walk_out(self) -> None:
         self._wait(self._draw_us(WALK_S))
@@ -241,9 +246,16 @@ class Customer:
         self._refusal = VisitOutcome.TOO_LARGE
         self._drive_out()
 
+    def _turn_back_unchargeable(self) -> None:
+        self._refusal = VisitOutcome.NO_CHARGING
+        self._drive_out()
+
     def _come_back(self) -> None:
         """Told FULL after walking away: the car is still in the bay."""
         self._refusal = VisitOutcome.FULL
+
+    def _come_back_unchargeable(self) -> None:
+        self._refusal = VisitOutcome.NO_CHARGING
 
     # --- going -------------------------------------------------------------------------------------------------
 
@@ -305,7 +317,9 @@ class Customer:
         "walk_away": _walk_away,
         "turn_back": _turn_back,
         "turn_back_too_large": _turn_back_too_large,
+        "turn_back_unchargeable": _turn_back_unchargeable,
         "come_back": _come_back,
+        "come_back_unchargeable": _come_back_unchargeable,
         "insert_ticket": _insert_ticket,
         "cancel": _cancel,
         "be_patient": _be_patient,

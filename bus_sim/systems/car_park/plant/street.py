@@ -20,6 +20,7 @@ TEXTS: dict[DeskText, CustomerEvent] = {
     # Turned away as well, if not for want of room.
     DeskText.OUT_OF_ORDER: CustomerEvent.FULL,
     DeskText.CAR_TOO_LARGE: CustomerEvent.TOO_LARGE,
+    DeskText.NO_CHARGING: CustomerEvent.NO_CHARGING,
     DeskText.PLEASE_WAIT: CustomerEvent.WAIT,
     DeskText.UNKNOWN_TICKET: CustomerEvent.UNKNOWN,
     DeskText.CAR_READY: CustomerEvent.READY,
@@ -42,6 +43,7 @@ class StreetSummary:
     asking: int
     refused_full: int
     refused_too_large: int
+    refused_no_charging: int
     cancelled: int
     in_wait_us: tuple[int, ...] = field(repr=False)
     out_wait_us: tuple[int, ...] = field(repr=False)
@@ -98,6 +100,7 @@ class Street:
             asking=states.count(CustomerState.AT_DESK) + states.count(CustomerState.AWAITING_DOOR),
             refused_full=outcomes.count(VisitOutcome.FULL),
             refused_too_large=outcomes.count(VisitOutcome.TOO_LARGE),
+            refused_no_charging=outcomes.count(VisitOutcome.NO_CHARGING),
             cancelled=outcomes.count(VisitOutcome.CANCELLED),
             in_wait_us=self.in_waits_us(since_us),
             out_wait_us=tuple(

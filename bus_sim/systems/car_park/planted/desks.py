@@ -14,7 +14,7 @@ from onboard.contract.messages import Award, BayState, DeskEvent, DeskOrder, Doo
 from onboard.controller.shell import Controller
 from onboard.ways.mirror import way_mirror
 
-_TASK_WORDS = (DeskText.TAKE_TICKET, DeskText.FULL, DeskText.CAR_TOO_LARGE)
+_TASK_WORDS = (DeskText.TAKE_TICKET, DeskText.FULL, DeskText.CAR_TOO_LARGE, DeskText.NO_CHARGING)
 
 
 def _closing_is_locked(simulation: Simulation) -> None:

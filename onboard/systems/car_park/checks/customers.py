@@ -15,6 +15,8 @@ from onboard.contract.messages import (
     Reference,
     TaskReport,
 )
+from onboard.core.site import Station
+from onboard.systems.car_park.bay_task import KEYS, class_in
 from onboard.systems.car_park.site import CarPark
 from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.picture import BusPicture
@@ -27,7 +29,13 @@ WORD_WITHIN_US = 60_000_000
 #: A customer gets the car, or the place, within this, us: some thirty cars before one on the shipped sites.
 SERVED_WITHIN_US = 3_600_000_000
 
-_ANSWERS_TO_KEY = (DeskText.TAKE_TICKET, DeskText.FULL, DeskText.CAR_TOO_LARGE, DeskText.OUT_OF_ORDER)
+_ANSWERS_TO_KEY = (
+    DeskText.TAKE_TICKET,
+    DeskText.FULL,
+    DeskText.CAR_TOO_LARGE,
+    DeskText.NO_CHARGING,
+    DeskText.OUT_OF_ORDER,
+)
 
 
 class TasksServed(Rule):
@@ -110,7 +118,7 @@ class CustomersServed(Rule):
 
     def _on_event(self, event: LogEvent[DeskEvent]) -> None:
         node, desk_event = event.message.sender, event.message
-        if desk_event.event is not DeskInput.KEY:
+        if desk_event.event not in KEYS:
             self._tickets.setdefault((node, desk_event.car), event)
         elif self._loads_kg.get(node) and node not in self._answered:
             self._asked.setdefault(node, event)
@@ -137,7 +145,7 @@ class CustomersServed(Rule):
 
 
 class FullMeansFull(Rule):
-    """Without faults a customer is refused only where the park is full."""
+    """Without faults a customer is refused only where no place is free for such a car."""
 
     name = "full-means-full"
     title = "nobody is refused while there is room"
@@ -148,24 +156,45 @@ class FullMeansFull(Rule):
 
     def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
-        self._inside: set[Reference] = set()
+        self._stations: dict[Reference, int] = {}
+        self._bays: dict[int, BayState] = {}
+        self._keys: dict[int, DeskInput] = {}
 
     def handlers(self) -> Handlers:
-        """Cars, and what desks say."""
-        return {CarAt: self._on_car, DeskOrder: self._on_word}
+        """Cars, what bays sense, which key is pressed, and what desks say."""
+        return {CarAt: self._on_car, BayState: self._on_bay, DeskEvent: self._on_key, DeskOrder: self._on_word}
 
     def _on_car(self, event: LogEvent[CarAt]) -> None:
-        (self._inside.discard if event.message.station == OUTSIDE else self._inside.add)(event.message.car)
+        said = event.message
+        if said.station == OUTSIDE:
+            self._stations.pop(said.car, None)
+        else:
+            self._stations[said.car] = said.station
+
+    def _on_bay(self, event: LogEvent[BayState]) -> None:
+        self._bays[event.message.sender] = event.message
+
+    def _on_key(self, event: LogEvent[DeskEvent]) -> None:
+        if event.message.event in KEYS:
+            self._keys[event.message.sender] = event.message.event
 
     def _on_word(self, event: LogEvent[DeskOrder]) -> None:
-        places = len(way_site(self.picture.site).places)
-        if isinstance(self.picture.site, CarPark) and self.picture.site.classes:
-            # Full is full for the class of a car, and the desk does not say which.
-            self.picture.unjudged += 1
+        said = event.message
+        if said.text not in (DeskText.FULL, DeskText.NO_CHARGING) or not self.picture.tokens.from_start:
             return
-        if event.message.text is not DeskText.FULL or not self.picture.tokens.from_start:
-            return
+        taken, places = set(self._stations.values()), {one.number for one in way_site(self.picture.site).places}
+        free = [one for one in self._suited(said.sender) if one.number not in taken]
         # A car that is on its way out keeps its place until it is fetched, one on its way in has one already.
-        if len(self._inside) < places:
-            what = f"says FULL with {len(self._inside)} cars on {places} places"
-            self.find(event, (event.message.sender,), what)
+        moving = sum(station not in places for station in self._stations.values())
+        if moving < len(free):
+            what = f"says {said.text.name} with {len(self._stations)} cars inside and {len(free)} places free for it"
+            self.find(event, (said.sender,), what)
+
+    def _suited(self, node: int) -> list[Station]:
+        """The places for the car before a desk."""
+        site, bay = way_site(self.picture.site), self._bays.get(node)
+        if not isinstance(site, CarPark) or not site.classes:
+            return list(site.places)
+        charging = self._keys.get(node) is DeskInput.CHARGING_KEY
+        car_class = class_in(bay, site, charging=charging)
+        return [place for place in site.places if site.takes(place, car_class)]

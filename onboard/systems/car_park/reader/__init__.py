@@ -26,7 +26,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
     fleet, uses = read_fleet(root, layout)
     stewards = read_stewards(root.table("stewards"), layout, fleet)
     constants = read_constants(root, lift, min(track.pitch_mm for track in layout.alleys()))
-    classes, place_class = read_classes(root, layout, constants.cars)
+    classes, place_class = read_classes(root, layout, constants)
     check_heights(layout, constants.cars, classes, place_class)
     robots = sum(1 for machine in fleet.by_node.values() if machine.kind is KindCode.ROBOT)
     timing = read_timing(root.table("timing"), robots, len(fleet.by_node), bitrate)

@@ -1,6 +1,7 @@
-"""Classes of places: how long, high and heavy a car may be that is put there, and where one can charge."""
+"""Classes of places: how long, high, heavy and wide a car may be that is put there, and where one can charge."""
 
 from onboard.config.reader import TomlTable
+from onboard.systems.car_park.reader.constants import Constants, check_width
 from onboard.systems.car_park.reader.layout import Layout
 from onboard.systems.car_park.reader.positions import read_written
 from onboard.systems.car_park.site import CarLimits, SizeClass
@@ -9,9 +10,9 @@ from onboard.systems.car_park.site import CarLimits, SizeClass
 _MOST_CLASSES = 15
 
 
-def read_classes(root: TomlTable, layout: Layout, cars: CarLimits) -> tuple[tuple[SizeClass, ...], dict[int, int]]:
+def read_classes(root: TomlTable, layout: Layout, constants: Constants) -> tuple[tuple[SizeClass, ...], dict[int, int]]:
     """``[[classes]]`` in the file's order, and the class of each place that has one: its number from 1 by station."""
-    tables = root.tables("classes")
+    tables, cars = root.tables("classes"), constants.cars
     if len(tables) > _MOST_CLASSES:
         tables[-1].bad("name", None, f"{len(tables)} classes", f"a site has at most {_MOST_CLASSES}")
     classes: list[SizeClass] = []
@@ -26,13 +27,15 @@ def read_classes(root: TomlTable, layout: Layout, cars: CarLimits) -> tuple[tupl
             table.integer("max_height_mm", 500, 4000, cars.max_height_mm),
             table.integer("max_load_kg", 100, 4000, cars.max_load_kg),
             table.flag("charging", default=False),
+            table.integer("max_width_mm", 1000, 4000, cars.max_width_mm),
         )
-        for limit in ("max_length_mm", "max_height_mm", "max_load_kg"):
+        for limit in ("max_length_mm", "max_height_mm", "max_load_kg", "max_width_mm"):
             most = getattr(cars, limit)
-            if getattr(one, limit) > most and limit not in table.wrong:
+            if most and getattr(one, limit) > most and limit not in table.wrong:
                 table.bad(
                     limit, getattr(one, limit), f"no such car comes in: cars.{limit} is {most}", "make one of both fit"
                 )
+        check_width(table, constants.carrier_length_mm)
         classes.append(one)
         _read_places(layout, table, number, of_place, classes)
     return tuple(classes), of_place

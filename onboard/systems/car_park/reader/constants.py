@@ -40,7 +40,7 @@ def read_constants(root: TomlTable, lift: TomlTable, pitch_mm: int) -> Constants
         _read_axis(shuttle, 750, 500),
         shuttle.integer("reach_mm", 500, 8_000, 5_400),
         _read_axis(lift, 1_083, 500),
-        _read_cars(cars),
+        _read_cars(cars, length_mm),
     )
 
 
@@ -51,7 +51,15 @@ def _read_axis(table: TomlTable, speed_mm_s: int, acceleration_mm_s2: int) -> Ax
     )
 
 
-def _read_cars(table: TomlTable) -> CarLimits:
+def check_width(table: TomlTable, carrier_length_mm: int) -> None:
+    """Note cars that stand out over their carrier: others come as near to it as its own length allows."""
+    most_mm = table.values.get("max_width_mm", 0)
+    if "max_width_mm" not in table.wrong and most_mm > carrier_length_mm:
+        what = f"wider than a carrier is long along the alley ({carrier_length_mm} mm)"
+        table.bad("max_width_mm", most_mm, what, "make it smaller, or carrier.length_mm and the pitches larger")
+
+
+def _read_cars(table: TomlTable, carrier_length_mm: int) -> CarLimits:
     """The wheelbases that the bus can carry (8 bits of 10 mm from 1500 mm) bound what a site can take."""
     limits = CarLimits(
         table.integer("min_wheelbase_mm", 1510, 4050, 1_800),
@@ -59,7 +67,9 @@ def _read_cars(table: TomlTable) -> CarLimits:
         table.integer("max_length_mm", 1000, 8000, 5_300),
         table.integer("max_height_mm", 500, 4000, 2_100),
         table.integer("max_load_kg", 100, 4000, 3_000),
+        table.integer("max_width_mm", 1000, 4000, 0),
     )
+    check_width(table, carrier_length_mm)
     low_mm, high_mm = limits.min_wheelbase_mm, limits.max_wheelbase_mm
     if low_mm > high_mm and not table.wrong:
         name = "min_wheelbase_mm" if "min_wheelbase_mm" in table.values else "max_wheelbase_mm"
