@@ -48,9 +48,7 @@ class TestBench:
         #: The bench's own node on the fleet bus.
         self.node = simulation.fleet.attach("bench", None)
         self._notice = Notice()
-        self._boot = 0
         simulation.observers.append(lambda message, time_us: self._hear(time_us, FLEET, message))
-        simulation.observers.append(self._power_devices)
         decoder = Decoder(simulation.codecs.device)
 
         def on_device(frame: Frame, time_us: int, _sender: str) -> None:
@@ -148,13 +146,6 @@ class TestBench:
         await self.until(look, f"{count} heartbeats of node {node_id}", within_s)
 
     # --- inside ------------------------------------------------------------------------------------------------
-
-    def _power_devices(self, message: Message, _time_us: int) -> None:
-        """Drives and sensors come up with their controller: at the first word of a life they tell how they stand."""
-        if not isinstance(message, Heartbeat) or not self._is_own(message) or message.boot == self._boot:
-            return
-        self._boot = message.boot
-        self.world.power_up(self.machine.node_id)
 
     def _hear(self, time_us: int, bus: str, message: Message) -> None:
         self.said.append(BenchMessage(time_us, bus, message))

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from onboard.contract.messages import Message
+from onboard.contract.messages import Message, StateRequest
 from onboard.core.frame import Frame
 from onboard.ports.bus import Bus
 
@@ -21,6 +21,9 @@ class DeviceBusLink(Protocol):
 
     def subscribe(self, on_message: MessageHandler) -> None:
         """Hand every message of other nodes of that bus to ``on_message``; several subscribers are served in order."""
+
+    def answer(self, say: Callable[[], None]) -> None:
+        """Call ``say`` whenever the controller asks how its devices stand: it sends all state words of one device."""
 
 
 class Encoder(Protocol):
@@ -55,6 +58,7 @@ class BusDeviceLink:
         self._decoder = decoder
         self._node_id = node_id
         self._handlers: list[MessageHandler] = []
+        self.answers: list[Callable[[], None]] = []
         bus.subscribe(self._on_frame)
 
     def send(self, message: Message) -> None:
@@ -70,9 +74,18 @@ class BusDeviceLink:
         """Hand every message that reaches the device to one more handler."""
         self._handlers.append(on_message)
 
+    def answer(self, say: Callable[[], None]) -> None:
+        """One more device that says how it stands when it is asked."""
+        self.answers.append(say)
+
     def _on_frame(self, frame: Frame, time_us: int) -> None:
         message = self._decoder.feed(frame, time_us)
         if message is None or message.sender != self._node_id:
+            return
+        if isinstance(message, StateRequest):
+            # Sensors answer it: what keeps orders from the actuators does not keep this from them.
+            for say in self.answers:
+                say()
             return
         if self.incoming:
             message = _filtered(message, self.incoming)

@@ -218,9 +218,6 @@ class SystemStage(ABC, Generic[PlantT]):
         """
         raise DemandError(f"{site.name}: a {site.system} has no order that one machine carries out at any time")
 
-    def power_up(self, node: int) -> None:
-        """The devices of one machine get their power: they tell how they stand, as at power-up."""
-
     # --- a person who watches ----------------------------------------------------------------------------------
 
     @property

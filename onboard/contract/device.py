@@ -93,6 +93,15 @@ class DeskOrder(Message):
 
 
 @message(frozen=True, slots=True)
+class StateRequest(Message):
+    """Asks all devices of this machine, of whatever system, how they stand.
+
+    Each answers at once with its state words. Sent when a controller begins a life, and every second while it
+    starts; a device that does not know it tells the same on change and at its slow repeats.
+    """
+
+
+@message(frozen=True, slots=True)
 class DriveState(Message):
     """Position and state of the drive.
 

@@ -17,6 +17,7 @@ from onboard.contract.device import (
     PlatformState,
     ShuttleOrder,
     ShuttleState,
+    StateRequest,
 )
 from onboard.contract.plans import (
     Blocked,
@@ -99,6 +100,7 @@ __all__ = [
     "ShuttleOrder",
     "ShuttleState",
     "Stamp",
+    "StateRequest",
     "SyncDone",
     "SyncRequest",
     "TaskReport",

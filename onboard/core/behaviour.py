@@ -76,7 +76,7 @@ class Behaviour(Protocol):
         """Version of the firm itinerary, 0 for none."""
 
     def start(self, now_us: int) -> list[Effect]:
-        """First effects after power-up: silence outputs, ask the sensors."""
+        """First effects after power-up: silence outputs; the devices are asked how they stand without it."""
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """A message of the machine's own device bus."""

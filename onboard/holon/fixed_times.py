@@ -1,14 +1,17 @@
-"""What a machine says at fixed times: its sign of life with all that goes with it, and bus time where it sends that."""
+"""What a machine says at fixed times: its sign of life with all that goes with it, bus time where it sends that.
+
+And while it starts, the question to its own devices how they stand, which they say by themselves on change only.
+"""
 
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import Reason
-from onboard.contract.messages import BusTime
+from onboard.contract.messages import BusTime, StateRequest
 from onboard.core.behaviour import Fleet
 from onboard.core.bus_time import BUS_TIME_MODULUS
-from onboard.core.effects import Effect, Send
+from onboard.core.effects import Effect, Send, Tell
 from onboard.core.site import BEATS_APART_US
 from onboard.holon.drops import ToldDrops
 from onboard.holon.holds import Holds
@@ -17,6 +20,8 @@ from onboard.holon.timekeeper import Timekeeper
 
 #: Whoever changes what all believe tells its digest so long after, us: the words of one step go together.
 TELL_US = 100_000
+#: Devices are asked again after this while their machine starts, us (dbc/device.dbc): a word may be lost.
+ASK_AGAIN_US = 1_000_000
 
 
 @dataclass
@@ -30,6 +35,8 @@ class FixedTimes:
     drops: Callable[[], Counter[Reason]]
     #: None before the first word.
     heartbeat_due_us: int | None = None
+    #: When the devices are asked next; None where the machine has heard what it needs to take part.
+    ask_due_us: int | None = None
     _told: ToldDrops = field(default_factory=ToldDrops)
     _is_starting: bool = False
     #: When the last sign of life was given.
@@ -46,7 +53,12 @@ class FixedTimes:
             self._beat_by(max(now_us + TELL_US, self._beat_us + BEATS_APART_US))
         if self._is_starting and not is_starting:
             self._beat_by(now_us + TELL_US)
+            self.ask_due_us = None
         self._is_starting = is_starting
+
+    def ask_devices(self, now_us: int, *, is_starting: bool) -> None:
+        """Ask the devices once, and again for as long as the machine ``is_starting``."""
+        self.ask_due_us, self._is_starting = now_us, is_starting
 
     def on_return(self, beat_us: int, now_us: int) -> None:
         """Somebody was silent for long: at ``beat_us`` all tell what they believe; what waits is said soon again."""
@@ -60,7 +72,7 @@ class FixedTimes:
 
     def due_us(self, work_due_us: int | None) -> int | None:
         """The first of these words and of what is to be done otherwise; None where there is neither."""
-        times = (self.heartbeat_due_us, self.time.due_us, work_due_us)
+        times = (self.heartbeat_due_us, self.ask_due_us, self.time.due_us, work_due_us)
         return min((time for time in times if time is not None), default=None)
 
     def words(self, now_us: int) -> list[Effect]:
@@ -75,6 +87,9 @@ class FixedTimes:
             effects += self._told.words(node_id, self.drops())
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
             effects += [Send(self.presence.standing_word(node)) for node in self.fleet.winners.stuck(now_us)]
+        if self.ask_due_us is not None and self.ask_due_us <= now_us:
+            self.ask_due_us = now_us + ASK_AGAIN_US if self._is_starting else None
+            effects.append(Tell(StateRequest(node_id)))
         if self.time.due_us is not None and self.time.due_us <= now_us:
             self.time.due_us = now_us + timing.bus_time_us
             effects.append(self.bus_time(now_us))

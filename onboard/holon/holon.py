@@ -142,8 +142,8 @@ class Holon:
         # Bus time starts somewhere; the lowest fixed node's start is as good as any.
         self.time.elect(local_us)
         now_us = self.clock.bus_us(local_us)
-        self.fixed.heartbeat_due_us = now_us
         self.presence.begins(now_us)
+        self._say_first(now_us)
         if self.journal.is_foreign:
             return [Report(self.journal.line), *self.fixed.words(now_us)]
         effects = self._first_entries(self.journal) + self.behaviour.start(now_us) + self.fixed.words(now_us)
@@ -326,12 +326,18 @@ class Holon:
     def _begin(self, now_us: int) -> list[Effect]:
         """Bus time is known: the first word, and what was sensed before."""
         self.presence.begins(now_us)
-        self.fixed.heartbeat_due_us = now_us
         effects: list[Effect] = []
         for early in self._sensed_early.values():
             effects += self._settle(self.behaviour.sense(early, now_us), now_us)
         self._sensed_early.clear()
+        self._say_first(now_us)
         return effects
+
+    def _say_first(self, now_us: int) -> None:
+        """The first word is due, and the devices are asked: what they said before bus time was known may be lost."""
+        self.fixed.heartbeat_due_us = now_us
+        if self.clock.is_set and not self.journal.is_foreign:
+            self.fixed.ask_devices(now_us, is_starting=self.behaviour.state is MachineState.STARTING)
 
     def _set_anew(self, now_us: int) -> list[Effect]:
         """Bus time was far off, and is set: what was read of plans meanwhile was read in the wrong time."""
@@ -465,6 +471,7 @@ class Holon:
         self.negotiation.estimator = estimator = self._factory.estimator(self.site, self.machine, self.mirror)
         self.behaviour = behaviour = self._factory.behaviour(self.fleet, estimator)
         self.schedule.begins_anew(behaviour)
+        self.fixed.ask_devices(now_us, is_starting=behaviour.state is MachineState.STARTING)
         return [*self._first_entries(OLD), *self.behaviour.start(now_us)]
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:

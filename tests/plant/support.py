@@ -111,6 +111,7 @@ class ListLink:
         self.controllers: list[Callable[[Message], None]] = []
         self._timers = timers
         self._handlers: list[MessageHandler] = []
+        self._answers: list[Callable[[], None]] = []
 
     def send(self, message: Message) -> None:
         self.said.append((self._timers.now_us(), message))
@@ -119,6 +120,13 @@ class ListLink:
 
     def subscribe(self, on_message: MessageHandler) -> None:
         self._handlers.append(on_message)
+
+    def answer(self, say: Callable[[], None]) -> None:
+        self._answers.append(say)
+
+    def ask(self) -> None:
+        for say in self._answers:
+            say()
 
     def order(self, message: Message) -> None:
         for handler in self._handlers:

@@ -11,7 +11,7 @@ from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import LoopTimers
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.contract.codes import LightColour
-from onboard.contract.messages import LightOrder, Message
+from onboard.contract.messages import LightOrder, Message, StateRequest
 from onboard.core.frame import Frame
 from onboard.ports.bus import BusHealth, FrameHandler
 from onboard.wire.codec import device_codec
@@ -80,3 +80,17 @@ def test_loop_timers_fire_at_the_microsecond_asked_for(loop: VirtualTimeLoop) ->
     timers.call_at(500, lambda: fired.append((0, 0))).cancel()
     loop.run_until_complete(asyncio.sleep(86_400))
     assert fired == [(t, t) for t in (1, 333_333, 1_000_001, 86_399_999_999)]
+
+
+def test_a_device_that_is_asked_answers_also_while_no_order_reaches_it(loop: VirtualTimeLoop) -> None:
+    medium = Medium(loop, bit_rate=500_000)
+    codec = device_codec()
+    asked: list[int] = []
+    for node in (1, 2):
+        link = BusDeviceLink(medium.attach(f"devices {node}", node), codec, Decoder(codec), node)
+        link.incoming.append(lambda _: None)
+        link.answer(partial(asked.append, node))
+    controller = BusDeviceLink(medium.attach("controller", 1), codec, Decoder(codec), 1)
+    loop.call_at(0.001, controller.send, StateRequest(1))
+    loop.run_until_complete(asyncio.sleep(0.01))
+    assert asked == [1]

@@ -15,10 +15,10 @@ MADE_IN = {
     "Permit": "onboard/core/motion_authority.py",
     "MotionAuthority": "onboard/core/behaviour.py",
 }
-#: What controllers say to devices by which nothing moves: words to people, and a program that is loaded.
+#: What controllers say to devices by which nothing moves: words to people, a program that is loaded, a question.
 STILL = {
     *("LightOrder", "DeskOrder", "OrderAnswer", "VisitAnswer", "MissionAnswer", "JobAnswer", "TransportAnswer"),
-    *("ProgramText", "ProgramEnd"),
+    *("ProgramText", "ProgramEnd", "StateRequest"),
 }
 
 

@@ -14,12 +14,12 @@ from bus_sim.cli import main
 
 #: Options of `bus-sim run`, and the first 64 bits of SHA-256 over the log that it writes.
 RUNS = {
-    "level1 --random 40 15 --cars 3": "c7df3e7350a6087e",
-    "small --random 40 15 --cars 3 --fault crash:target=MR1,at_s=80,restart_s=5": "8303d5352ec38cc9",
-    "standard --random 30 15 --cars 3": "99c55d02b46a0d62",
-    "large --random 30 15 --cars 2": "a54b90c28b4d2a5d",
-    "graph --for 150": "9e5c5272f61b6b74",
-    "terminal --for 150": "c5e07d5830ac3ff0",
+    "level1 --random 40 15 --cars 3": "faf799a088cd6c47",
+    "small --random 40 15 --cars 3 --fault crash:target=MR1,at_s=80,restart_s=5": "46784f2349a58278",
+    "standard --random 30 15 --cars 3": "80aaa4d7433403dc",
+    "large --random 30 15 --cars 2": "f2d5a83df7604da7",
+    "graph --for 150": "ca9d46445fb97379",
+    "terminal --for 150": "dd7e45dbac516661",
 }
 
 

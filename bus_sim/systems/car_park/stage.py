@@ -127,13 +127,6 @@ class CarParkStage(SystemStage[Plant]):
             if customer.state in _HURRIED:
                 customer.on(CustomerEvent.TIMER)
 
-    def power_up(self, node: int) -> None:
-        """Drive, shuttle, lift and bay of machine ``node`` say how they stand, as at power-up."""
-        plant = self.plant
-        for devices in (plant.shuttles, plant.carriers, plant.lifts, plant.compartments):
-            if node in devices:
-                devices[node].start()
-
     # --- a person who watches ----------------------------------------------------------------------------------
 
     @property

@@ -60,12 +60,14 @@ class ArmDevice:
         self._grip_mode = GripMode.OPEN
         self._fresh_until_us = 0
         self._word: Timer | None = None
+        self._grip_word: Timer | None = None
         self._arrival: Timer | None = None
         self._expiry: Timer | None = None
         link.subscribe(self._on_message)
+        link.answer(self.start)
 
     def start(self) -> None:
-        """Power on: say where it is and what it holds."""
+        """Power on, or asked for it: say where it is and what it holds."""
         self._say()
         self._say_grip()
 
@@ -171,17 +173,11 @@ class ArmDevice:
     def _say_grip(self) -> None:
         held = self._plant.parts.of(self.arm.node_id)
         self._link.send(GripState(self.arm.node_id, self._grip_sequence, self._grip_mode, held))
-        if self._grip_mode is not GripMode.BUSY:
-            self._grip_again()
-
-    def _grip_again(self) -> None:
-        sequence, mode = self._grip_sequence, self._grip_mode
-
-        def again() -> None:
-            if (self._grip_sequence, self._grip_mode) == (sequence, mode):
-                self._say_grip()
-
-        self._timers.call_at(self._timers.now_us() + RESTING_WORD_US, again)
+        if self._grip_word is not None:
+            self._grip_word.cancel()
+        is_busy = self._grip_mode is GripMode.BUSY
+        again_us = self._timers.now_us() + RESTING_WORD_US
+        self._grip_word = None if is_busy else self._timers.call_at(again_us, self._say_grip)
 
 
 @dataclass

@@ -48,11 +48,6 @@ class CellStage(SystemStage[CellPlant]):
         alone = replace(site, arms={node: site.arms[node]})
         next(iter(self.plant.counters.values())).add(draw(alone, OrderArrivals(1, 1.0), self.run.options.seed).goals[0])
 
-    def power_up(self, node: int) -> None:
-        """Drive and gripper of arm ``node`` say how they stand, as at power-up."""
-        if node in self.plant.devices:
-            self.plant.devices[node].start()
-
     def picture(self) -> str:
         """The plan of the cell with arms and parts, in characters."""
         return plan(self.plant, self.view)

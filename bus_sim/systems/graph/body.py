@@ -57,6 +57,7 @@ class GraphRobotBody:
         self._expiry: Timer | None = None
         self._word: Timer | None = None
         link.subscribe(self._on_message)
+        link.answer(self._say)
 
     def start(self) -> None:
         """Power on: say where it is."""

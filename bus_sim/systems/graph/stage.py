@@ -44,11 +44,6 @@ class GraphStage(SystemStage[GraphPlant]):
         anybody = next(order for order in site.orders if not order.robot)
         next(iter(self.plant.counters.values())).add(anybody)
 
-    def power_up(self, node: int) -> None:
-        """The body of robot ``node`` says where it stands, as at power-up; agents have none."""
-        if node in self.plant.bodies:
-            self.plant.bodies[node].start()
-
     def picture(self) -> str:
         """Nodes with whoever stands there or is on the way, in characters."""
         return picture(self.plant)

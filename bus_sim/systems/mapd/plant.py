@@ -35,6 +35,7 @@ class GridRobotBody:
         self._sequence = 0
         self._word: Timer | None = None
         link.subscribe(self._on_message)
+        link.answer(self.say)
 
     def say(self) -> None:
         """Tell where it is, now and slowly from now on."""

@@ -1,7 +1,7 @@
 """The plant of a terminal: drives and handlers of vehicles, the desks' keyboards and cameras, on their device buses."""
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 
 from bus_sim.devices.link import BusDeviceLink
@@ -49,12 +49,16 @@ class VehicleDevices:
         self._pending: MoveOrder | None = None
         self._run = 0
         link.subscribe(self._on_message)
+        link.answer(self._tell)
 
     def start(self) -> None:
         """Say how things stand, now and slowly ever after."""
+        self._tell()
+        self.plant.after(SLOW_US, self.start)
+
+    def _tell(self) -> None:
         self._tell_move()
         self._tell_handler()
-        self.plant.after(SLOW_US, self.start)
 
     def _on_message(self, message: Message, _: int) -> None:
         match message:
@@ -193,6 +197,7 @@ class TerminalPlant:
         for node, machine in site.machines.items():
             if machine.kind is KindCode.DESK:
                 links[node].subscribe(self._answered)
+                links[node].answer(partial(self._look_for, node))
         self.vehicles = {
             node: VehicleDevices(self, body, links[node], seed) for node, body in self.world.bodies.items()
         }
@@ -238,10 +243,17 @@ class TerminalPlant:
 
     def _look(self) -> None:
         """Cameras say again what they see."""
-        for blockage in self.site.blockages:
+        self._say_lanes(self.site.blockages)
+        self.after(SLOW_US, self._look)
+
+    def _look_for(self, desk: int) -> None:
+        """A desk asks what its own cameras see."""
+        self._say_lanes(one for one in self.site.blockages if self.site.stewards[one.lane] == desk)
+
+    def _say_lanes(self, blockages: Iterable[Blockage]) -> None:
+        for blockage in blockages:
             if blockage.at_us <= self.now_us():
                 self._camera(blockage.lane)
-        self.after(SLOW_US, self._look)
 
     def _camera(self, lane: int) -> None:
         desk = self.site.stewards[lane]

@@ -69,6 +69,7 @@ class NcDevice:
         self._set_up_for: tuple[str, int] | None = None
         self._timer: Timer | None = None
         link.subscribe(self._on_message)
+        link.answer(self._say_all)
 
     def start(self) -> None:
         """Power on: say how it is, and how its edges are."""
@@ -156,6 +157,11 @@ class NcDevice:
         if self._timer is not None:
             self._timer.cancel()
         self._timer = self._timers.call_at(self._timers.now_us() + STATE_REPEAT_US, self._say)
+
+    def _say_all(self) -> None:
+        # The wear first: with the control's word the lathe takes part.
+        self._say_wear()
+        self._say()
 
     def _say_tools(self) -> None:
         self._say_wear()

@@ -33,11 +33,6 @@ class TurningStage(SystemStage[TurningPlant]):
         wanted = next(fits)
         next(iter(self.plant.counters.values())).add(wanted)
 
-    def power_up(self, node: int) -> None:
-        """The control of lathe ``node`` says how it stands, as at power-up."""
-        if node in self.plant.devices:
-            self.plant.devices[node].start()
-
     def picture(self) -> str:
         """Lathes with their jobs and how far their tools are worn, in characters."""
         return board(self.plant)

@@ -30,6 +30,7 @@ from onboard.contract.device import (
     PlatformState,
     ShuttleOrder,
     ShuttleState,
+    StateRequest,
 )
 
 _new = tuple.__new__
@@ -51,6 +52,7 @@ _PACK_BIXXX = struct.Struct("<BIxxx").pack
 _PACK_BSIHB = struct.Struct("<BiHB").pack
 _PACK_BSISHB = struct.Struct("<BihB").pack
 _PACK_IXXXX = struct.Struct("<Ixxxx").pack
+_PACK_XXXXXXXX = struct.Struct("<xxxxxxxx").pack
 _UNPACK_BBXXXXXX = struct.Struct("<BBxxxxxx").unpack_from
 _UNPACK_BIXXX = struct.Struct("<BIxxx").unpack_from
 _UNPACK_BSIHB = struct.Struct("<BiHB").unpack_from
@@ -58,6 +60,7 @@ _UNPACK_BSISHB = struct.Struct("<BihB").unpack_from
 _UNPACK_BXXXXXXX = struct.Struct("<Bxxxxxxx").unpack_from
 _UNPACK_HXXXXXX = struct.Struct("<Hxxxxxx").unpack_from
 _UNPACK_Q = struct.Struct("<Q").unpack_from
+_UNPACK_XXXXXXXX = struct.Struct("<xxxxxxxx").unpack_from
 
 
 def pack_drive_order(message: DriveOrder) -> bytes:
@@ -140,6 +143,14 @@ def unpack_desk_order(sender: int, data: bytes) -> DeskOrder | None:
     car_origin = word_1 >> 4 & 0xFF
     car_number = word_1 >> 12 & 0xFFFF
     return DeskOrder(sender, sequence, _DESK_TEXT[text], _new(Reference, (car_origin, car_number)))
+
+
+def pack_state_request(message: StateRequest) -> bytes:
+    return _PACK_XXXXXXXX()
+
+
+def unpack_state_request(sender: int, data: bytes) -> StateRequest | None:
+    return StateRequest(sender)
 
 
 def pack_drive_state(message: DriveState) -> bytes:
@@ -319,6 +330,17 @@ FRAMES = (
     ),
     FrameCode(
         "DeskOrder", 0x14840000, 8, pack_desk_order, unpack_desk_order, DeskOrder, DeskOrder, ("Controller",), True
+    ),
+    FrameCode(
+        "StateRequest",
+        0x14850000,
+        8,
+        pack_state_request,
+        unpack_state_request,
+        StateRequest,
+        StateRequest,
+        ("Controller",),
+        True,
     ),
     FrameCode(
         "DriveState", 0x16900000, 8, pack_drive_state, unpack_drive_state, DriveState, DriveState, ("Drive",), True

@@ -68,6 +68,7 @@ class Carrier:
         self._repeat_at_us = 0
         self._told_mm = 0
         link.subscribe(self._on_message)
+        link.answer(lambda: self._say(timers.now_us()))
         world.watch(self._on_change)
 
     def start(self) -> None:

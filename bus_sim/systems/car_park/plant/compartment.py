@@ -7,7 +7,7 @@ the output door only while the light curtain sees nobody (row P60).
 from collections.abc import Callable
 
 from bus_sim.devices.link import DeviceBusLink
-from bus_sim.devices.timers import Timers
+from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.bodies import CarBody
 from bus_sim.systems.car_park.plant.door import Door
 from bus_sim.systems.car_park.plant.world import BayBody, CarParkWorld, WorldChange
@@ -54,6 +54,7 @@ class CompartmentPlant:
         self._desk_sequence = 0
         self._desk_order: DeskOrder | None = None
         self._told: BayState | None = None
+        self._repeat_timer: Timer | None = None
         self._watchers: list[Callable[[], None]] = []
         self._desk_watchers: list[Callable[[DeskText, Reference], None]] = []
         travel_us = car_park(site).timing.door_us
@@ -75,6 +76,7 @@ class CompartmentPlant:
             ),
         }
         link.subscribe(self._on_message)
+        link.answer(self._say_all)
         world.watch(self._on_change)
 
     def start(self) -> None:
@@ -212,4 +214,6 @@ class CompartmentPlant:
     def _say_all(self) -> None:
         self._say_doors()
         self._say_bay()
-        self._timers.call_at(self._timers.now_us() + REPEAT_US, self._say_all)
+        if self._repeat_timer is not None:
+            self._repeat_timer.cancel()
+        self._repeat_timer = self._timers.call_at(self._timers.now_us() + REPEAT_US, self._say_all)

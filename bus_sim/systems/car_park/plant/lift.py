@@ -29,6 +29,7 @@ class LiftDrive(Carrier):
         self._told: PlatformState | None = None
         self._platform_timer: Timer | None = None
         self._crossing_timer: Timer | None = None
+        link.answer(self._say_platform)
 
     def start(self) -> None:
         """Power on: say where the platform is and what it senses."""

@@ -52,6 +52,7 @@ class Shuttle:
         self._action_timer: Timer | None = None
         self._repeat_timer: Timer | None = None
         link.subscribe(self._on_message)
+        link.answer(self._say)
 
     def start(self) -> None:
         """Power on: say how the shuttle stands, then again slowly."""
