@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import Reason
+from onboard.contract.codes import MachineState, Reason
 from onboard.contract.messages import BusTime, StateRequest
 from onboard.core.behaviour import Fleet
 from onboard.core.bus_time import BUS_TIME_MODULUS
@@ -47,8 +47,9 @@ class FixedTimes:
         #: Each machine's beats have a place of their own in the period: who was away is heard of by somebody soon.
         self._phase_us = nodes.index(self.fleet.node_id) * beat_us // len(nodes)
 
-    def tell_soon(self, now_us: int, *, has_told: bool, is_starting: bool) -> None:
+    def tell_soon(self, now_us: int, state: MachineState, *, has_told: bool) -> None:
         """Who ``has_told`` what changes the digest of all tells its own soon after; who has started says so."""
+        is_starting = state is MachineState.STARTING
         if has_told:
             self._beat_by(max(now_us + TELL_US, self._beat_us + BEATS_APART_US))
         if self._is_starting and not is_starting:
@@ -56,9 +57,15 @@ class FixedTimes:
             self.ask_due_us = None
         self._is_starting = is_starting
 
-    def ask_devices(self, now_us: int, *, is_starting: bool) -> None:
-        """Ask the devices once, and again for as long as the machine ``is_starting``."""
-        self.ask_due_us, self._is_starting = now_us, is_starting
+    def say_first(self, now_us: int, state: MachineState, *, asks: bool) -> None:
+        """The first word is due, and the devices are asked: what they said before bus time was known may be lost."""
+        self.heartbeat_due_us = now_us
+        if self.time.clock.is_set and asks:
+            self.ask_devices(now_us, state)
+
+    def ask_devices(self, now_us: int, state: MachineState) -> None:
+        """Ask the devices once, and again for as long as the machine is starting."""
+        self.ask_due_us, self._is_starting = now_us, state is MachineState.STARTING
 
     def on_return(self, beat_us: int, now_us: int) -> None:
         """Somebody was silent for long: at ``beat_us`` all tell what they believe; what waits is said soon again."""

@@ -143,7 +143,7 @@ class Holon:
         self.time.elect(local_us)
         now_us = self.clock.bus_us(local_us)
         self.presence.begins(now_us)
-        self._say_first(now_us)
+        self.fixed.say_first(now_us, self.behaviour.state, asks=not self.journal.is_foreign)
         if self.journal.is_foreign:
             return [Report(self.journal.line), *self.fixed.words(now_us)]
         effects = self._first_entries(self.journal) + self.behaviour.start(now_us) + self.fixed.words(now_us)
@@ -330,14 +330,8 @@ class Holon:
         for early in self._sensed_early.values():
             effects += self._settle(self.behaviour.sense(early, now_us), now_us)
         self._sensed_early.clear()
-        self._say_first(now_us)
+        self.fixed.say_first(now_us, self.behaviour.state, asks=not self.journal.is_foreign)
         return effects
-
-    def _say_first(self, now_us: int) -> None:
-        """The first word is due, and the devices are asked: what they said before bus time was known may be lost."""
-        self.fixed.heartbeat_due_us = now_us
-        if self.clock.is_set and not self.journal.is_foreign:
-            self.fixed.ask_devices(now_us, is_starting=self.behaviour.state is MachineState.STARTING)
 
     def _set_anew(self, now_us: int) -> list[Effect]:
         """Bus time was far off, and is set: what was read of plans meanwhile was read in the wrong time."""
@@ -440,8 +434,7 @@ class Holon:
         else:
             if self.part.begins:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
-        is_starting = self.behaviour.state is MachineState.STARTING
-        self.fixed.tell_soon(now_us, has_told=self.witness.heed(effects, now_us), is_starting=is_starting)
+        self.fixed.tell_soon(now_us, self.behaviour.state, has_told=self.witness.heed(effects, now_us))
         return self._approve(effects)
 
     def _approve(self, effects: list[Effect]) -> list[Effect]:
@@ -471,7 +464,7 @@ class Holon:
         self.negotiation.estimator = estimator = self._factory.estimator(self.site, self.machine, self.mirror)
         self.behaviour = behaviour = self._factory.behaviour(self.fleet, estimator)
         self.schedule.begins_anew(behaviour)
-        self.fixed.ask_devices(now_us, is_starting=behaviour.state is MachineState.STARTING)
+        self.fixed.ask_devices(now_us, behaviour.state)
         return [*self._first_entries(OLD), *self.behaviour.start(now_us)]
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
