@@ -8,8 +8,8 @@ from onboard.trace.chart.svg import SvgDrawing
 from onboard.trace.scene.arrange import arrange
 from onboard.trace.scene.scene import Spot
 
-#: Width of the whole, and room at the edges and above, px.
-_WIDTH, _EDGE, _HEAD = 1_200.0, 40.0, 70.0
+#: Most and least width of the whole (its words need that), and room at the edges and above, px.
+_WIDTH, _LEAST_WIDTH, _EDGE, _HEAD = 1_200.0, 640.0, 40.0, 70.0
 _WAY, _ROBOT = "#9a9a9a", "#000000"
 #: Share of a way at which the tip of a one-way one is, and half of a tip, px.
 _TIP, _TIP_PX = 0.6, 5.0
@@ -65,7 +65,8 @@ def draw_plan(
     right, low = (max(one.spot[axis] for one in places.values()) + size / 2 for axis in (0, 1))
     scale = min(most_scale, (_WIDTH - 2 * _EDGE) / max(right - left, 1e-9))
     head = _HEAD + 14 * len(notes)
-    drawing = SvgDrawing(_WIDTH, head + (low - top) * scale + _EDGE, title)
+    wide = max((right - left) * scale + 2 * _EDGE, _LEAST_WIDTH)
+    drawing = SvgDrawing(wide, head + (low - top) * scale + _EDGE, title)
     drawing.text(10, 18, title, fill="#000000")
     drawing.line([(_EDGE, 32), (_EDGE + bar[0] * scale, 32)], "#000000", width=2)
     drawing.text(_EDGE + bar[0] * scale + 6, 36, bar[1])
@@ -99,9 +100,14 @@ def _draw_way(drawing: SvgDrawing, start: Spot, end: Spot, way: PlanWay) -> None
 
 def _name_place(drawing: SvgDrawing, x: float, y: float, half: float, one: PlanPlace) -> None:
     if one.robots:
-        inner = half * 0.7
-        drawing.area([(x - inner, y), (x, y - inner), (x + inner, y), (x, y + inner)], _ROBOT, opacity=0.75)
-        drawing.text(x, y + half + 11, " ".join(one.robots), anchor="middle", fill=_ROBOT)
+        inner, words = half * 0.7, " ".join(one.robots)
+        if one.name:
+            drawing.area([(x - inner, y), (x, y - inner), (x + inner, y), (x, y + inner)], _ROBOT, opacity=0.75)
+            drawing.text(x, y + half + 11, words, anchor="middle", fill=_ROBOT)
+        else:
+            # A cell beside it may have a robot too: what is written below this one would be behind that.
+            drawing.area(_square(x, y, half), _ROBOT, opacity=1)
+            drawing.text(x, y + 4, words, anchor="middle", fill="#ffffff")
     if one.name:
         drawing.text(x, y - half - 3, one.name, anchor="middle")
 
