@@ -190,9 +190,9 @@ class Carriage:
     def statement(self, itinerary_version: int, leg: int) -> list[Effect]:
         """Where the body is, in leg ``leg`` of the itinerary as told; nothing where no position is known.
 
-        A journal that is lost knew the track; the drive alone knows only where on it.
+        A journal that is lost knew the track, which the drive does not know: who makes its rights anew tells it.
         """
-        if self.sensed is None or self.fleet.has_no_rights:
+        if self.sensed is None or self.fleet.has_no_rights or self.fleet.slots_told:
             return []
         here, offset_mm = self._told_at(self.sensed)
         self._reported = here
