@@ -53,7 +53,7 @@ def test_an_undisturbed_story_names_the_handling_the_way_and_the_lift() -> None:
 @pytest.mark.parametrize(
     ("fault", "node", "word", "at_least_s"),
     [
-        ("crash:target=MR1,at_s=30", 11, "started anew", 9),
+        ("crash:target=MR1,at_s=30", 11, "started anew", 5),
         ("crash:target=MR1,at_s=30,restart=no", 11, "silent", 12),
         ("pause:target=MR1,at_s=40,for_s=30", 11, "silent", 12),
         ("actuator_stuck:target=ER1,at_s=12,for_s=60", 5, "is not ready", 14),
