@@ -181,6 +181,12 @@ def test_two_bodies_closer_than_a_carrier_are_found() -> None:
     assert tape.broken() == {"one-body": 1}
 
 
+@pytest.mark.parametrize(("speed_mm_s", "broken"), [(1_500, {}), (-1_500, {"one-body": 1}), (0, {"one-body": 1})])
+def test_who_drove_away_when_its_power_failed_is_farther_by_now(speed_mm_s: int, broken: dict[str, int]) -> None:
+    gone = at(MR1, 1, 12, -600, speed_mm_s)
+    assert Tape(one_alley(), started=False).say(1, gone, at(MR2, 1, 11)).broken() == broken
+
+
 def test_two_bodies_on_one_platform_are_found_whatever_their_floors() -> None:
     tape = Tape(two_floors(), started=False).say(1, at(ER1, LIFT, 1), at(MR1, 1, 0), at(MR2, 2, 0))
     assert tape.broken() == {"one-body": 1}

@@ -125,9 +125,12 @@ class OneBody(Rule):
         for other in self.picture.bodies.values():
             if other.node == body.node or self.picture.kind(other.node) is not KindCode.ROBOT:
                 continue
-            apart_mm = abs(other.position_mm - body.position_mm)
-            if other.track == body.track and apart_mm < way_site(site).carrier_length_mm - TOLERANCE_MM:
-                self.find(event, (body.node, other.node), f"{apart_mm} mm apart on track {body.track}")
+            apart_mm = other.position_mm - body.position_mm
+            # Who drove away when it last spoke is farther by now: its power may have failed before its next word.
+            is_gone = apart_mm * other.speed_mm_s > 0
+            is_near = abs(apart_mm) < way_site(site).carrier_length_mm - TOLERANCE_MM
+            if other.track == body.track and is_near and not is_gone:
+                self.find(event, (body.node, other.node), f"{abs(apart_mm)} mm apart on track {body.track}")
             for lift in sorted(lifts & lifts_under(site, other)):
                 self.find(event, (body.node, other.node), f"both on the platform of lift {lift}")
             for one, two in ((body, other), (other, body)):
