@@ -15,8 +15,8 @@ CARS = 14
 
 @pytest.fixture(scope="module")
 def rush() -> Scene:
-    """A car every half a minute, fetched soon after; so dense that robots met head-on before plans kept their order."""
-    return play(find_site("standard"), Demand.by_mean(30, 15, 2, count=CARS), limit_s=2_400)
+    """A car every 25 s, fetched soon after; so dense that robots met head-on before plans kept their order."""
+    return play(find_site("standard"), Demand.by_mean(25, 10, 3, count=CARS), limit_s=2_400)
 
 
 def test_p44_everybody_is_served_and_the_machines_never_stand_still(rush: Scene) -> None:
