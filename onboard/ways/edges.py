@@ -9,7 +9,7 @@ wherever they come from: when one may arrive is worked out once for all of them 
 """
 
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from onboard.core.site import Segment
 from onboard.ways.arrivals import Arrivals
@@ -17,7 +17,7 @@ from onboard.ways.departures import Departures, Held
 from onboard.ways.kinematics import ceil_ms
 from onboard.ways.lifts import platform
 from onboard.ways.occupancy import Sweep, junction_segments
-from onboard.ways.reservations import FOREVER, Reservations
+from onboard.ways.reservations import FOREVER, Interval, Reservations
 from onboard.ways.roads import Roads
 from onboard.ways.stops import paying_until_us
 
@@ -42,6 +42,13 @@ class State:
         self.since_us = FOREVER
         self.edges: list[Edge] = []
         self.to_goals: dict[frozenset[Segment], list[Edge]] = {}
+
+
+def number_on(numbered: list[State], segment: Segment, safe: Iterable[Interval]) -> list[State]:
+    """The states of a position's safe intervals, in order; they join those that are ``numbered`` already."""
+    found = [State(number, segment, *interval) for number, interval in enumerate(safe, start=len(numbered))]
+    numbered += found
+    return found
 
 
 #: A move that leads from one state to another if it departs during ``[first, last)``: first, last, until, duration, the
@@ -134,12 +141,7 @@ class Edges:
         """The safe intervals for standing at a position, in order."""
         found = self._states.get(segment)
         if found is None:
-            safe = self.departures.standing(segment)
-            numbers = enumerate(safe, start=len(self.numbered))
-            found = self._states[segment] = [
-                State(number, segment, from_us, to_us) for number, (from_us, to_us) in numbers
-            ]
-            self.numbered += found
+            found = self._states[segment] = number_on(self.numbered, segment, self.departures.standing(segment))
         return found
 
     def state_at(self, segment: Segment, time_us: int) -> State | None:

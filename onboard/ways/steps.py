@@ -9,7 +9,7 @@ to begin, as each enters once the one before has begun to leave. With one other 
 from collections.abc import Callable, Iterable, Sequence
 
 from onboard.core.site import Segment
-from onboard.ways.edges import NO_EDGE, Edge, State
+from onboard.ways.edges import Edge, State, number_on
 from onboard.ways.network import Network
 from onboard.ways.reservations import FOREVER, Reservations, SlotWindow
 
@@ -19,8 +19,6 @@ STEP_US = 1_000
 FAR = 1 << 20
 #: The track that stands for a floor.
 FLOOR = 1
-
-_SAFE = NO_EDGE[-1]
 
 
 def cell_segment(cell: int) -> Segment:
@@ -100,11 +98,7 @@ class StepMoves:
         if found is None:
             taken = cell_segment(self._network.takes.get(segment.index, segment.index))
             safe = self._reservations.safe_intervals(taken, self._owner, self._start_us)
-            numbers = enumerate(safe, start=len(self.numbered))
-            found = self._states[segment] = [
-                State(number, segment, from_us, to_us) for number, (from_us, to_us) in numbers
-            ]
-            self.numbered += found
+            found = self._states[segment] = number_on(self.numbered, segment, safe)
         return found
 
     def state_at(self, segment: Segment, time_us: int) -> State | None:
@@ -124,7 +118,7 @@ class StepMoves:
                         first_us += STEP_US
                     last_us = min(state.to_us, there.to_us - STEP_US)
                     if first_us < last_us:
-                        state.edges.append((first_us, last_us, FOREVER, STEP_US, there.number, 1, _SAFE))
+                        state.edges.append((first_us, last_us, FOREVER, STEP_US, there.number, 1, True))
         return state.edges
 
     def _is_in_ring(self, here: int, to: int, depart_us: int) -> bool:

@@ -78,7 +78,7 @@ class State(NamedTuple):
     """
 
     memory: tuple[int | None, ...]
-    todo: tuple[int, ...]
+    to_do: tuple[int, ...]
     journal: tuple[int, ...]
     bus: int
     crashes: int
@@ -268,12 +268,12 @@ class Explorer:
                 continue
             if state.crashes < self.limits.crashes:
                 yield self._crash(state, i)
-            if state.todo[i]:
+            if state.to_do[i]:
                 yield self._carry_out(state, i)
                 continue
             yield from self._hearings(state, i, memory, words)
             for j in range(len(self.nodes)):
-                if self._asks(state, j, i) and not state.todo[j]:
+                if self._asks(state, j, i) and not state.to_do[j]:
                     yield self._answers(state, i, j)
 
     def _hearings(self, state: State, i: int, memory: int, words: list[Message | None]) -> Iterator[State]:
@@ -283,7 +283,7 @@ class Explorer:
                 continue
             after, deeds = self.hears(i, memory, word)
             if (after != memory or deeds) and (self._memories.things[after].seen or 0) <= self.limits.versions:
-                yield state._replace(memory=_set(state.memory, i, after), todo=_set(state.todo, i, deeds))
+                yield state._replace(memory=_set(state.memory, i, after), to_do=_set(state.to_do, i, deeds))
 
     def _asks(self, state: State, j: int, i: int) -> bool:
         """Whether node j waits for an answer of node i."""
@@ -292,7 +292,7 @@ class Explorer:
 
     def _crash(self, state: State, i: int) -> State:
         return state._replace(
-            memory=_set(state.memory, i, None), todo=_set(state.todo, i, 0), crashes=state.crashes + 1
+            memory=_set(state.memory, i, None), to_do=_set(state.to_do, i, 0), crashes=state.crashes + 1
         )
 
     def _restarts(self, state: State, i: int) -> Iterator[State]:
@@ -314,8 +314,8 @@ class Explorer:
         return state._replace(memory=tuple(others), journal=_set(state.journal, i, journal), bus=state.bus | said)
 
     def _carry_out(self, state: State, i: int) -> State:
-        deed, *rest = self._deeds.things[state.todo[i]]
-        after = state._replace(todo=_set(state.todo, i, self._deeds.number(tuple(rest))))
+        deed, *rest = self._deeds.things[state.to_do[i]]
+        after = state._replace(to_do=_set(state.to_do, i, self._deeds.number(tuple(rest))))
         if isinstance(deed, Message):
             return after._replace(bus=state.bus | 1 << self._words.number(deed))
         journal = self._journals.number((*self._journals.things[state.journal[i]], deed))
@@ -326,15 +326,17 @@ class Explorer:
         memory, asking = state.memory[i], state.memory[j]
         assert memory is not None and asking is not None
         memory, answer = self.hears(i, memory, SyncRequest(self.nodes[j], self.nodes[i]))
-        todo: Deeds = ()
+        to_do: Deeds = ()
         words = [word for word in self._deeds.things[answer] if isinstance(word, Message)]
         for word in words:
             asking, more = self.hears(j, asking, word)
-            todo += self._deeds.things[more]
+            to_do += self._deeds.things[more]
         asking = self._trusts(state, asking, j)
         memories = _set(_set(state.memory, i, memory), j, asking)
         said = self._bits(tuple(word for word in words if not isinstance(word, SyncDone)))
-        return state._replace(memory=memories, todo=_set(state.todo, j, self._deeds.number(todo)), bus=state.bus | said)
+        return state._replace(
+            memory=memories, to_do=_set(state.to_do, j, self._deeds.number(to_do)), bus=state.bus | said
+        )
 
     def _trusts(self, state: State, asking: int, j: int) -> int:
         """Once all that live have answered, and nobody knew better, a node's rights are its own."""
@@ -376,8 +378,8 @@ class Explorer:
         return any(one is not None and self._memories.things[one].doubt for one in state.memory)
 
     def _quiet(self, state: State) -> State:
-        while any(state.todo):
-            state = self._carry_out(state, next(i for i, todo in enumerate(state.todo) if todo))
+        while any(state.to_do):
+            state = self._carry_out(state, next(i for i, to_do in enumerate(state.to_do) if to_do))
         return state
 
     def _all_hear(self, state: State) -> State:
@@ -398,7 +400,7 @@ class Explorer:
         memory = state.memory[i]
         assert memory is not None
         after, deeds = self.hears(i, memory, word)
-        return self._quiet(state._replace(memory=_set(state.memory, i, after), todo=_set(state.todo, i, deeds)))
+        return self._quiet(state._replace(memory=_set(state.memory, i, after), to_do=_set(state.to_do, i, deeds)))
 
     def told(self, state: State) -> str:
         """A state in full, for a person."""
@@ -406,7 +408,7 @@ class Explorer:
         for i, node in enumerate(self.nodes):
             memory = state.memory[i]
             lines.append(f"node {node}: {'down' if memory is None else self._memories.things[memory]}")
-            lines.append(f"    to do {self._deeds.things[state.todo[i]]}")
+            lines.append(f"    to do {self._deeds.things[state.to_do[i]]}")
             lines.append(f"    journal {self._journals.things[state.journal[i]]}")
         return "\n".join([*lines, f"bus {list(self._on_bus(state))}"])
 
