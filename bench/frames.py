@@ -19,6 +19,7 @@ from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.contract.codes import CallResult
 from onboard.contract.messages import Award, Bid, CallForProposals, Message, TaskReport
+from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.wire.codec import fleet_codec
 
@@ -45,13 +46,14 @@ class Count:
     in_us: list[int] = field(default_factory=list)
     out_us: list[int] = field(default_factory=list)
 
+    def see(self, frame: Frame, time_us: int, sender: str) -> None:
+        """One frame of the fleet bus."""
+        self.frames[fleet_codec().name_of(frame) or "unknown"] += 1
+
     def hear(self, message: Message, time_us: int) -> None:
         """One message of the fleet bus."""
-        codec = fleet_codec()
-        sent = codec.encode(message)
-        self.frames.update(codec.name_of(frame) or "unknown" for frame in sent)
         if isinstance(message, NEGOTIATION):
-            self.negotiation += len(sent)
+            self.negotiation += len(fleet_codec().encode(message))
         self.awarded += isinstance(message, Award) and message.result is CallResult.AWARDED
 
     def take(self, simulation: Simulation) -> None:
@@ -72,6 +74,7 @@ class Count:
 
 async def _play(site: Site, demand: Demand, seed: int, loop: VirtualTimeLoop, count: Count) -> None:
     simulation = build(site, RunOptions(seed=seed), loop)
+    simulation.fleet.tap(count.see)
     simulation.observers.append(count.hear)
     simulation.plant.street.add_all(demand, ORIGIN_US)
     simulation.start()

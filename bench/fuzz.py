@@ -8,7 +8,7 @@ reason counted (must be 0), size of all tables over time, frames a second.
 import sys
 import time
 
-from bus_sim.campaign.fuzz import Fuzzer
+from bus_sim.campaign.fuzz import Fuzzer, record
 from bus_sim.sites import find_site
 from onboard.contract.codes import KindCode
 from onboard.core.site import Machine, Site
@@ -26,8 +26,9 @@ def main() -> int:
     frames = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
     sites, failed = [find_site(name) for name in sys.argv[3:] or ["small"]], False
+    said = {site.name: record(site, seed) for site in sites}
     for site, machine in [(one, machine) for one in sites for machine in one_of_each_kind(one)]:
-        fuzzer, began_s = Fuzzer(site, machine, seed), time.process_time()
+        fuzzer, began_s = Fuzzer(site, machine, seed, corpus=said[site.name]), time.process_time()
         outcome = fuzzer.run(frames, looks=10)
         name = f"{site.name} {machine.name}"
         rate = outcome.frames / (time.process_time() - began_s)

@@ -84,14 +84,14 @@ def _watch(viewers: int, seconds: float, folder: Path) -> tuple[float, float, fl
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=_environment()) as process:
         assert process.stdout is not None
         line = next(line for line in process.stdout if "picture at" in line)
-        found = re.search(r"http://(\S+)/", line)
+        found = re.search(r"http://(\S+)/(\S+)", line)
         assert found is not None
         try:
             _go_on(process, FILL_S)
             begin_s, spent_s = time.monotonic(), _processor_s(process.pid)
             updates = octets = 0
             if viewers:
-                with connect(f"ws://{found[1]}/live") as socket:
+                with connect(f"ws://{found[1]}/live{found[2]}") as socket:
                     while time.monotonic() - begin_s < seconds:
                         octets += len(socket.recv())
                         updates += 1

@@ -1,4 +1,4 @@
-"""The longest recovery times: ``python -m bench.recovery [SITE] [RUNS]`` (default: small, 20 of each kind).
+"""The longest recovery times: ``python -m bench.recovery [SITE] [RUNS] [BIT/S]`` (default: small, 20 of each kind).
 
 Each measure has scenes of its own, with one fault at a moment that the seed draws, while a car comes and goes; what is
 told is the maximum over all runs, never the mean. ``bus_sim/campaign/recovery.py`` says what is measured from when.
@@ -53,6 +53,7 @@ def faults_of(site: Site, runs: int, chance: random.Random) -> dict[str, list[An
 def main() -> int:
     site = find_site(sys.argv[1] if len(sys.argv) > 1 else "small")
     runs = int(sys.argv[2]) if len(sys.argv) > 2 else 20
+    site = replace(site, bitrate=int(sys.argv[3]) if len(sys.argv) > 3 else site.bitrate)
     alone = reference(site.name, None)
     began_s, longest, seen, hours = time.process_time(), dict[str, int](), dict[str, int](), 0.0
     for title, faults in faults_of(site, runs, random.Random(1)).items():

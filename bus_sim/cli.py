@@ -31,12 +31,12 @@ from onboard.config.problems import ConfigError
 from onboard.config.site_report import site_report
 from onboard.core.site import Site
 from onboard.entry import INTERRUPTED
+from onboard.io.broker_address import is_loopback
 from onboard.io.open_bus import BusOpenError
 from onboard.io.signals import terminated_as_interrupted
 from onboard.systems.registry import part
 from onboard.web.address import WebError, parse_address
 from onboard.web.address import is_installed as is_web_installed
-from onboard.wire.site_dbc import site_dbc
 
 HELP = """\
 exit status:
@@ -165,7 +165,13 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         nargs="?",
         const="127.0.0.1:8080",
         metavar="[HOST:]PORT",
-        help="serve a live picture of the site (default: 127.0.0.1:8080); other hosts need the token that is printed",
+        help="serve a live picture of the site (default: 127.0.0.1:8080)",
+    )
+    out.add_argument(
+        "--web-token",
+        type=Path,
+        metavar="FILE",
+        help="keep the token of the picture's address here, so that it stays (made where missing)",
     )
     out.add_argument("--no-web", action="store_true", help="without a site: do not serve the picture")
     out.add_argument(
@@ -183,6 +189,12 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         const="127.0.0.1:29536",
         metavar="HOST:PORT",
         help="serve the buses in the socketcand protocol (default 127.0.0.1:29536)",
+    )
+    out.add_argument(
+        "--serve-token",
+        type=Path,
+        metavar="FILE",
+        help="clients open CHANNEL:TOKEN, with the token in this file (made where missing); other hosts need it",
     )
     out.add_argument(
         "--mqtt",
@@ -266,6 +278,8 @@ def _sites(args: argparse.Namespace) -> int:
 
 
 def _dbc(args: argparse.Namespace) -> int:
+    from onboard.wire.site_dbc import site_dbc  # noqa: PLC0415  # reading DBC files is an eighth of every start
+
     sys.stdout.write(site_dbc(find_site(args.site)))
     return 0
 
@@ -364,6 +378,8 @@ def _options(args: argparse.Namespace, site: Site) -> RunOptions:
     live = args.serve is not None or bool(args.bus) or processes is not None or mqtt is not None
     if args.serve is not None and not is_address(args.serve):
         raise OptionError(f"--serve {args.serve}: must be HOST:PORT, such as 127.0.0.1:29536")
+    if args.serve is not None and args.serve_token is None and not is_loopback(args.serve.rpartition(":")[0]):
+        raise OptionError(f"--serve {args.serve}: others reach it there, and may say anything; add --serve-token FILE")
     if live and args.without and args.speed is not None and speed != 1.0:
         raise OptionError(
             f"--speed {args.speed}: a controller in another process lives at the clock's pace; leave it out"
@@ -385,11 +401,13 @@ def _options(args: argparse.Namespace, site: Site) -> RunOptions:
         trace=args.trace,
         devices=args.devices,
         serve=args.serve or (ANY_PORT if processes is not None or mqtt is not None else None),
+        serve_token=args.serve_token,
         buses=tuple(args.bus),
         processes=processes,
         mqtt=mqtt,
         site_text=site_text(args.site or DEFAULT_SITE) if mqtt is not None else "",
         web=_web(args),
+        web_token=args.web_token,
     )
 
 

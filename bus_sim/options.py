@@ -33,10 +33,14 @@ class RunOptions:
     devices: bool = False
     #: HOST:PORT of the socketcand server, None for none.
     serve: str | None = None
+    #: The file of the token that its clients say; None where none is wanted.
+    serve_token: Path | None = None
     buses: tuple[str, ...] = ()
     processes: ProcessPlan | None = None
     #: Where the page is served, PORT or HOST:PORT; None for no page.
     web: str | None = None
+    #: The file of its token, so that the page's address outlives a run; None for another one each time.
+    web_token: Path | None = None
     #: The broker that the site is published to, empty for one of the run's own; None for none. Goes with ``serve``.
     mqtt: str | None = None
     site_text: str = ""

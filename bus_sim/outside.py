@@ -1,12 +1,16 @@
 """What joins a simulated site from outside: clients of the served buses, and interfaces of python-can."""
 
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
+from bus_sim.options import RunOptions
 from bus_sim.run import FLEET, BusRun
 from bus_sim.serve.bridge import Bridge, open_bridge, parse_bus_specs
 from bus_sim.serve.socketcand import ServeError, SocketcandServer
+from onboard.io.kept_token import TokenFileError, kept_token
 
 #: Of TCP.
 MOST_PORT = 65_535
@@ -18,22 +22,37 @@ def is_address(text: str) -> bool:
     return bool(host) and port.isascii() and port.isdecimal() and int(port) <= MOST_PORT
 
 
+@dataclass(frozen=True, slots=True)
+class Served:
+    """Where the buses are served, and the file of the token that clients there say; None where none is wanted."""
+
+    host: str
+    port: int
+    token_file: Path | None
+
+    @property
+    def arguments(self) -> dict[str, str | int]:
+        """What a controller's own client is told besides its channel."""
+        where: dict[str, str | int] = {"host": self.host, "port": self.port}
+        return where if self.token_file is None else where | {"token_file": str(self.token_file.resolve())}
+
+
 class Outside:
     """Everything that joins the buses from outside, for the time of a run.
 
-    ``serve`` is HOST:PORT for socketcand clients, ``buses`` are python-can interfaces as ``--bus`` names them. Entering
-    raises ``ServeError`` and ``BusOpenError`` for a person's mistakes.
+    ``options`` name HOST:PORT for socketcand clients, and python-can interfaces as ``--bus`` does. Entering raises
+    ``ServeError`` and ``BusOpenError`` for a person's mistakes.
     """
 
-    def __init__(self, simulation: BusRun[Any], serve: str | None, buses: tuple[str, ...], console: Console) -> None:
+    def __init__(self, simulation: BusRun[Any], options: RunOptions, console: Console) -> None:
         self._simulation = simulation
-        self._address = serve
-        self._buses = buses
+        self._address, self._token_file = options.serve, options.serve_token
+        self._buses = options.buses
         self._console = console
         self._server: SocketcandServer | None = None
         self._bridges: list[Bridge] = []
-        #: Host and port that are served, once they are.
-        self.served: tuple[str, int] | None = None
+        #: What is served, once it is.
+        self.served: Served | None = None
 
     async def __aenter__(self) -> None:
         if self._address is not None or self._buses:
@@ -62,15 +81,20 @@ class Outside:
         if not port.isdigit():
             raise ServeError(f"--serve {address}: must be HOST:PORT, such as 127.0.0.1:29536")
         epoch_us = self._simulation.options.epoch_us
+        try:
+            token = kept_token(self._token_file) if self._token_file is not None else None
+        except TokenFileError as error:
+            raise ServeError(f"--serve-token {error}") from error
         server = SocketcandServer(
-            self._simulation.join, lambda time_us: epoch_us + time_us, host or "127.0.0.1", int(port)
+            self._simulation.join, lambda time_us: epoch_us + time_us, host or "127.0.0.1", int(port), token
         )
         bound = await server.start()
         self._server = server
-        self.served = (host or "127.0.0.1", bound)
+        self.served = Served(host or "127.0.0.1", bound, self._token_file)
         channels = ", ".join([FLEET, *(machine.name for machine in self._simulation.site.machines.values())])
         self._console.print(
-            f"serving at {host or '127.0.0.1'}:{bound} (socketcand), channels {channels}",
+            f"serving at {host or '127.0.0.1'}:{bound} (socketcand), channels {channels}"
+            + (f"; open CHANNEL:TOKEN, the token is in {self._token_file}" if token is not None else ""),
             highlight=False,
             soft_wrap=True,
         )

@@ -12,9 +12,10 @@ from pathlib import Path
 from rich.console import Console
 
 import onboard
+from bus_sim.outside import Served
 from bus_sim.run import FLEET
 from onboard.core.site import Site
-from onboard.gateway.options import watch_lines
+from onboard.gateway.options import plain_warning, watch_lines
 from onboard.gateway.settings import GatewaySettings
 from onboard.io.broker_address import BrokerAddress, is_mqtt_installed, parse_broker
 
@@ -45,7 +46,7 @@ def check_mqtt(url: str) -> str:
 class Publishing:
     """Gateway and broker for the time of a run. Entering raises ``PublishError``."""
 
-    def __init__(self, site: Site, site_text: str, url: str, served: tuple[str, int], console: Console) -> None:
+    def __init__(self, site: Site, site_text: str, url: str, served: Served, console: Console) -> None:
         """``served`` is where the fleet bus is; ``url`` empty starts a broker on a free loopback port."""
         self._site, self._site_text, self._url, self._served = site, site_text, url, served
         self._console = console
@@ -59,7 +60,8 @@ class Publishing:
         except BaseException:  # whatever ends it, no process may be left behind
             await self.__aexit__()
             raise
-        for line in watch_lines(address, self._site, GatewaySettings(node_id=NODE)):
+        warning = [f"warning: --mqtt {told}"] if (told := plain_warning(address)) else []
+        for line in (*warning, *watch_lines(address, self._site, GatewaySettings(node_id=NODE))):
             self._console.print(line, highlight=False, soft_wrap=True)
 
     async def __aexit__(self, *_: object) -> None:
@@ -93,9 +95,9 @@ class Publishing:
 
     async def _start_gateway(self, address: BrokerAddress) -> None:
         (Path(self._folder.name) / "site.toml").write_text(self._site_text, encoding="utf-8")
-        host, port = self._served
         words = ["-m", "onboard", "gateway", "-i", "socketcand-asyncio", "-c", FLEET, "--bus-kwargs"]
-        words += [f"host={host}", f"port={port}", "--site", "site.toml", "--orders", str(NODE)]
+        words += [f"{key}={value}" for key, value in self._served.arguments.items()]
+        words += ["--site", "site.toml", "--orders", str(NODE)]
         await self._start("gateway", sys.executable, *words, "--mqtt", self._url or str(address))
 
     async def _start(self, name: str, *words: str) -> Process:

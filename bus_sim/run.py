@@ -18,6 +18,7 @@ from bus_sim.options import RunOptions
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.contract.codes import KindCode
 from onboard.contract.messages import Message
+from onboard.contract.runs import singles
 from onboard.controller.shell import Controller, Ports
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.frame import Frame
@@ -194,9 +195,9 @@ class BusRun(Generic[PlantT]):
             if self.writer is not None:
                 self.writer.write(self.options.epoch_us + time_us, FLEET, frame)
             message: Message | None = decoder.feed(frame, time_us)
-            if message is not None:
+            for word in singles(message) if message is not None else ():
                 for observer in self.observers:
-                    observer(message, time_us)
+                    observer(word, time_us)
 
         self.fleet.tap(on_fleet, errors=self.writer is not None)
         if self.writer is not None and self.options.devices:

@@ -115,7 +115,7 @@ class _Session:
         if options.prepare is not None:
             options.prepare(run)
         self._begin_s = time.monotonic()
-        outside, show = Outside(run, options.serve, options.buses, self._console), stage.show(self._console)
+        outside, show = Outside(run, options, self._console), stage.show(self._console)
         async with AsyncExitStack() as stack:
             # A signal ends a run as its end does: with its figures, a log that is whole, and no process left behind.
             stack.enter_context(ended_by(self._loop, self._interrupt))
@@ -133,7 +133,7 @@ class _Session:
                 if self._processes is not None:
                     assert outside.served is not None, "the options with processes name an address"
                     stack.push_async_callback(self._processes.stop)
-                    await self._processes.start(*outside.served)
+                    await self._processes.start(outside.served)
                 await self._to_the_end(show)
             else:
                 run.start()
@@ -165,7 +165,7 @@ class _Session:
     async def _page(self, where: str) -> AsyncIterator[str]:
         from bus_sim.web.page import Page  # noqa: PLC0415  # its libraries are an extra
 
-        page = Page(self.stage.source(), where, self._console)
+        page = Page(self.stage.source(), where, self._options.web_token, self._console)
         async with page:
             yield page.address
 

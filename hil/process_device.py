@@ -41,7 +41,9 @@ class ProcessDevice:
         """Write both files and start ``onboard``; the journal in the directory is that of its former life."""
         name = self._machine.name
         (self._directory / "site.toml").write_text(site_text, encoding="utf-8")
-        (self._directory / f"{name}.toml").write_text(machine_file(name, _HOST, self._port), encoding="utf-8")
+        (self._directory / f"{name}.toml").write_text(
+            machine_file(name, {"host": _HOST, "port": self._port}), encoding="utf-8"
+        )
         self._process = await start_machine(self._directory, name)
 
     async def power_off(self) -> None:

@@ -10,6 +10,7 @@ from bus_sim.faults.injection import Injection
 from bus_sim.run import BusRun
 from bus_sim.systems.registry import simulated_of
 from onboard.contract.messages import Message
+from onboard.contract.runs import singles
 from onboard.core.frame import Frame
 from onboard.wire.decoder import Decoder
 
@@ -48,8 +49,8 @@ class _Attacker:
     def _hear(self, frame: Frame, time_us: int) -> None:
         self._attack.hear_frame(frame, time_us)
         message = self._decoder.feed(frame, time_us)
-        if message is not None:
-            self._attack.hear(message, time_us)
+        for word in singles(message) if message is not None else ():
+            self._attack.hear(word, time_us)
 
     def _begin(self) -> None:
         self._is_begun = True

@@ -42,6 +42,8 @@ JOURNAL_LIMIT = 2_000
 OWN = 0.05
 #: The corpus is what was said in so long, s.
 CORPUS_S = 400.0
+#: Frames of the fleet bus, and of all device buses.
+Corpus = tuple[list[Frame], list[Frame]]
 
 
 @dataclass
@@ -80,13 +82,13 @@ class _Wire:
         """Nothing to give back."""
 
 
-def record(site: Site, seed: int) -> tuple[list[Frame], list[Frame]]:
-    """The corpus: frames of the fleet bus and of all device buses while two customers come and go, or orders."""
+def record(site: Site, seed: int = 1) -> Corpus:
+    """What all machines of a site are fed with, recorded while two customers come and go, or orders."""
     loop = VirtualTimeLoop()
     return run_on(loop, _record(site, seed, loop))
 
 
-async def _record(site: Site, seed: int, loop: VirtualTimeLoop) -> tuple[list[Frame], list[Frame]]:
+async def _record(site: Site, seed: int, loop: VirtualTimeLoop) -> Corpus:
     few = simulated_of(site).on(Occasion.FEW, site)
     stage = stage_of(site, FaultScenario(site.name, seed, CORPUS_S, few), loop)
     fleet: list[Frame] = []
@@ -136,15 +138,20 @@ def _mutations(chance: random.Random, corpus: list[Frame], avoided: int) -> Iter
 
 
 class Fuzzer:
-    """Feeds one machine of a site; ``device_share`` of the frames come on its device bus."""
+    """Feeds one machine of a site; ``device_share`` of the frames come on its device bus.
 
-    def __init__(self, site: Site, machine: Machine, seed: int = 1, device_share: float = 0.2) -> None:
+    ``corpus`` is the site's recording by the same seed, where one has been made already.
+    """
+
+    def __init__(
+        self, site: Site, machine: Machine, seed: int = 1, device_share: float = 0.2, corpus: Corpus | None = None
+    ) -> None:
         self._site, self._machine = site, machine
         self._chance = random.Random(f"fuzz:{site.name}:{machine.name}:{seed}")
         self._share = device_share
         self._journal = SimulatedJournal()
         self._codecs: Codecs = codecs_for(site)
-        fleet, devices = record(site, seed)
+        fleet, devices = corpus or record(site, seed)
         # A node of its own on the bus would be heard at once; so nearly all forged frames have other senders.
         others = [frame for frame in fleet if frame.arbitration_id & 0xFF != machine.node_id]
         own = [frame for frame in devices if frame.arbitration_id & 0xFF == machine.node_id] or devices

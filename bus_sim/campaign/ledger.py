@@ -16,6 +16,7 @@ import bus_sim
 import onboard
 from bus_sim.campaign.report import FAILURES, RunVerdict
 from bus_sim.demand import DemandError
+from onboard.bounded_file import MOST_EXPORT, read_bounded
 
 #: Files that a run depends on, beside the interpreter.
 SOURCES = (".py", ".toml", ".dbc", ".csv")
@@ -48,11 +49,12 @@ class Ledger:
         """A file that is not there yet is empty. Raises ``DemandError`` for one that is no ledger."""
         ledger = cls(path, campaign)
         try:
-            text = path.read_text(encoding="utf-8") if path.exists() else ""
+            text = read_bounded(path, MOST_EXPORT).decode() if path.exists() else ""
             for line in text.splitlines():
                 ledger._take(json.loads(line))
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise DemandError(f"--add-to {path}: cannot be read as results of campaigns ({error})") from error
+        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+            why = str(error)[:200]
+            raise DemandError(f"--add-to {path}: cannot be read as results of campaigns ({why})") from error
         return ledger
 
     def _take(self, line: dict[str, str | int]) -> None:

@@ -38,17 +38,19 @@ def wall_limit(seconds: float) -> Iterator[None]:
 
     That is in a thread other than the main one, and on systems without ``setitimer``.
     """
+    before, is_set = None, True
     try:
-        before = signal.getsignal(signal.SIGALRM)
-        end_after(seconds)
-    except (AttributeError, ValueError):
-        yield
-        return
-    try:
+        # Within: on a busy machine a short time may be over before anything else is done.
+        try:
+            before = signal.getsignal(signal.SIGALRM)
+            end_after(seconds)
+        except (AttributeError, ValueError):
+            is_set = False
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        if is_set:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            signal.signal(signal.SIGALRM, before)
 
 
 def end_after(seconds: float) -> None:

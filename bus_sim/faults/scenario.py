@@ -34,7 +34,9 @@ from bus_sim.faults.injection import AnyFault, parse_injection
 from bus_sim.sites import SiteNotFoundError, find_site
 from bus_sim.systems.registry import simulated, simulated_names, simulated_of
 from bus_sim.systems.system import Coming
-from onboard.config.problems import ConfigError, Problems, nearest, quoted
+from onboard.config.files import read_text
+from onboard.config.problems import Problems, nearest, quoted
+from onboard.config.toml_lines import parse
 from onboard.core.site import Site
 
 
@@ -84,16 +86,9 @@ _WORDS = {str: "a text in quotes", int: "a whole number from 0", float: "a numbe
 def load_scenario(path: Path) -> tuple[FaultScenario, Site]:
     """Read a scenario and its site. Raises ``ConfigError`` with one line for each mistake."""
     problems = Problems(str(path))
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        problems.add(0, "", None, f"cannot be read as UTF-8 text ({error})", "name a scenario file")
-        raise ConfigError(problems.in_order()) from error
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        problems.add(0, "", None, f"is no TOML ({error})", "correct it there")
-        raise ConfigError(problems.in_order()) from error
+    text = read_text(path, "scenario")
+    table = parse(text, str(path), problems).values
+    problems.raise_if_any()
     return _ScenarioReader(problems, text, table).read()
 
 

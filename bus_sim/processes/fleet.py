@@ -11,6 +11,7 @@ from typing import Any
 
 from rich.console import Console
 
+from bus_sim.outside import Served
 from bus_sim.processes.plan import PowerSpan, ProcessPlan, machine_file, spans_of
 from bus_sim.processes.spawn import log_of, start_machine
 from bus_sim.run import BusRun
@@ -55,9 +56,9 @@ class ProcessFleet:
         self._cpu_before_s = _cpu_of_children_s()
         self._begin_s = 0.0
 
-    async def start(self, host: str, port: int) -> None:
+    async def start(self, served: Served) -> None:
         """Write the machine files and start all that are on from the beginning; the others start in their time."""
-        self._write_files(host, port)
+        self._write_files(served)
         for medium in self._simulation.devices.values():
             # A device bus has several nodes, so that a frame is acknowledged though the controller is off.
             medium.attach("process host", None)
@@ -137,7 +138,7 @@ class ProcessFleet:
     def _tell(self, what: str) -> None:
         self._console.print(f"{self._since_s():7.1f} s  {what}", highlight=False, soft_wrap=True)
 
-    def _write_files(self, host: str, port: int) -> None:
+    def _write_files(self, served: Served) -> None:
         try:
             if self._plan.directory is None:
                 self._temporary = tempfile.TemporaryDirectory(prefix="bus-sim-")
@@ -152,7 +153,7 @@ class ProcessFleet:
                     )
             (self._directory / "site.toml").write_text(self._plan.site_text, encoding="utf-8")
             for name in self._spans:
-                (self._directory / f"{name}.toml").write_text(machine_file(name, host, port), encoding="utf-8")
+                (self._directory / f"{name}.toml").write_text(machine_file(name, served.arguments), encoding="utf-8")
         except OSError as error:
             raise ProcessesError(
                 f"{error.filename}: cannot be written ({error.strerror}); name another directory"

@@ -2,7 +2,7 @@
 
 import math
 import signal
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -101,8 +101,8 @@ def _spans(moments: list[Moment]) -> list[PowerSpan]:
     return spans if begin_s is None else [*spans, PowerSpan(begin_s, None)]
 
 
-def machine_file(name: str, host: str, port: int) -> str:
-    """The machine file of a process: the served fleet bus, and its own device bus."""
-    where: dict[str, Value] = {"host": host, "port": port, "give_up_s": GIVE_UP_S}
+def machine_file(name: str, served: Mapping[str, str | int]) -> str:
+    """The machine file of a process: the served fleet bus, and its own device bus, by what reaches their server."""
+    where: dict[str, Value] = {**served, "give_up_s": GIVE_UP_S}
     fleet, devices = (BusTable("socketcand-asyncio", channel, where) for channel in ("fleet", name))
     return machine_text(name, "site.toml", fleet, devices)

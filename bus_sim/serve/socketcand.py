@@ -5,6 +5,7 @@ and not its own. python-can, SavvyCAN, Kayak and our own controllers speak this 
 """
 
 import asyncio
+import hmac
 import socket
 from collections import Counter
 from collections.abc import Callable
@@ -26,13 +27,16 @@ class ServeError(Exception):
 class SocketcandServer:
     """Serves on one address. ``counts`` says what clients did, in words; see ``SocketcandSession`` for its keys.
 
-    Only loopback is meant to be served: the protocol knows no password.
+    The protocol knows no password. With ``token`` a client names its channel as ``CHANNEL:TOKEN``, which every client
+    of the protocol can; beyond loopback nothing should be served without.
     """
 
-    def __init__(self, join: JoinBus, stamp: Stamp, host: str = "127.0.0.1", port: int = DEFAULT_PORT) -> None:
+    def __init__(
+        self, join: JoinBus, stamp: Stamp, host: str = "127.0.0.1", port: int = DEFAULT_PORT, token: str | None = None
+    ) -> None:
         """``port`` 0 takes a free one, which ``start`` returns."""
         self.counts: Counter[str] = Counter()
-        self._join = join
+        self._join = join if token is None else _guarded(join, token)
         self._stamp = stamp
         self._address = (host, port)
         self._server: asyncio.Server | None = None
@@ -65,7 +69,8 @@ class SocketcandServer:
 
     def _session(self) -> SocketcandSession:
         self._clients += 1
-        session = SocketcandSession(f"socketcand-{self._clients}", self._join, self._stamp, self.counts, self._on_end)
+        name = f"socketcand-{self._clients}"
+        session = SocketcandSession(name, self._join, self._stamp, self.counts, self._on_end)
         self._sessions.add(session)
         return session
 
@@ -86,3 +91,13 @@ class SocketcandServer:
         gone = self._all_gone
         if gone is not None and not gone.done() and not self._sessions and not self._leaving:
             gone.set_result(None)
+
+
+def _guarded(join: JoinBus, token: str) -> JoinBus:
+    """The same buses for who says the token after the channel; there is none for anybody else."""
+
+    def open_for(channel: str, client: str) -> Bus | None:
+        name, _, said = channel.partition(":")
+        return join(name, client) if hmac.compare_digest(said.encode(), token.encode()) else None
+
+    return open_for

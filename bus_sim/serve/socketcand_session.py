@@ -31,7 +31,8 @@ class SocketcandSession(asyncio.Protocol):
 
     Keys that it counts: ``clients``, ``opened``, ``refused`` (no such channel), ``listening`` (raw mode was entered),
     ``sent`` and ``send_refused`` (the node's queue was full), ``received``, ``remote_dropped`` (the protocol has no
-    remote frames), ``malformed``, ``unknown_command``, ``too_slow``.
+    remote frames), ``malformed``, ``unknown_command``, ``too_slow``, ``foreign`` (whose first byte was of another
+    protocol).
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class SocketcandSession(asyncio.Protocol):
         self._mode = Mode.NO_BUS
         self._bus: Bus | None = None
         self._splitter = Splitter()
+        self._has_begun = False
         self._transport: asyncio.Transport | None = None
         self._held: list[bytes] | None = None
         self._holding: asyncio.TimerHandle | None = None
@@ -77,7 +79,18 @@ class SocketcandSession(asyncio.Protocol):
         self._on_end(self, self._bus)
 
     def data_received(self, data: bytes) -> None:
-        """Carry out every whole message; bytes that are none are counted and answered with an error."""
+        """Carry out every whole message; bytes that are none are counted and answered with an error.
+
+        Who begins with something else than a message speaks another protocol, and is not listened to any further: a
+        browser says its ``POST`` first, and what a page on the web makes it send after that is none of a person's.
+        """
+        if not self._has_begun:
+            data = data.lstrip()
+            self._has_begun = bool(data)
+            if data and not data.startswith(b"<"):
+                self._complain("foreign", "error not the socketcand protocol")
+                self.disconnect()
+                return
         garbage = self._splitter.garbage
         messages = self._splitter.feed(data)
         for _ in range(self._splitter.garbage - garbage):
@@ -114,7 +127,7 @@ class SocketcandSession(asyncio.Protocol):
     def _open(self, channel: str) -> None:
         self._bus = self._join(channel, self.name)
         if self._bus is None:
-            self._complain("refused", "error could not open bus")
+            self._complain("refused", "error could not open bus; a server with a token wants open CHANNEL:TOKEN")
             self.disconnect()
             return
         self._counts["opened"] += 1

@@ -2,15 +2,17 @@
 
 from pathlib import Path
 
+from onboard.bounded_file import MOST_TEXT, read_bounded
 from onboard.config.problems import ConfigError, Problem, Problems
 from onboard.config.reader import TomlTable
 from onboard.config.toml_lines import parse
 
 
-def read_text(path: Path, what: str) -> str:
+def read_text(path: Path, what: str, most_bytes: int = MOST_TEXT) -> str:
     """The text of a UTF-8 file, with or without a byte-order mark. Raises ``ConfigError`` with one problem."""
     try:
-        return path.read_text(encoding="utf-8-sig")
+        # Ends of lines as ``open`` gives them: whoever compares with what a file says has ``\n``.
+        return read_bounded(path, most_bytes).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except FileNotFoundError:
         why = "does not exist"
     except UnicodeDecodeError:

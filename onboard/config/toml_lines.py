@@ -22,6 +22,12 @@ _STRING = re.compile(
     r'"""(?:\\.|[^\\])*?"{3,5}' + r"|'''.*?'{3,5}" + r'|"(?:\\.|[^"\\\n])*"' + r"|'[^'\n]*'", re.DOTALL
 )
 _OTHER_VALUE = re.compile(r"[^,\]}#\n]*")
+#: Parts of a key joined by dots: deeper than any file of ours by a factor of ten.
+_MOST_PARTS = 32
+#: The largest site has some hundreds.
+_MOST_TABLES = 10_000
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_KEY_OF_MANY = re.compile(rf"(?<![\w\"'.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MOST_PARTS}}}")
 _LINE_IN_MESSAGE = re.compile(r"\s*\(at line (\d+), column \d+\)")
 
 
@@ -53,6 +59,14 @@ class Document:
 
 def parse(text: str, file: str, problems: Problems) -> Document:
     """Read a TOML text; one that is not TOML becomes one problem and an empty document."""
+    if (deep := _KEY_OF_MANY.search(text)) is not None:
+        # The parser's time grows with the square of a key's parts.
+        line = text.count("\n", 0, deep.start()) + 1
+        problems.add(line, "", None, f"a key of more than {_MOST_PARTS} parts", "write the file in the documented form")
+        return Document(file)
+    if text.count("\n[") > _MOST_TABLES:
+        problems.add(0, "", None, f"more than {_MOST_TABLES} tables", "write the file in the documented form")
+        return Document(file)
     try:
         return Document(file, tomllib.loads(text), _Scanner(text.replace("\r\n", "\n")).scan())
     except RecursionError:

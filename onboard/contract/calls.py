@@ -34,8 +34,9 @@ class LeftOut(Message):
 class Call(SetFrame):
     """First frame of a call for proposals.
 
-    The set Call, CallTerms, CallLoad and, where depth is not 0, CallParent with one sender and call number is one
-    call; an incomplete set is inert.
+    The set Call, CallTerms, CallLoad and, where depth or ready_ms is not 0, CallParent with one sender and call
+    number is one call; an incomplete set is inert. A call of its own tells CallParent before CallLoad, and is whole
+    without it.
     """
 
     #: The initiator's call number (serial, RFC 1982; never 0). All frames of one call carry it. 0 to 65535.
@@ -98,7 +99,8 @@ class CallParent(SetFrame):
     #: ``origin``: Node-ID of the initiator of the call that this one is a part of; 0 with number 0: none. 0 to 255.
     #: ``number``: Call number of the call that this one is a part of; 0 with origin 0: none. 0 to 65535.
     parent: Reference = NO_REFERENCE
-    #: How long after this call's deadline the part can begin at the earliest, in steps of 100 ms. 0 to 1638300 ms.
+    #: How long after this call's deadline the part can begin at the earliest, in steps of 100 ms; of a call of its own:
+    #: when the bay can give or take the car. 0 to 1638300 ms.
     ready_ms: int = 0
     #: How long after this call's deadline the winner holds its bid as an option, in steps of 250 ms; 0: no option, the
     #: award follows the deadline. 0 to 255750 ms.
@@ -189,7 +191,8 @@ class CallForProposals(Message):
     parent: Reference = NO_REFERENCE
     #: Number of a sub-call among those of its parent, from 1; 0 for a call of its own. 0 to 15.
     part: int = 0
-    #: How long after this call's deadline the part can begin at the earliest, in steps of 100 ms. 0 to 1638300 ms.
+    #: How long after this call's deadline the part can begin at the earliest, in steps of 100 ms; of a call of its own:
+    #: when the bay can give or take the car. 0 to 1638300 ms.
     ready_ms: int = 0
     #: How long after this call's deadline the winner holds its bid as an option, in steps of 250 ms; 0: no option, the
     #: award follows the deadline. 0 to 255750 ms.

@@ -10,7 +10,7 @@ CONTRACT = 2
 #: What heartbeats say of it; a machine with another number joins as an obstacle and never bids. While the
 #: contract is open: 128 plus the low 7 bits of a CRC-32 over the DBC (docs/contract-2.md), so that builds
 #: of different days are strangers.
-CONTRACT_VERSION = 0xA2
+CONTRACT_VERSION = 0xFE
 
 
 class Reason(IntEnum):
@@ -67,12 +67,16 @@ class Reason(IntEnum):
 
 
 class TokenKind(IntEnum):
-    """What a token authorises; its 24-bit number means a segment, a station, a car or a task accordingly."""
+    """What a token authorises.
+
+    Its 24-bit number means a segment, a station, a car or a task accordingly, or segments in line.
+    """
 
     SEGMENT = 0
     STATION = 1
     CAR = 2
     TASK = 3
+    RUN = 4
 
 
 class Operation(IntEnum):
@@ -173,6 +177,7 @@ class OperatorAction(IntEnum):
     INSERT_TICKET = 1
     CANCEL = 2
     URGENT_TICKET = 3
+    CHARGING_KEY = 4
 
 
 class MachineState(IntEnum):

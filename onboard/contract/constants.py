@@ -7,6 +7,8 @@ from onboard.contract.codes import KindCode, MachineState
 
 #: Bits of ``Award.task_version``, a serial number.
 TASK_VERSION_BITS = 7
+#: Highest version of a token: 163 years of the busiest slot, so that it never wraps (28 bits in dbc/fleet.dbc).
+MAX_VERSION = (1 << 28) - 1
 #: Bits of a token's version as ``TokenRequest`` and ``TokenRefusal`` tell it, a serial number.
 SEEN_VERSION_BITS = 20
 #: Nobody: no node carries this node-ID.

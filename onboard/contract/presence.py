@@ -114,7 +114,7 @@ class OperatorOrder(Message):
     #: Node-ID of the compartment. 1 to 255.
     compartment: int
     #: Which key. URGENT_TICKET: a ticket that is served before all that wait at this desk, once the task in hand is
-    #: over.
+    #: over. CHARGING_KEY: the key of who asks for a place to charge.
     action: OperatorAction
     #: ``origin``: Node-ID that named the car; 0 with number 0: none. 0 to 255.
     #: ``number``: Serial number of the car at its origin; 0 with origin 0: none. 0 to 65535.

@@ -18,10 +18,11 @@ class TokenGrant(Message):
     #: What the token number means.
     token_kind: TokenKind
     #: SEGMENT: track << 8 | index. STATION: track << 8 | side << 7 | index. CAR and TASK: origin node-ID << 16 |
-    #: number. 0 to 16777215.
+    #: number. RUN: track << 16 | first index << 8 | last index, 16 segments in line at most, in this order; the frame
+    #: is as good as one for each of them. 0 to 16777215.
     token: int
-    #: Number of this transfer of the token; grows by one with each and never wraps; 0 is never sent by a giver. A
-    #: receiver accepts only a version newer than any seen. 0 to 268435455.
+    #: Number of this transfer of the token; grows with each (by one, or to one more than the highest of a run) and
+    #: never wraps; 0 is never sent by a giver. A receiver accepts only a version newer than any seen. 0 to 268435455.
     version: int
     #: Node-ID of the new holder; everybody else only learns where the token went. 1 to 255.
     holder: int
@@ -37,10 +38,11 @@ class TokenHeld(Message):
     #: What the token number means.
     token_kind: TokenKind
     #: SEGMENT: track << 8 | index. STATION: track << 8 | side << 7 | index. CAR and TASK: origin node-ID << 16 |
-    #: number. 0 to 16777215.
+    #: number. RUN: track << 16 | first index << 8 | last index, 16 segments in line at most, in this order; the frame
+    #: is as good as one for each of them. 0 to 16777215.
     token: int
-    #: Number of this transfer of the token; grows by one with each and never wraps; 0 is never sent by a giver. A
-    #: receiver accepts only a version newer than any seen. 0 to 268435455.
+    #: Number of this transfer of the token; grows with each (by one, or to one more than the highest of a run) and
+    #: never wraps; 0 is never sent by a giver. A receiver accepts only a version newer than any seen. 0 to 268435455.
     version: int
 
 
@@ -51,10 +53,11 @@ class TokenRefusal(Message):
     #: What the token number means.
     token_kind: TokenKind
     #: SEGMENT: track << 8 | index. STATION: track << 8 | side << 7 | index. CAR and TASK: origin node-ID << 16 |
-    #: number. 0 to 16777215.
+    #: number. RUN: track << 16 | first index << 8 | last index, 16 segments in line at most, in this order; the frame
+    #: is as good as one for each of them. 0 to 16777215.
     token: int
-    #: Version under which the sender holds it. Low 20 bits of the version, compared as a serial number (RFC 1982). 0 to
-    #: 1048575.
+    #: Version under which the sender holds it. Of a run the least, which claims too much of none. Low 20 bits of the
+    #: version, compared as a serial number (RFC 1982). 0 to 1048575.
     version: int
     #: Node-ID that asked. 1 to 255.
     requester: int
@@ -73,10 +76,12 @@ class TokenRequest(Message):
     #: What the token number means.
     token_kind: TokenKind
     #: SEGMENT: track << 8 | index. STATION: track << 8 | side << 7 | index. CAR and TASK: origin node-ID << 16 |
-    #: number. 0 to 16777215.
+    #: number. RUN: track << 16 | first index << 8 | last index, 16 segments in line at most, in this order; the frame
+    #: is as good as one for each of them. 0 to 16777215.
     token: int
-    #: Newest version that the sender has seen of this token, 0 for none. Low 20 bits of the version, compared as a
-    #: serial number (RFC 1982). A holder that knows only older ones has an old journal. 0 to 1048575.
+    #: Newest version that the sender has seen of this token, 0 for none. Of a run the least, which claims too much of
+    #: none. Low 20 bits of the version, compared as a serial number (RFC 1982). A holder that knows only older ones has
+    #: an old journal. 0 to 1048575.
     version_seen: int
     #: Version of the sender's firm itinerary that needs the token; 0: no order of passing is agreed, the sender asks
     #: for all tokens to its next refuge, or none. 0 to 255.
@@ -96,7 +101,8 @@ class TokenDispute(Message):
     #: What the token number means.
     token_kind: TokenKind
     #: SEGMENT: track << 8 | index. STATION: track << 8 | side << 7 | index. CAR and TASK: origin node-ID << 16 |
-    #: number. 0 to 16777215.
+    #: number. RUN: track << 16 | first index << 8 | last index, 16 segments in line at most, in this order; the frame
+    #: is as good as one for each of them. 0 to 16777215.
     token: int
     #: Version of the grant that was not accepted. 0 to 268435455.
     version: int
@@ -111,10 +117,11 @@ class TokenGiven(Message):
     #: What the token number means.
     token_kind: TokenKind
     #: SEGMENT: track << 8 | index. STATION: track << 8 | side << 7 | index. CAR and TASK: origin node-ID << 16 |
-    #: number. 0 to 16777215.
+    #: number. RUN: track << 16 | first index << 8 | last index, 16 segments in line at most, in this order; the frame
+    #: is as good as one for each of them. 0 to 16777215.
     token: int
-    #: Number of this transfer of the token; grows by one with each and never wraps; 0 is never sent by a giver. A
-    #: receiver accepts only a version newer than any seen. 0 to 268435455.
+    #: Number of this transfer of the token; grows with each (by one, or to one more than the highest of a run) and
+    #: never wraps; 0 is never sent by a giver. A receiver accepts only a version newer than any seen. 0 to 268435455.
     version: int
     #: Node-ID to which it was given. 1 to 255.
     holder: int
@@ -130,10 +137,11 @@ class TokenSeen(Message):
     #: What the token number means.
     token_kind: TokenKind
     #: SEGMENT: track << 8 | index. STATION: track << 8 | side << 7 | index. CAR and TASK: origin node-ID << 16 |
-    #: number. 0 to 16777215.
+    #: number. RUN: track << 16 | first index << 8 | last index, 16 segments in line at most, in this order; the frame
+    #: is as good as one for each of them. 0 to 16777215.
     token: int
-    #: Number of this transfer of the token; grows by one with each and never wraps; 0 is never sent by a giver. A
-    #: receiver accepts only a version newer than any seen. 0 to 268435455.
+    #: Number of this transfer of the token; grows with each (by one, or to one more than the highest of a run) and
+    #: never wraps; 0 is never sent by a giver. A receiver accepts only a version newer than any seen. 0 to 268435455.
     version: int
     #: Node-ID that holds it as far as the sender knows. 1 to 255.
     holder: int
@@ -149,10 +157,11 @@ class TokenAssigned(Message):
     #: What the token number means.
     token_kind: TokenKind
     #: SEGMENT: track << 8 | index. STATION: track << 8 | side << 7 | index. CAR and TASK: origin node-ID << 16 |
-    #: number. 0 to 16777215.
+    #: number. RUN: track << 16 | first index << 8 | last index, 16 segments in line at most, in this order; the frame
+    #: is as good as one for each of them. 0 to 16777215.
     token: int
-    #: Number of this transfer of the token; grows by one with each and never wraps; 0 is never sent by a giver. A
-    #: receiver accepts only a version newer than any seen. 0 to 268435455.
+    #: Number of this transfer of the token; grows with each (by one, or to one more than the highest of a run) and
+    #: never wraps; 0 is never sent by a giver. A receiver accepts only a version newer than any seen. 0 to 268435455.
     version: int
     #: Node-ID that will hold it. 1 to 255.
     holder: int

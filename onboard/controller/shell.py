@@ -6,12 +6,13 @@ effects are carried out one after the other, so nothing is said before what must
 
 import asyncio
 from collections import Counter, deque
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import ParamSpec
 
 from onboard.contract.codes import MachineState, Reason
+from onboard.controller.outgoing import Outgoing
 from onboard.controller.rest import Rest
 from onboard.core.effects import Actuate, Effect, Halt, Record, Renew, Report, Send, Tell
 from onboard.core.frame import Frame
@@ -22,6 +23,8 @@ from onboard.ports.telemetry import Telemetry
 from onboard.ports.watchdog import Watchdog
 from onboard.wire.codec import Codec
 from onboard.wire.decoder import Decoder
+from onboard.wire.pace import paces_of
+from onboard.wire.runs import in_runs
 
 _Given = ParamSpec("_Given")
 
@@ -65,6 +68,9 @@ class Controller:
         self._writing: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._timer_us: int | None = None
+        #: What is said on the fleet bus, and what waits for its budget.
+        self.outgoing = Outgoing(fleet, paces_of(holon.site), self._put_on_bus)
+        self._saying: asyncio.TimerHandle | None = None
         #: Whether its wakes come to rest; a run in simulated time ends with a machine whose wakes do not.
         self.rest = Rest()
         #: Frames that the fleet bus had taken of me when it last had taken another, and when that was, us.
@@ -76,7 +82,7 @@ class Controller:
         self.stopped = self._loop.create_future()
         self.ports.fleet_bus.subscribe(partial(self._post, self._fleet_frame))
         self.ports.device_bus.subscribe(partial(self._post, self._device_frame))
-        self._outbox.extend(self.holon.start(self._now_us()))
+        self._outbox.extend(in_runs(self.holon.start(self._now_us())))
         self.ports.watchdog.ready()
         self._carry_out()
 
@@ -84,6 +90,7 @@ class Controller:
         """Leave both buses; pending journal writes are finished first."""
         if self._timer is not None:
             self._timer.cancel()
+        self._keep_quiet()
         # A write that ends may begin the next one.
         while self._writing is not None:
             await asyncio.wait([self._writing])
@@ -94,6 +101,7 @@ class Controller:
 
     def power_off(self) -> None:
         """A write under way is lost with everything else, as when the board loses its power."""
+        self._keep_quiet()
         if self._writing is not None:
             self._writing.cancel()
 
@@ -129,7 +137,7 @@ class Controller:
             try:
                 effects = handle(frame, time_us)
                 if effects:
-                    self._outbox.extend(effects)
+                    self._outbox.extend(in_runs(effects))
             except Exception as error:  # noqa: BLE001  # as in ``_guarded``, without its call: this is for every frame
                 self._give_up(error)
             # Where nothing is to be said and nothing can have fallen due, all is as it was when this was done last.
@@ -174,10 +182,10 @@ class Controller:
 
     # --- effects out -------------------------------------------------------------------------------------------
 
-    def _guarded(self, decide: Callable[_Given, Iterable[Effect]], *given: _Given.args, **named: _Given.kwargs) -> None:
+    def _guarded(self, decide: Callable[_Given, Sequence[Effect]], *given: _Given.args, **named: _Given.kwargs) -> None:
         """A decision waits to be carried out; one that raises broke an invariant: the machine stops and says why."""
         try:
-            self._outbox.extend(decide(*given, **named))
+            self._outbox.extend(in_runs(decide(*given, **named)))
         except Exception as error:  # noqa: BLE001  # whatever it is, going on with a broken belief would be worse
             self._give_up(error)
 
@@ -209,7 +217,7 @@ class Controller:
                 self._perform(self._outbox.popleft())
             elif self._inbox:
                 handle, frame, time_us = self._inbox.popleft()
-                self._outbox.extend(handle(frame, time_us))
+                self._outbox.extend(in_runs(handle(frame, time_us)))
             else:
                 break
         return ()
@@ -217,8 +225,9 @@ class Controller:
     def _perform(self, effect: Effect) -> None:
         match effect:
             case Send(message):
-                for frame in self._codecs[0].encode(message):
-                    self.ports.fleet_bus.send(frame)
+                self.outgoing.say(message, self._now_us())
+                if self.outgoing.next_us is not None:
+                    self._set_saying(self.outgoing.next_us)
             case Actuate(message) | Tell(message):
                 for frame in self._codecs[1].encode(message):
                     self.ports.device_bus.send(frame)
@@ -230,6 +239,31 @@ class Controller:
                 self.ports.telemetry.event(self._now_us(), self.holon.machine.name, text)
             case Halt(why, reason):
                 self._halt(why, reason)
+
+    def _put_on_bus(self, frame: Frame) -> None:
+        self.ports.fleet_bus.send(frame)
+
+    def _say_more(self) -> None:
+        """What waited for its budget goes out, and what is left has its next time."""
+        self._saying = None
+        self.outgoing.release(self._now_us())
+        if self.outgoing.next_us is not None:
+            self._set_saying(self.outgoing.next_us)
+
+    def _set_saying(self, when_us: int) -> None:
+        """An earlier timer stays: it finds nothing to say and sets the next one."""
+        if self._saying is not None and self._saying.when() <= when_us / 1_000_000:
+            return
+        if self._saying is not None:
+            self._saying.cancel()
+        self._saying = self._loop.call_at(when_us / 1_000_000, self._say_more)
+
+    def _keep_quiet(self) -> None:
+        """What waits is never said."""
+        self.outgoing.clear()
+        if self._saying is not None:
+            self._saying.cancel()
+            self._saying = None
 
     async def _write(self, writing: Awaitable[None]) -> None:
         try:
@@ -264,6 +298,7 @@ class Controller:
             self.halted_for = reason
         self.holon.halted = self.holon.halted or why
         self._inbox.clear()
+        self._keep_quiet()
         for frame in self._codecs[0].encode(self.holon.last_word(reason or Reason.JOURNAL_LOST)):
             self.ports.fleet_bus.send(frame)
         self.ports.telemetry.event(self._now_us(), self.holon.machine.name, f"halted: {why}")

@@ -28,13 +28,12 @@ from onboard.core.belief import Belief, Beliefs, Key
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.journal_records import Entry, records_in
 from onboard.core.records import RetiredRecord, TokenGivenRecord, TokenGoneRecord, TokenHeldRecord, TokenRecord
+from onboard.core.run_versions import RunVersions
 from onboard.core.site import Site
 from onboard.core.token_keys import TokenKey, genesis_holder, may_exist, segment_token, station_token
 
 __all__ = ["Claim", "TokenBook", "TokenKey", "genesis_holder", "may_exist", "segment_token", "station_token"]
 
-#: Highest version of a token: 163 years of the busiest slot, so that it never wraps (28 bits in dbc/fleet.dbc).
-MAX_VERSION = (1 << 28) - 1
 #: Whoever was refused asks again after so many token repeats, but seldom where the holder gives by itself (rule 10).
 REFUSED_REPEATS = 5
 #: A grant this young is still on its way and is not said again for a request, us: one journal write, and a burst.
@@ -119,6 +118,7 @@ class TokenBook:
     def __post_init__(self) -> None:
         self.backoff = BackOff(self.site.timing.token_repeat_us)
         self.beliefs = Beliefs(self._first_holder)
+        self._versions = RunVersions(lambda key: self.own_version(key) if self.holds(key) else None)
 
     def replay(self, entries: Iterable[Entry]) -> None:
         """Restore holdings from the journal, oldest entry first; entries of other record types are passed over."""
@@ -227,9 +227,7 @@ class TokenBook:
         """
         if not self.holds(key):
             raise ValueError(f"node {self.node_id} gives {key} which it does not hold")
-        version = self.own_version(key) + 1
-        if version > MAX_VERSION:
-            raise ValueError(f"{key} has no version left after {MAX_VERSION}: regenerate the tokens of this site")
+        version = self._versions.following(key, self.own_version(key), to, now_us)
         self.held.pop(key, None)
         self.changes += 1
         self.seen[key] = version
@@ -255,7 +253,7 @@ class TokenBook:
             return []
         if verdict is Reason.NONE:
             return self.give(key, request.sender, now_us)
-        version = _told(self.own_version(key))
+        version = self.own_version(key) % (1 << SEEN_VERSION_BITS)
         return [Send(TokenRefusal(self.node_id, key.kind, key.number, version, request.sender, verdict))]
 
     def on_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
@@ -294,8 +292,7 @@ class TokenBook:
 
     def drop_disputed(self, giver: int) -> None:
         """A node was started again: what it gave before, and was disputed, counts only if it gives it again."""
-        for key in [key for key, grant in self._disputed.items() if grant.sender == giver]:
-            del self._disputed[key]
+        self._disputed = {key: grant for key, grant in self._disputed.items() if grant.sender != giver}
 
     def on_dispute(self, dispute: TokenDispute, now_us: int) -> list[Effect]:
         """Somebody believes that I hold a token which another gave away: say what my journal knows of it."""
@@ -339,9 +336,7 @@ class TokenBook:
     def statements(self) -> list[Effect]:
         """What this node holds away from the site file's first holders, and what it gave away and is under way."""
         held = [Send(TokenHeld(self.node_id, *key, version)) for key, version in self.held.items()]
-        gone = [
-            Send(TokenGiven(self.node_id, *key, given.version, given.holder)) for key, given in self.leaving.items()
-        ]
+        gone = [Send(TokenGiven(self.node_id, *key, one.version, one.holder)) for key, one in self.leaving.items()]
         return [*held, *gone]
 
     def wake(self, now_us: int) -> list[Effect]:
@@ -356,7 +351,8 @@ class TokenBook:
                 of_set = self.backoff.unordered_us * max(1, len(self.unordered & self.wanted.keys()))
                 longest_us = self.backoff.longest_us if claim.itinerary_version else of_set
                 self.wanted[key] = self.backoff.say(("wanted", key), now_us, waiting, longest_us)
-                effects.append(Send(TokenRequest(self.node_id, *key, _told(self.version_of(key)), *claim)))
+                seen = self.version_of(key) % (1 << SEEN_VERSION_BITS)
+                effects.append(Send(TokenRequest(self.node_id, *key, seen, *claim)))
         for key, grant in self.leaving.items():
             if grant.repeat_at_us <= now_us:
                 due_us = self.backoff.say(("leaving", key), now_us, waiting)
@@ -410,11 +406,8 @@ class TokenBook:
         if first is None:
             return []
         self._hold(key, grant.version)
-        return [
-            *first,
-            _record(TokenHeldRecord, key, grant.version, self.node_id),
-            Send(TokenHeld(self.node_id, key.kind, key.number, grant.version)),
-        ]
+        held = Send(TokenHeld(self.node_id, *key, grant.version))
+        return [*first, _record(TokenHeldRecord, key, grant.version, self.node_id), held]
 
     def _overheard(self, key: TokenKey, giver: int, version: int, holder: int, now_us: int) -> list[Effect]:
         """``giver`` says that it gave a token to ``holder``: believed of whom I believe to have held it."""
@@ -492,8 +485,3 @@ class TokenBook:
 
 def _record(record: type[TokenRecord], key: TokenKey, version: int, holder: int) -> Record:
     return Record(record(key.kind, key.number, version, holder))
-
-
-def _told(version: int) -> int:
-    """A version as it fits in a request or a refusal."""
-    return version & ((1 << SEEN_VERSION_BITS) - 1)

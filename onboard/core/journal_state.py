@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 from onboard.contract.codes import Reason
-from onboard.core.journal_records import Entry, RecordTypes, misshapen, records_in
-from onboard.core.records import CORE_RECORDS, BlockedRecord, BootRecord, ClearRecord, EpochRecord, ManualRecord
+from onboard.core.journal_records import Entry, RecordTypes, records_in
+from onboard.core.records import BlockedRecord, BootRecord, ClearRecord, EpochRecord, ManualRecord
 
 #: Why a machine holds whose rights nobody knows any more; only regeneration gives it any (docs/contract-2.md).
 RIGHTS_LOST = (Reason.JOURNAL_LOST, Reason.JOURNAL_SHORT, Reason.JOURNAL_FOREIGN)
@@ -81,14 +81,3 @@ def still_counting(condition: JournalCondition, entries: Iterable[Entry]) -> tup
     if condition.is_reliable:
         return tuple(entries)
     return () if condition.is_foreign else tuple(one.entry for one in records_in(entries, *_STILL_COUNTS))
-
-
-def condition_of(
-    condition: JournalCondition, entries: Iterable[Entry], types: RecordTypes, name: str
-) -> JournalCondition:
-    """``condition``, or SHORT where a record of a known type has not its form: what it said is missing.
-
-    ``types``: beside the core's; ``name`` is how a person finds the journal.
-    """
-    why = misshapen(entries, (*CORE_RECORDS, *types)) if condition.is_reliable else ""
-    return JournalCondition(JournalState.SHORT, 1, 0, f"{name}: {why}") if why else condition

@@ -46,11 +46,6 @@ def away(value: int, other: int, modulus: int) -> int:
     return (value - other + half) % modulus - half
 
 
-def reread_us(time_us: int, near_us: int) -> int:
-    """The time nearest to ``near_us`` that is told on the wire as ``time_us`` is: what was read while a clock lied."""
-    return near_us + away(time_us, near_us, BUS_MS_MODULUS * 1000)
-
-
 def from_bus_ms(bus_ms: int, near_us: int) -> int:
     """The bus time in us nearest to ``near_us`` that reads ``bus_ms`` on the wire (within 24.8 days of it)."""
     near_ms = near_us // 1000

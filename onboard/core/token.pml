@@ -15,8 +15,10 @@
  * OLD_COPY: once a machine starts from an old copy of its journal, while all others live. It asks them what they know
  *   (left out: NO_WITNESS), and where they know newer it stands for a person.
  * REGENERATE: a person has the rights of a machine that is down made anew. All are frozen meanwhile (left out: NO_FREEZE),
- *   the version is above every one known, leaving grants too (left out: NOT_ABOVE), and the machine that was declared
+ *   the version is above every one known, leaving grants too (left out: NOT_ABOVE), and of all in line (left out:
+ *   ONE_ABOVE), and the machine that was declared
  *   lost stays out under its old epoch if it comes back (left out: NO_EPOCH).
+ * FIRST_OF_RUN: a token that goes in a run gets the version after that of the first of the run, which may not be newer.
  * SERIAL: versions of 3 bits that wrap, as they did once: a rule left out for good.
  */
 #ifndef NODES
@@ -46,11 +48,24 @@
 #ifdef SERIAL
 #define NEXT(version) (((version) + 1) & 7)
 #define NEWS(n, version) ((((version) - seen[n]) & 7) > 0 && (((version) - seen[n]) & 7) < 4)
-#define MORE(n) true
+#define MAY_GIVE(n, version) ((version) == NEXT(seen[n]))
 #else
 #define NEXT(version) ((version) + 1)
 #define NEWS(n, version) ((version) > seen[n])
-#define MORE(n) (seen[n] < VERSIONS)
+/* Of a token that goes in a run the version is one more than the highest of the run: newer than its own by JUMP at most.
+ * The first's and one more is not newer than each (FIRST_OF_RUN). */
+#ifndef JUMP
+#ifdef TRACE
+#define JUMP VERSIONS
+#else
+#define JUMP 2
+#endif
+#endif
+#ifdef FIRST_OF_RUN
+#define MAY_GIVE(n, version) ((version) > 0 && (version) <= VERSIONS)
+#else
+#define MAY_GIVE(n, version) ((version) > seen[n] && (version) <= seen[n] + JUMP && (version) <= VERSIONS)
+#endif
 #endif
 #define NOBODY NODES
 /* A grant of this version comes from whom n believes to hold; a trace knows nothing of beliefs. */
@@ -133,10 +148,10 @@ inline somewhere() {
     other_ = 0
 }
 
-inline give(n, to) {
+inline give(n, to, version) {
     atomic {
-        todo[n] == IDLE && holds[n] && MORE(n) && n != to && FREE;
-        holds[n] = false; seen[n] = NEXT(seen[n]); leaving[n] = seen[n]; receiver[n] = to;
+        todo[n] == IDLE && holds[n] && MAY_GIVE(n, version) && n != to && FREE;
+        holds[n] = false; seen[n] = version; leaving[n] = seen[n]; receiver[n] = to;
 #if defined(BELIEFS) && !defined(TRACE)
         giver[seen[n]] = n; believed[n] = to; given_to[n] = to;
 #endif
@@ -339,7 +354,12 @@ inline collect(n) {
         od;
         if
         :: other_ < NODES -> maximum = 0
+        /* What the lost one may have given unheard goes under a version above all in line with it. */
+#ifdef ONE_ABOVE
         :: else -> maximum = maximum + 1
+#else
+        :: else -> maximum = maximum + JUMP
+#endif
         fi;
         other_ = 0
     }
@@ -406,10 +426,14 @@ end:
 
 /* What it may give to another, and what it hears of each version: processes of their own, so that SPIN's fairness, which
  * counts processes, is fair to each frame. */
-proctype giving(byte n, to) {
+proctype giving(byte n, to, version) {
 end:
     do
-    :: atomic { GIVES(to) && todo[n] == IDLE && holds[n] && MORE(n) -> give(n, to) }
+#ifdef SERIAL
+    :: atomic { GIVES(to) && todo[n] == IDLE && holds[n] -> give(n, to, NEXT(seen[n])) }
+#else
+    :: atomic { GIVES(to) && todo[n] == IDLE && holds[n] && MAY_GIVE(n, version) -> give(n, to, version) }
+#endif
     od
 }
 
@@ -519,7 +543,11 @@ init {
             for (j : 0 .. NODES - 1) {
                 if
                 :: i != j ->
-                    run giving(i, j);
+#ifdef SERIAL
+                    run giving(i, j, 0);
+#else
+                    for (v : 1 .. VERSIONS) { run giving(i, j, v) }
+#endif
 #ifdef BELIEFS
                     for (v : 1 .. VERSIONS) { run believing(i, v, j) }
 #endif

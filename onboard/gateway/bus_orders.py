@@ -96,3 +96,9 @@ def refuse_load(body: dict[str, Any]) -> None:
     """Where loads have no names of their own. Raises ``RefusedError`` for a transport that names one."""
     if "load" in body:
         raise RefusedError("UNSUPPORTED", "loads have no names here", "$.load")
+
+
+def refuse_charging(body: dict[str, Any], why: str = "nothing is charged here; leave it out") -> None:
+    """Raises ``RefusedError`` for a transport that asks for a place to charge."""
+    if body.get("charging"):
+        raise RefusedError("UNSUPPORTED", why, "$.charging")

@@ -12,7 +12,7 @@ from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Machine, Site
 from onboard.gateway.gateway import Gateway
-from onboard.gateway.options import add_mqtt_arguments, broker_address, gateway_settings, watch_lines
+from onboard.gateway.options import add_mqtt_arguments, broker_address, gateway_settings, plain_warning, watch_lines
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import GatewayError, GatewaySettings, level
 from onboard.io.broker_address import BrokerAddress
@@ -79,7 +79,7 @@ def main(argv: Sequence[str]) -> int:
     try:
         site = load_site(args.site)
         settings = gateway_settings(args, node_id=args.orders)
-        address = broker_address(args)
+        address = _broker(args)
         bus = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
         return asyncio.run(_run(site, settings, address, bus, args.spool))
     except (ConfigError, BusOpenError, GatewayError, BrokerError) as error:
@@ -94,7 +94,7 @@ def main(argv: Sequence[str]) -> int:
 def beside(args: argparse.Namespace, site: Site, machine: Machine) -> Callable[[OpenBus, Codec], Gateway]:
     """The gateway of one controller: call it on the running loop with the fleet bus. Raises as the options do."""
     settings = gateway_settings(args, serials=frozenset({machine.name}))
-    broker = MqttBroker(broker_address(args))
+    broker = MqttBroker(_broker(args))
     client = f"{settings.prefix}-{level(site.name)}"
 
     def build(bus: OpenBus, codec: Codec) -> Gateway:
@@ -103,6 +103,15 @@ def beside(args: argparse.Namespace, site: Site, machine: Machine) -> Callable[[
         return gateway
 
     return build
+
+
+def _broker(args: argparse.Namespace) -> BrokerAddress:
+    """The broker that the options name, with a word to people where everybody on the way could speak for it."""
+    address = broker_address(args)
+    warning = plain_warning(address)
+    if warning:
+        print(f"warning: --mqtt {warning}", file=sys.stderr)
+    return address
 
 
 async def _run(site: Site, settings: GatewaySettings, address: BrokerAddress, bus: BusSettings, spool: Path) -> int:

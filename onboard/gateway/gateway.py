@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 
 from onboard.contract.messages import Message
+from onboard.contract.runs import singles
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.gateway.desk import GatewayDesk
@@ -131,9 +132,9 @@ class Gateway:
             for _ in range(min(TURN, len(self._inbox))):
                 frame, time_us = self._inbox.popleft()
                 message = self._decoder.feed(frame, time_us)
-                if message is not None:
-                    fact = self.publisher.history.feed(message, time_us)
-                    self._post(self.publisher.take(message, fact, time_us))
+                for word in singles(message) if message is not None else ():
+                    fact = self.publisher.history.feed(word, time_us)
+                    self._post(self.publisher.take(word, fact, time_us))
                     if self.desk is not None:
                         await self.desk.feed(fact, time_us)
             await self._keep_reports()

@@ -1,12 +1,15 @@
 """The options by which a command line names a broker and what is published there."""
 
 import argparse
-import os
 from pathlib import Path
 
+from onboard.bounded_file import read_bounded
 from onboard.core.site import Site
 from onboard.gateway.settings import GatewayError, GatewaySettings, level
-from onboard.io.broker_address import BrokerAddress, parse_broker
+from onboard.io.broker_address import BrokerAddress, is_loopback, parse_broker
+
+#: Longest file with a password, a key or certificates, bytes: all authorities of a system have a quarter of it.
+_MOST_SECRET = 1_000_000
 
 
 def add_mqtt_arguments(parser: argparse.ArgumentParser, *, required: bool) -> None:
@@ -37,8 +40,8 @@ def broker_address(args: argparse.Namespace) -> BrokerAddress:
     for option, path in files.items():
         if path is not None and not found.tls:
             raise GatewayError(f"{option} {path}: goes with TLS only; write --mqtt mqtts://...")
-        if path is not None and not os.access(path, os.R_OK):
-            raise GatewayError(f"{option} {path}: cannot be read; name an existing PEM file")
+        if path is not None:
+            _check_readable(option, path)
     return BrokerAddress(
         found.host,
         found.port,
@@ -49,6 +52,13 @@ def broker_address(args: argparse.Namespace) -> BrokerAddress:
         args.mqtt_cert,
         args.mqtt_key,
     )
+
+
+def plain_warning(address: BrokerAddress) -> str:
+    """What a person should know of a broker without TLS that is not on this computer; empty for any other."""
+    if address.tls or is_loopback(address.host):
+        return ""
+    return f"{address}: no TLS: whoever is on the way reads all and may order; write mqtts://{address.host}"
 
 
 def gateway_settings(
@@ -85,10 +95,19 @@ def watch_lines(address: BrokerAddress, site: Site, settings: GatewaySettings) -
     ]
 
 
+def _check_readable(option: str, path: Path) -> None:
+    """TLS reads a file until it ends, whatever it is: look at it before."""
+    try:
+        read_bounded(path, _MOST_SECRET)
+    except OSError as error:
+        raise GatewayError(f"{option} {path}: cannot be read ({error.strerror}); name an existing PEM file") from error
+
+
 def _password(path: Path | None) -> str | None:
     if path is None:
         return None
     try:
-        return path.read_text(encoding="utf-8").splitlines()[0]
+        return read_bounded(path, _MOST_SECRET).decode().splitlines()[0]
     except (OSError, UnicodeDecodeError, IndexError) as error:
-        raise GatewayError(f"--mqtt-password {path}: {error}; name a file whose first line is the password") from error
+        why = getattr(error, "strerror", None) or error
+        raise GatewayError(f"--mqtt-password {path}: {why}; name a file whose first line is the password") from error

@@ -18,7 +18,8 @@ class OrderRequest:
     ``base`` is the last node that a VDA 5050 order releases and its sequence number, where an update goes on;
     ``is_open`` tells that it has a horizon, so that an update is to come (VDA 5050 2.1, section 6.6.4).
 
-    ``node`` is the compartment or robot; ``number`` names a visit list on the bus (16 bits); ``urgent`` overtakes.
+    ``node`` is the compartment or robot; ``number`` names a visit list on the bus (16 bits); ``urgent`` overtakes;
+    ``charging`` asks for a place at which the car that is parked is charged.
     """
 
     what: str
@@ -29,6 +30,7 @@ class OrderRequest:
     urgent: bool = False
     base: tuple[str, int] = ("", 0)
     is_open: bool = False
+    charging: bool = False
 
 
 @dataclass(slots=True)
@@ -80,6 +82,7 @@ class GatewayOrder:
             car=request.car,
             task=self.task,
             before_us=self.before_us,
+            charging=request.charging,
         ).entry
 
 
@@ -94,6 +97,7 @@ def order_of(record: WishRecord) -> GatewayOrder:
         record.urgent,
         (record.base, record.sequence),
         record.open,
+        record.charging,
     )
     return GatewayOrder(
         record.name,

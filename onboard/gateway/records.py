@@ -54,6 +54,7 @@ class WishRecord(JournalRecord):
     car: Reference | None = None
     task: Reference | None = None
     before_us: int | None = None
+    charging: bool = False
 
 
 @dataclass(frozen=True, slots=True)

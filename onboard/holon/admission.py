@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from onboard.contract.codes import KindCode, Reason
 from onboard.contract.constants import MAX_NODE_ID, MOBILE_KINDS, Speakers
 from onboard.contract.messages import Blocked, BusTime, Clear, EmergencyStop, ManualOrder, Message
+from onboard.contract.runs import singles
 from onboard.core.effects import Effect, Report
 from onboard.core.site import Site
 
@@ -38,11 +39,16 @@ class Admission:
         self._verdicts.clear()
 
     def why_not(self, message: Message) -> Reason:
-        """NONE where a message counts; else NOT_OF_SITE, NOT_OF_KIND, or NOT_AUTHORISED for a track of another's."""
+        """NONE where a message counts; else NOT_OF_SITE, NOT_OF_KIND, or NOT_AUTHORISED for a track of another's.
+
+        VALUE_OUT_OF_RANGE for a run that is longer than any.
+        """
         said = message.sender, type(message)
         verdict = self._verdicts.get(said)
         if verdict is None:
             verdict = self._verdicts[said] = self._why_never(*said)
+        if verdict is Reason.NONE and not singles(message):
+            return Reason.VALUE_OUT_OF_RANGE
         if verdict is not Reason.NONE or not isinstance(message, _OF_STEWARDS):
             return verdict
         is_gateway = message.sender not in self.site.machines

@@ -23,6 +23,7 @@ from onboard.contract.messages import (
     TokenHeld,
     TokenRequest,
 )
+from onboard.contract.runs import singles
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.records import BootRecord
@@ -52,7 +53,9 @@ class Holds:
     def on_own_number(self, message: Message, now_us: int) -> list[Effect]:
         """Somebody sends under my number: I hold, and take nothing in, until I know that nobody believed it."""
         self.drops[Reason.DUPLICATE_NODE_ID] += 1
-        return self.apply(self.holding.own_frame(now_us, is_right=self.own.is_right(message)), now_us)
+        return self.apply(
+            self.holding.own_frame(now_us, is_right=any(map(self.own.is_right, singles(message)))), now_us
+        )
 
     def on_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
         """From anybody: standing is always safe. It is no sign of life of its sender, who may be nobody of the site."""

@@ -29,6 +29,7 @@ from onboard.contract.messages import (
     TokenGrant,
     TokenHeld,
 )
+from onboard.contract.runs import singles
 from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory
 from onboard.core.bus_time import BUS_TIME_MODULUS
@@ -161,7 +162,7 @@ class Holon:
         self.admission.listen(speakers)
 
     def receive(self, message: Message, local_us: int) -> list[Effect]:
-        """A message of the fleet bus, received at ``local_us``."""
+        """A message of the fleet bus, received at ``local_us``; one of a run of tokens is one for each of them."""
         local_us = self.time.steady(local_us)
         now_us = self.clock.bus_us(local_us)
         if isinstance(message, Heartbeat) and self.schedule.lives_on(message, now_us):
@@ -180,7 +181,7 @@ class Holon:
             return self._on_bus_time(message, local_us)
         if self._is_unheard(message):
             return []
-        effects = self._take_up(message, now_us)
+        effects = [effect for word in singles(message) for effect in self._take_up(word, now_us)]
         if not effects and self.schedule.is_overheard(message, before):
             return effects
         self.schedule.changed()
@@ -422,8 +423,7 @@ class Holon:
 
     def _settle(self, effects: list[Effect], now_us: int) -> list[Effect]:
         """Let the machine go on until it waits for something; bounded, as each round must come from the one before."""
-        if self.witness.doubt is not None:
-            effects = effects + self._doubts(now_us)
+        effects = effects if self.witness.doubt is None else effects + self._doubts(now_us)
         if self.halted is not None:
             return [effect for effect in effects if isinstance(effect, Report | Halt)]
         for _ in range(MAX_ROUNDS if self.part.begins else 0):

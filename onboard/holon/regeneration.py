@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+from onboard.contract.assignments import assignment_digest
 from onboard.contract.codes import CONTRACT_VERSION, MachineState, Reason, RegenerationPhase, TokenKind
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import (
@@ -21,7 +22,6 @@ from onboard.contract.messages import (
     TokenHeld,
     TokenSeen,
 )
-from onboard.core.assignments import assignment_digest
 from onboard.core.authority import TokenBook, TokenKey, may_exist
 from onboard.core.belief import Belief
 from onboard.core.effects import Effect, Record, Report, Send

@@ -1,6 +1,7 @@
 """Where a broker is and how one shows who one is, as a command line names it."""
 
 import importlib.util
+import ipaddress
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,3 +42,11 @@ def parse_broker(text: str) -> BrokerAddress:
     if not 0 < port < 65_536:
         raise ValueError(f"{text}: port {port} is not from 1 to 65535")
     return BrokerAddress(found["host"].strip("[]"), port, found["scheme"] == "mqtts", found["user"])
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host is this computer itself, by number or as ``localhost``; another name may be anybody."""
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return host == "localhost"

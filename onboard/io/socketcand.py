@@ -3,9 +3,11 @@
 import asyncio
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 from typing import ClassVar
 
 from onboard.core.frame import Frame
+from onboard.io.kept_token import TokenFileError, read_token
 from onboard.io.settings import BusOpenError, BusSettings
 from onboard.io.socketcand_protocol import DEFAULT_PORT, Splitter, format_send, parse_frame
 from onboard.io.subscribers import Subscribers
@@ -30,7 +32,8 @@ class SocketcandBus:
 
     def __init__(self, host: str, port: int, channel: str, give_up_s: float | None = None) -> None:
         """``start`` connects."""
-        self.name = f"socketcand:{channel}@{host}:{port}"
+        # What follows a colon is the server's token, and none of a log's.
+        self.name = f"socketcand:{channel.partition(':')[0]}@{host}:{port}"
         self.counts: Counter[str] = Counter()
         self._loop = asyncio.get_running_loop()
         self._address = (host, port)
@@ -228,17 +231,17 @@ _OnEnd = Callable[[_Connection], None]
 
 
 async def open_socketcand(settings: BusSettings) -> SocketcandBus:
-    """Open the channel of ``settings``, with ``host``, ``port`` and ``give_up_s`` as further arguments.
+    """Open the channel of ``settings``, with ``host``, ``port``, ``token_file`` and ``give_up_s`` as further arguments.
 
     Raises ``BusOpenError``.
     """
     extra = dict(settings.extra)
     host, port = extra.pop("host", "127.0.0.1"), extra.pop("port", DEFAULT_PORT)
-    give_up_s = extra.pop("give_up_s", None)
+    give_up_s, token_file = extra.pop("give_up_s", None), extra.pop("token_file", None)
     if extra:
         unknown = ", ".join(sorted(extra))
         raise BusOpenError(
-            f"interface {settings.interface}: unknown argument {unknown}; it takes host, port and give_up_s"
+            f"interface {settings.interface}: unknown argument {unknown}; it takes host, port, token_file and give_up_s"
         )
     if isinstance(port, bool) or not isinstance(port, int) or not 0 < port < 1 << 16:
         raise BusOpenError(f"interface {settings.interface}: port = {port}: must be a number from 1 to 65535")
@@ -246,6 +249,12 @@ async def open_socketcand(settings: BusSettings) -> SocketcandBus:
         raise BusOpenError(f"interface {settings.interface}: give_up_s = {give_up_s}: must be a number above 0")
     if not settings.channel or any(letter in "<> " for letter in settings.channel):
         raise BusOpenError(f'interface {settings.interface}: channel = "{settings.channel}": must be one word')
-    bus = SocketcandBus(str(host), port, settings.channel, give_up_s)
+    channel = settings.channel
+    if token_file is not None:
+        try:
+            channel = f"{channel}:{read_token(Path(str(token_file)))}"
+        except TokenFileError as error:
+            raise BusOpenError(f"interface {settings.interface}: token_file = {error}") from error
+    bus = SocketcandBus(str(host), port, channel, give_up_s)
     await bus.start()
     return bus

@@ -152,12 +152,21 @@ def assign(statements: Statements, whose: Whose, operator: int) -> RightsAssignm
         if key in statements.held or not _is_orphan(statements, key, whose):
             continue
         to = _heir(statements, key, whose)
-        version = statements.seen[key].version + 1 if key in statements.seen else 1
+        version = 1 + _newest(statements, key)
         if to == NOBODY or version > LAST_VERSION:
             nobodys.append(key)
         else:
             given.append(TokenAssigned(operator, key.kind, key.number, version, to))
     return RightsAssignment(tuple(given), tuple(nobodys))
+
+
+def _newest(statements: Statements, key: TokenKey) -> int:
+    """The newest version known of a token; of a segment of its whole track, as one grant goes above all in line."""
+    newest = statements.seen[key].version if key in statements.seen else 0
+    if key.kind is not TokenKind.SEGMENT or key.number >> 8 in way_site(statements.site).lifts:
+        return newest
+    on_track = (one for one in statements.seen if one.kind is key.kind and one.number >> 8 == key.number >> 8)
+    return max((statements.seen[one].version for one in on_track), default=0)
 
 
 def _is_orphan(statements: Statements, key: TokenKey, whose: Whose) -> bool:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
+from onboard.contract.assignments import assignment_digest
 from onboard.contract.codes import Reason, RegenerationPhase, TokenKind
 from onboard.contract.constants import MOBILE_KINDS, NOBODY
 from onboard.contract.messages import (
@@ -24,7 +25,6 @@ from onboard.contract.messages import (
     TokenHeld,
     TokenSeen,
 )
-from onboard.core.assignments import assignment_digest
 from onboard.core.authority import TokenKey
 from onboard.core.serial import is_newer, successor
 from onboard.holon.remedies import reason_words

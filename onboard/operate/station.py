@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 
 from onboard.contract.messages import Message
+from onboard.contract.runs import singles
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.operate.commands import LISTEN_BEATS, Maker
@@ -144,10 +145,11 @@ class OperatorStation:
         if message.sender == self.node:
             self._tell_once(f"somebody else speaks under node-ID {self.node} as well; end that, or give another --node")
             return
-        self.park.feed(message, time_us)
-        if self._order is not None:
-            self._order.feed(message, time_us)
-            self._news.set()
+        for word in singles(message):
+            self.park.feed(word, time_us)
+            if self._order is not None:
+                self._order.feed(word, time_us)
+                self._news.set()
 
     async def _wait(self, rest_us: int | None) -> None:
         """Until something is heard that matters, or for so long."""

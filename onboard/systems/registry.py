@@ -11,8 +11,9 @@ from types import ModuleType
 from onboard import systems
 from onboard.contract.codes import KindCode
 from onboard.core.behaviour import BehaviourFactory
-from onboard.core.journal_records import Entry
-from onboard.core.journal_state import JournalCondition, condition_of
+from onboard.core.journal_records import Entry, misshapen
+from onboard.core.journal_state import JournalCondition, JournalState
+from onboard.core.records import CORE_RECORDS
 from onboard.core.site import Site
 from onboard.systems.folders import Folders
 from onboard.systems.system import System
@@ -81,4 +82,5 @@ def compaction_for(site: Site) -> Callable[[list[Entry]], list[Entry]]:
 
 def condition_for(site: Site, found: JournalCondition, entries: Iterable[Entry], name: str) -> JournalCondition:
     """The condition in which a journal of this site was ``found``, or SHORT where a record has not its form."""
-    return condition_of(found, entries, system_of(site).records, name)
+    why = misshapen(entries, (*CORE_RECORDS, *system_of(site).records)) if found.is_reliable else ""
+    return JournalCondition(JournalState.SHORT, 1, 0, f"{name}: {why}") if why else found

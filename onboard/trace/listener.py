@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from onboard.contract.codes import Reason
 from onboard.contract.messages import Message
+from onboard.contract.runs import singles
 from onboard.trace.raw import RawFrame
 from onboard.wire.codec import Codecs
 from onboard.wire.decoder import Decoder
@@ -75,7 +76,8 @@ class Listener:
         for frame in frames:
             heard = self.hear(frame)
             if heard.message is not None:
-                yield LoggedMessage(frame.time_us, frame.channel, heard.message, heard.is_fleet)
+                for word in singles(heard.message):
+                    yield LoggedMessage(frame.time_us, frame.channel, word, heard.is_fleet)
 
     def lines(self) -> list[str]:
         """What came to nothing, one line for each reason."""

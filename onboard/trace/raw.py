@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-from onboard.core.frame import CAN_EFF_MASK, Frame
+from onboard.core.frame import CAN_EFF_MASK, CAN_MAX_DLC, Frame
 
 #: Bits of the flags nibble of a CAN FD frame in a candump log (``struct canfd_frame``, linux/can.h).
 CANFD_BRS, CANFD_ESI, CANFD_FDF = 0x1, 0x2, 0x4
@@ -12,6 +12,9 @@ CANFD_BRS, CANFD_ESI, CANFD_FDF = 0x1, 0x2, 0x4
 EFF_FLAG, RTR_FLAG, ERR_FLAG = 0x8000_0000, 0x4000_0000, 0x2000_0000
 #: Most data bytes of a CAN FD frame (ISO 11898-1).
 CANFD_MAX_LEN = 64
+#: Keys of data frames: data, identifier, and the length, marked as a key and as a long identifier's.
+KEY_BYTES, KEY_IS_LONG, KEY_MARK = CAN_MAX_DLC + 5, 0x40, 0x80
+_KEY_LENGTH = 0x0F
 #: ``Frame`` from a tuple of all its fields: half the time of calling the class.
 _frame_of: Callable[[Any], Frame] = partial(tuple.__new__, Frame)
 
@@ -56,3 +59,9 @@ class RawFrame(NamedTuple):
         if self.fd_flags is not None:
             return None
         return _frame_of(self[2:8])
+
+
+def data_frame(key: bytes) -> tuple[int, bytes, bool]:
+    """Identifier, data, and whether the identifier is a long one, of the frame with this key (``FrameBlock.keys``)."""
+    last = key[-1]
+    return int.from_bytes(key[CAN_MAX_DLC:-1], "little"), key[: last & _KEY_LENGTH], last & KEY_IS_LONG != 0

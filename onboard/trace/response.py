@@ -66,8 +66,10 @@ class Bound:
 
     @property
     def is_met(self) -> bool:
-        """Whether every frame is out before the next of its stream may be queued (deadline = period)."""
-        return self.response_us is not None and self.response_us <= self.stream.period_us
+        """Whether every frame is out before as many again of its stream may be queued (deadline = period)."""
+        stream = self.stream
+        deadline_us = (1 + stream.jitter_us // stream.period_us) * stream.period_us
+        return self.response_us is not None and self.response_us <= deadline_us
 
 
 class _Ticks:

@@ -9,7 +9,7 @@ from dataclasses import fields
 from enum import IntEnum
 from functools import cache, lru_cache, partial
 from operator import attrgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 from onboard.contract.codes import Criterion, LegAction, Side, TokenKind
 from onboard.contract.messages import Bid, CallForProposals, Leg, Message, Reference, Stamp
@@ -37,17 +37,26 @@ _KEPT = 4096
 _Phrase = tuple[Callable[[Message], Any], Callable[[Any], str]]
 
 
+class _Kind(NamedTuple):
+    """How messages of one class are said: what comes before the first phrase, all phrases, and what they depend on."""
+
+    begins: str
+    phrases: tuple[_Phrase, ...]
+    is_heard: bool
+    is_fixed: bool
+
+
 class Words:
     """Puts messages into words. It remembers the criterion of each call that it saw. ``site`` None: numbers only."""
 
     def __init__(self, site: Site | None = None) -> None:
         self.site = site
         self.system = words_of(site)
-        self.machine = self.system.machine
+        #: Names of 255 nodes at most, and of nobody.
+        self.machine = cache(self.system.machine)
         self.cost = self.system.cost
         self.reference = self.system.reference
-        #: By class of message, how each thing that it says is taken out of it, and how that is said.
-        self._phrases: dict[type[Message], tuple[_Phrase, ...]] = {}
+        self._kinds: dict[type[Message], _Kind] = {}
         self._criteria: dict[tuple[int, int], Criterion] = {}
         self._is_forgetful = type(self.system).hear is SiteWords.hear
         self._way = self._kept(self._way_of)
@@ -62,17 +71,22 @@ class Words:
 
     def is_fixed(self, message: Message) -> bool:
         """Whether the same message is always said in the same words, whatever was said before."""
-        return self._is_forgetful and not isinstance(message, Bid | CallForProposals)
+        return (self._kinds.get(type(message)) or self._kind(message)).is_fixed
 
     def message(self, message: Message) -> str:
         """``MR1 Bid: initiator IOC1, call 1, cost 43.210 s, itinerary version 2``."""
-        self.hear(message)
-        phrases = self._phrases.get(type(message))
-        if phrases is None:
-            phrases = self._phrases[type(message)] = tuple(self._phrases_of(message))
-        said = ", ".join([say(taken(message)) for taken, say in phrases])
-        name = type(message).__name__
-        return f"{self.machine(message.sender)} {name}" + (f": {said}" if said else "")
+        begins, phrases, is_heard, _ = self._kinds.get(type(message)) or self._kind(message)
+        if is_heard:
+            self.hear(message)
+        return self.machine(message.sender) + begins + ", ".join([say(taken(message)) for taken, say in phrases])
+
+    def _kind(self, message: Message) -> _Kind:
+        phrases, is_call = tuple(self._phrases_of(message)), isinstance(message, CallForProposals)
+        begins = f" {type(message).__name__}{': ' if phrases else ''}"
+        is_fixed = self._is_forgetful and not is_call and not isinstance(message, Bid)
+        kind = _Kind(begins, phrases, is_call or not self._is_forgetful, is_fixed)
+        self._kinds[type(message)] = kind
+        return kind
 
     def _phrases_of(self, message: Message) -> Iterable[_Phrase]:
         """What a message of this class says; the values of a field are of one kind in all of them."""
@@ -114,7 +128,11 @@ class Words:
         return lru_cache(_KEPT)(say) if self._is_forgetful else say
 
     def _token(self, token: tuple[TokenKind, int]) -> str:
-        return f"token {self.system.resource(*token)}"
+        kind, number = token
+        if kind is not TokenKind.RUN:
+            return f"token {self.system.resource(kind, number)}"
+        first, last = number >> 16 << 8 | number >> 8 & 0xFF, number >> 16 << 8 | number & 0xFF
+        return f"tokens {' to '.join(self.system.resource(TokenKind.SEGMENT, one) for one in (first, last))}"
 
     def _slot(self, place: tuple[int, int]) -> str:
         return f"at {self.system.slot(*place)}"

@@ -22,6 +22,9 @@ class Point(NamedTuple):
     x_mm: int
     y_mm: int
 
+    def __str__(self) -> str:
+        return f"({self.x_mm}, {self.y_mm}) mm"
+
 
 class Line(NamedTuple):
     """A track: the centre of index 1, and the direction of growing index, a unit along one axis. FAR is to its left."""
@@ -32,13 +35,25 @@ class Line(NamedTuple):
     dy: int
 
 
+class Mismatch(NamedTuple):
+    """A loop that does not close: a track's end is ``here`` by itself and ``there`` by the segment beside it.
+
+    Of a lift the platform is ``here`` behind this sill and ``there`` behind its first.
+    """
+
+    track: int
+    beside: Segment
+    here: Point
+    there: Point
+
+
 @dataclass
 class FloorPlan:
-    """Lines of alleys and spurs, centres of lifts' platforms, and in words where a loop does not close."""
+    """Lines of alleys and spurs, centres of lifts' platforms, and where a loop does not close."""
 
     lines: dict[int, Line] = field(default_factory=dict)
     shafts: dict[int, Point] = field(default_factory=dict)
-    mismatches: tuple[str, ...] = ()
+    mismatches: tuple[Mismatch, ...] = ()
 
 
 #: A loop that closes to this is closed, mm: what a carrier's marks allow.
@@ -141,18 +156,18 @@ def _face(site: WaySite, lift: int, stop: int) -> int:
     return 1 if stop > 1 and is_same_stop(site, lift, stop - 1, stop) else 0
 
 
-def _mismatches(plan: FloorPlan, site: WaySite) -> list[str]:
+def _mismatches(plan: FloorPlan, site: WaySite) -> list[Mismatch]:
     found = []
     for mouth, ends in site.links.items():
         for end in ends:
             here, there = at_mm(plan, site, end), at_mm(plan, site, mouth)
             if _apart(here, there) or site.across(end.track) is site.across(mouth.track):
-                found.append(f"the end of track {end.track} is at {_words(here)}, and {mouth} at {_words(there)}")
+                found.append(Mismatch(end.track, mouth, here, there))
     for lift, shaft in plan.shafts.items():
         for sill in site.tracks[lift].joins:
             here = at_mm(plan, site, site.beyond(sill))
             if _apart(here, shaft):
-                found.append(f"lift {lift} is at {_words(shaft)}, and behind {sill} it would be at {_words(here)}")
+                found.append(Mismatch(lift, sill, here, shaft))
     return found
 
 
@@ -171,7 +186,3 @@ def _pitch(site: WaySite, segment: Segment) -> int:
 
 def _apart(one: Point, other: Point) -> bool:
     return abs(one.x_mm - other.x_mm) > TOLERANCE_MM or abs(one.y_mm - other.y_mm) > TOLERANCE_MM
-
-
-def _words(point: Point) -> str:
-    return f"({point.x_mm}, {point.y_mm}) mm"

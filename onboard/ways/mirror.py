@@ -10,7 +10,7 @@ from onboard.contract.messages import Blocked, Clear, Itinerary, Message, Progre
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect
 from onboard.core.mirror import Mirror
-from onboard.core.serial import reread_us
+from onboard.core.petitions import UNORDERED
 from onboard.core.site import Machine, Segment, Station
 from onboard.core.token_keys import TokenKey, segment_token
 from onboard.ways.blocked_words import BlockedWords
@@ -19,7 +19,7 @@ from onboard.ways.lift_uses import standing_after
 from onboard.ways.lifts import lift_tracks
 from onboard.ways.obstacles import Obstacles
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses, turned_in
-from onboard.ways.passing import BegunItinerary, next_plan
+from onboard.ways.passing import BegunItinerary, next_plan, reread_us
 from onboard.ways.passing_order import PassingOrder
 from onboard.ways.reservations import Reservations
 from onboard.ways.site import WaySite
@@ -217,6 +217,19 @@ class WayFleet(CarFleet):
 
     site: WaySite
     mirror: WayMirror
+
+    def passing_verdict(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """Whether ``requester`` may have a slot now: in the plans' order, as its holder and the requester both see it.
+
+        Without an agreed order it goes to whoever has asked for longest.
+        """
+        claim = self.petitions.claim(key, requester)
+        if claim is None:
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        if claim.itinerary_version == UNORDERED:
+            oldest = self.petitions.is_oldest_unordered(key, requester, now_us)
+            return Reason.NONE if oldest else Reason.TOKEN_NOT_GRANTABLE_YET
+        return self.mirror.order.verdict(requester, slot_of(key), claim.itinerary_version, claim.predecessor)
 
 
 def way_mirror(mirror: Mirror) -> WayMirror:

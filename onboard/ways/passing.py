@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from onboard.contract.messages import Itinerary, Leg
-from onboard.core.serial import from_bus_ms
+from onboard.core.serial import BUS_MS_MODULUS, away, from_bus_ms
 from onboard.ways.occupancy import leg_begins_us
 
 #: Windows told in whole milliseconds may overlap by their rounding; so much is no conflict, us.
@@ -30,6 +30,11 @@ def next_plan(known: BegunItinerary | None, itinerary: Itinerary, now_us: int) -
         if _way(leg) == _way(itinerary.legs[0]):
             return BegunItinerary(itinerary, min(begin_us, from_bus_ms(itinerary.legs[0].end_ms, now_us)))
     return BegunItinerary(itinerary, award_us)
+
+
+def reread_us(time_us: int, near_us: int) -> int:
+    """The time nearest to ``near_us`` that is told on the wire as ``time_us`` is: what was read while a clock lied."""
+    return near_us + away(time_us, near_us, BUS_MS_MODULUS * 1000)
 
 
 def _way(leg: Leg) -> tuple[int, ...]:

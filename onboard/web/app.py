@@ -18,6 +18,8 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from onboard.web.address import is_own_host
+
 #: Snapshots a second that a viewer is sent at most.
 SNAPSHOTS_S = 10
 #: Most viewers at a time, and the longest command, bytes: a page that is left open must not fill the memory.
@@ -31,7 +33,11 @@ _HEADERS = {
     "Content-Security-Policy": _POLICY,
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
+    # The token stands in the address.
+    "Referrer-Policy": "no-referrer",
 }
+#: Why a viewer is cut off (RFC 6455, section 7.4.1): it may not look on, or it has sent what is no text.
+_POLICY_BREACH, _NO_TEXT = 1008, 1003
 
 
 class CommandError(ValueError):
@@ -59,14 +65,19 @@ class Source(Protocol):
         """Let so many seconds of the wall clock pass."""
 
 
-def create_app(source: Source, token: str | None = None) -> Starlette:
-    """The application. With ``token`` every request must bring it, as ``?token=``: for addresses beyond loopback."""
+def create_app(source: Source, token: str, names: frozenset[str] = frozenset()) -> Starlette:
+    """The application. A viewer brings ``token``, as ``?token=``, and asks for this host: see ``is_own_host``.
+
+    On loopback too: other people of this computer, and any page that its browser opens, reach it there.
+    """
     viewers: set[WebSocket] = set()
 
     def is_allowed(given: str | None) -> bool:
-        return token is None or (given is not None and hmac.compare_digest(given, token))
+        return given is not None and hmac.compare_digest(given.encode(), token.encode())
 
     async def page(request: Request) -> Response:
+        if not is_own_host(request.headers.get("host", ""), names):
+            return PlainTextResponse("not a name of this server; open the address that it printed", 421, _HEADERS)
         name = request.path_params.get("name", "index.html")
         if name not in _TYPES:
             return PlainTextResponse("not found", 404, _HEADERS)
@@ -76,8 +87,9 @@ def create_app(source: Source, token: str | None = None) -> Starlette:
         return Response(text, media_type=_TYPES[name], headers=_HEADERS)
 
     async def live(socket: WebSocket) -> None:
-        if not is_allowed(socket.query_params.get("token")) or not _same_origin(socket) or len(viewers) >= MOST_VIEWERS:
-            await socket.close(1008)
+        is_meant = is_own_host(socket.headers.get("host", ""), names) and _same_origin(socket)
+        if not is_meant or not is_allowed(socket.query_params.get("token")) or len(viewers) >= MOST_VIEWERS:
+            await socket.close(_POLICY_BREACH)
             return
         await socket.accept()
         viewers.add(socket)
@@ -101,7 +113,10 @@ async def _serve(socket: WebSocket, source: Source) -> None:
     sending = asyncio.ensure_future(_send(socket, source))
     try:
         while True:
-            text = await socket.receive_text()
+            text = (await _received(socket)).get("text")
+            if text is None:
+                await socket.close(_NO_TEXT)
+                return
             answer = await _obey(text, source)
             # With what has come of it: a source that stands still would not tell by itself.
             await socket.send_text(json.dumps({**answer, "snapshot": source.snapshot()}))
@@ -111,6 +126,14 @@ async def _serve(socket: WebSocket, source: Source) -> None:
         sending.cancel()
         with suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
             await sending
+
+
+async def _received(socket: WebSocket) -> Mapping[str, Any]:
+    """The next frame; one of bytes has no ``text``. Raises ``WebSocketDisconnect``."""
+    frame = await socket.receive()
+    if frame["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect(frame.get("code", 1005))
+    return frame
 
 
 async def _send(socket: WebSocket, source: Source) -> None:
@@ -133,7 +156,7 @@ async def _obey(text: str, source: Source) -> dict[str, Any]:
         name, arguments = order["command"], order.get("arguments", {})
         if not isinstance(name, str) or not isinstance(arguments, dict):
             raise TypeError
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return {"answer": "not a command", "ok": False}
     try:
         return {"answer": await source.command(name, arguments), "ok": True}

@@ -10,12 +10,12 @@ from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Site
+from onboard.io.kept_token import TokenFileError, kept_token
 from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
 from onboard.io.signals import ended_by
 from onboard.systems.contract import codecs_for
 from onboard.trace.readers.open_log import Log, LogOpenError
 from onboard.web.address import DEFAULT_PORT, WebError
-from onboard.web.app import Source
 from onboard.web.film import Film
 from onboard.web.live import LiveSource, LogSource
 from onboard.web.serve import WebServer
@@ -47,7 +47,13 @@ def build_parser() -> argparse.ArgumentParser:
         "--web",
         default=f"127.0.0.1:{DEFAULT_PORT}",
         metavar="[HOST:]PORT",
-        help="where (default: %(default)s); other hosts need the token that is printed",
+        help="where (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--web-token",
+        type=Path,
+        metavar="FILE",
+        help="keep the token of the printed address here, so that it stays (made where missing; default: a new one)",
     )
     add_bus_arguments(parser)
     return parser
@@ -60,18 +66,26 @@ def main(argv: Sequence[str]) -> int:
     if args.log is None and not hasattr(args, "interface"):
         parser.error("name a log, or a bus: -i INTERFACE -c CHANNEL")
     try:
-        site = load_site(args.site)
+        site, token = load_site(args.site), web_token(args.web_token)
         codec = codecs_for(site)
         if args.log is not None:
             with Film(site, codec) as film:
                 _read(film, args.log)
-                return asyncio.run(_show_log(film, args.web))
+                return asyncio.run(_show_log(film, args.web, token))
         settings = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
-        return asyncio.run(_show_bus(site, codec, settings, args.web))
+        return asyncio.run(_show_bus(site, codec, settings, args.web, token))
     except (ConfigError, BusOpenError, LogOpenError, WebError) as error:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"onboard web: {line}", file=sys.stderr)
         return 1 if isinstance(error, BusOpenError) and error.may_come else 2
+
+
+def web_token(path: Path | None) -> str | None:
+    """The token that is kept in a file; None for none. Raises ``WebError``."""
+    try:
+        return None if path is None else kept_token(path)
+    except TokenFileError as error:
+        raise WebError(f"--web-token {error}") from error
 
 
 def _read(film: Film, name: str) -> None:
@@ -87,30 +101,29 @@ def _read(film: Film, name: str) -> None:
             print(f"{name}: {line}", file=sys.stderr)
 
 
-async def _show_log(film: Film, where: str) -> int:
+async def _show_log(film: Film, where: str, token: str | None) -> int:
     source = LogSource(film)
     playing = asyncio.get_running_loop().create_task(source.play())
     try:
-        return await _serve(source, where, None)
+        return await _serve(WebServer(source, where, token), None)
     finally:
         playing.cancel()
 
 
-async def _show_bus(site: Site, codec: Codecs, settings: BusSettings, where: str) -> int:
+async def _show_bus(site: Site, codec: Codecs, settings: BusSettings, where: str, token: str | None) -> int:
     source = LiveSource(site, codec)
     bus = await open_bus(settings)
     bus.subscribe(source.on_frame)
     lost = asyncio.get_running_loop().create_task(bus.wait_lost())
     try:
-        return await _serve(source, where, lost)
+        return await _serve(WebServer(source, where, token), lost)
     finally:
         lost.cancel()
         await bus.close()
 
 
-async def _serve(source: Source, where: str, lost: asyncio.Task[str] | None) -> int:
+async def _serve(server: WebServer, lost: asyncio.Task[str] | None) -> int:
     """Until a signal ends it, or the bus is gone."""
-    server = WebServer(source, where)
     status = 0
 
     def on_lost(task: asyncio.Task[str]) -> None:

@@ -11,6 +11,7 @@ from struct import Struct
 from tempfile import TemporaryFile
 from typing import BinaryIO, NamedTuple, Self
 
+from onboard.contract.runs import singles
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.trace.listener import Listener
@@ -115,7 +116,8 @@ class Film:
         if heard.message is None:
             return False
         if heard.is_fleet:
-            picture.feed(heard.message, raw.time_us)
+            for word in singles(heard.message):
+                picture.feed(word, raw.time_us)
         else:
             picture.feed_device(heard.message.sender, heard.message, raw.time_us)
         return heard.is_fleet

@@ -5,6 +5,7 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+from onboard.contract.runs import singles
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.web.app import CommandError, number
@@ -42,7 +43,8 @@ class LiveSource:
         if message is None:
             return
         if is_fleet:
-            self.picture.feed(message, time_us)
+            for word in singles(message):
+                self.picture.feed(word, time_us)
         else:
             self.picture.feed_device(message.sender, message, time_us)
 

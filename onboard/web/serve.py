@@ -1,7 +1,6 @@
 """Serving the page on a socket of our own, on whatever asyncio loop is running."""
 
 import contextlib
-import ipaddress
 import secrets
 import socket
 from collections.abc import Generator
@@ -21,18 +20,21 @@ class _Server(uvicorn.Server):
 
 
 class WebServer:
-    """The page of one source. ``address`` is what a person opens, with a token where it is not loopback."""
+    """The page of one source. ``address`` is what a person opens, with the token that this server wants."""
 
-    def __init__(self, source: Source, where: str) -> None:
-        """``where`` is PORT or HOST:PORT. Raises ``WebError`` for a bad or a busy address."""
+    def __init__(self, source: Source, where: str, token: str | None = None) -> None:
+        """``where`` is PORT or HOST:PORT; a token is made where none is given.
+
+        Raises ``WebError`` for a bad or a busy address.
+        """
         host, port = parse_address(where)
         self._socket = _listen(host, port)
         self.port: int = self._socket.getsockname()[1]
-        token = None if _is_loopback(host) else secrets.token_urlsafe(16)
+        token = token or secrets.token_urlsafe(16)
         shown = f"[{host}]" if ":" in host else host
-        self.address = f"http://{shown}:{self.port}/" + (f"?token={token}" if token else "")
+        self.address = f"http://{shown}:{self.port}/?token={token}"
         config = uvicorn.Config(
-            create_app(source, token),
+            create_app(source, token, _names(host)),
             lifespan="off",
             log_level="error",
             ws="websockets-sansio",
@@ -71,8 +73,7 @@ def _listen(host: str, port: int) -> socket.socket:
     return found
 
 
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
+def _names(host: str) -> frozenset[str]:
+    """Names under which people reach this server: as it was told, and this computer's own, alone and by mDNS."""
+    own = socket.gethostname().lower()
+    return frozenset({host.lower(), own, f"{own}.local"})

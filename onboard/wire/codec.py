@@ -44,9 +44,11 @@ class Codec:
     def __init__(self, frames: tuple[FrameCode, ...]) -> None:
         """``frames`` are all that are said on the bus, by whomever."""
         self._by_id = {one.identifier: one for one in frames}
+        self._identifiers = {one.name: one.identifier for one in frames}
         self._packs = {one.frame: (one.identifier, one.pack) for one in frames}
         #: Messages of one frame; all others are put together of several.
         self.wholes = frozenset(one.frame for one in frames if not issubclass(one.frame, SetFrame))
+        self._wholes = {one.identifier: (one.length, one.unpack) for one in frames if one.frame in self.wholes}
         #: Which kinds of machine may say what on the bus, by the DBC.
         self.speakers = speakers_of(frames)
         #: A whole message, a part of a set (``SetFrame``), or why the frame is none.
@@ -75,9 +77,19 @@ class Codec:
     # --- in ----------------------------------------------------------------------------------------------------
 
     def whole(self, arbitration_id: int, data: bytes) -> Message | None:
-        """The message of a classic data frame with a 29-bit identifier; None for a part of a set and what is none."""
-        found = self.decode_part(Frame(arbitration_id, data))
-        return found if isinstance(found, Message) and type(found) in self.wholes else None
+        """The message of a classic data frame with a 29-bit identifier; None for a part of a set and what is none.
+
+        Nothing is remembered: of a log each frame has one reader, who does that better.
+        """
+        sender = arbitration_id & _NODE_MASK
+        found = self._wholes.get(arbitration_id - sender)
+        if found is None or not sender or len(data) < found[0]:
+            return None
+        return found[1](sender, data)
+
+    def identifier_of(self, name: str) -> int:
+        """The identifier of a message by its DBC name, node-ID 0. Raises ``KeyError`` for a message of another bus."""
+        return self._identifiers[name]
 
     def name_of(self, frame: Frame) -> str | None:
         """The DBC name of a frame's message, or None."""
@@ -101,14 +113,16 @@ class Codec:
 def _parts_of_call(call: CallForProposals) -> tuple[Message, ...]:
     sender, number = call.sender, call.call
     operation = (call.operation, call.kind, call.criterion)
-    parts = (
+    call_and_terms = (
         Call(sender, number, call.task, *operation, call.attempt, call.depth, call.part),
         CallTerms(sender, number, call.deadline_ms, call.from_station),
-        CallLoad(sender, number, call.to_station, call.car, _wheelbase_mm(call)),
     )
-    if not call.depth:
-        return parts
-    return (*parts, CallParent(sender, number, call.parent, call.ready_ms, call.hold_ms))
+    load = CallLoad(sender, number, call.to_station, call.car, _wheelbase_mm(call))
+    if not call.depth and not call.ready_ms:
+        return (*call_and_terms, load)
+    parent = CallParent(sender, number, call.parent, call.ready_ms, call.hold_ms)
+    # A call of its own is whole with its load: what tells when it can begin comes before that.
+    return (*call_and_terms, load, parent) if call.depth else (*call_and_terms, parent, load)
 
 
 def _parts_of_itinerary(itinerary: Itinerary) -> tuple[Message, ...]:

@@ -172,16 +172,32 @@ def system_layouts(system: str) -> tuple[tuple[MessageLayout, ...], tuple[Messag
     return tuple(one for one in layouts if one not in device), device
 
 
+#: A signal or message of more bits or bytes than five digits write: the longest transport of J1939 has 14,280 bits, and
+#: cantools lays each bit out.
+_TOO_WIDE = re.compile(r"^[ \t]*SG_[^:\n]*:[ \t]*(?:\d{6,}\||\d+\|\d{6,})|^BO_[^:\n]*:[ \t]*\d{5,}", re.MULTILINE)
+#: Words of signals that are remembered, some 150 bytes each.
+_TOLD_KEPT = 1 << 16
+
+
 class AnyDbcError(ValueError):
     """A text that is no DBC; one line."""
 
 
 class Decoded(NamedTuple):
-    """A frame by a DBC: the message's name, its length in bytes, and signals as (name, value with its unit)."""
+    """A frame by a DBC: the message's name, its length in bytes, and in words the signals with their units."""
 
     name: str
     length: int
-    signals: tuple[tuple[str, str], ...]
+    text: str
+
+
+class _Cut(NamedTuple):
+    """A signal of whole numbers: its bits in the big-endian or little-endian number of the message's bytes."""
+
+    number: int
+    is_big: bool
+    shift: int
+    mask: int
 
 
 class AnyDbc:
@@ -198,26 +214,69 @@ class AnyDbc:
             at = first.start() if first is not None else len(text)
             # In the format's order: what is there already stays where it is only if the other follows it.
             text = text[:at] + "".join(f"{section}:\n\n" for section in missing) + text[at:]
+        if (wide := _TOO_WIDE.search(text)) is not None:
+            raise AnyDbcError(f"line {text.count(chr(10), 0, wide.start()) + 1}: wider than any frame")
         try:
             database = load_string(text, database_format="dbc", strict=False)
         except Exception as error:  # cantools and its parser have a dozen errors of their own for a bad text
             raise AnyDbcError(" ".join(str(error).split())[:200]) from error
         assert isinstance(database, Database)
         self._messages = {(one.frame_id, one.is_extended_frame): one for one in database.messages}
+        self._signals: list[DbcSignal] = []
+        #: By identifier, of messages that always have the same signals.
+        self._cuts = {key: self._cuts_of(one) for key, one in self._messages.items()}
+        #: Words by a signal's number here and its bits.
+        self._told: dict[tuple[int, int], str] = {}
 
     def decode(self, can_id: int, data: bytes, *, is_extended: bool) -> Decoded | None:
         """The frame in words, or None for an identifier that the DBC has not. A short frame gives what it holds."""
         message = self._messages.get((can_id, is_extended))
         if message is None:
             return None
+        cuts = self._cuts[can_id, is_extended]
+        if cuts is not None and len(data) >= message.length:
+            return Decoded(message.name, message.length, self._cut(cuts, data[: message.length]))
         units = {signal.name: signal.unit or "" for signal in message.signals}
         try:
             values = message.decode(data, allow_truncated=True)
         except (DecodeError, ValueError, KeyError):
-            return Decoded(message.name, message.length, (("data", data.hex().upper() or "none"),))
+            return Decoded(message.name, message.length, f"data {data.hex().upper() or 'none'}")
         assert isinstance(values, dict)
-        signals = tuple((name, _told(value, units.get(name, ""))) for name, value in values.items())
-        return Decoded(message.name, message.length, signals)
+        text = ", ".join(f"{name} {_told(value, units.get(name, ''))}" for name, value in values.items())
+        return Decoded(message.name, message.length, text)
+
+    def _cut(self, cuts: list[_Cut], data: bytes) -> str:
+        told = self._told
+        little, big = int.from_bytes(data, "little"), int.from_bytes(data, "big")
+        raws = [(number, (big if is_big else little) >> shift & mask) for number, is_big, shift, mask in cuts]
+        return ", ".join([told.get(raw) or self._tell(*raw) for raw in raws])
+
+    def _tell(self, number: int, raw: int) -> str:
+        signal = self._signals[number]
+        half = 1 << signal.length - 1
+        value = signal.conversion.raw_to_scaled((raw ^ half) - half if signal.is_signed else raw, decode_choices=True)
+        text = f"{signal.name} {_told(value, signal.unit or '')}"
+        if len(self._told) >= _TOLD_KEPT:
+            self._told.clear()
+        self._told[number, raw] = text
+        return text
+
+    def _cuts_of(self, message: DbcMessage) -> list[_Cut] | None:
+        """None where signals depend on others, are no whole numbers, or do not lie in the message: cantools judges."""
+        bits = 8 * message.length
+        cuts: list[_Cut] = []
+        for signal in message.signals:
+            is_big = signal.byte_order == "big_endian"
+            # Of a big-endian signal the DBC names the highest bit, counted from the lowest of each byte.
+            first = 8 * (signal.start // 8) + 7 - signal.start % 8 if is_big else signal.start
+            if message.is_multiplexed() or signal.is_float or not 0 < signal.length <= bits - first:
+                return None
+            shift = bits - first - signal.length if is_big else first
+            cuts.append(_Cut(len(self._signals) + len(cuts), is_big, shift, (1 << signal.length) - 1))
+        if len({signal.name for signal in message.signals}) < len(cuts):
+            return None
+        self._signals += message.signals
+        return cuts
 
 
 def _told(value: object, unit: str) -> str:

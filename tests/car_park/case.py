@@ -21,6 +21,10 @@ CASE = Case(
     parties=None,
     shown_elsewhere=frozenset(bug.finds for bug in BUGS.values()),
     idle=frozenset(RULES),
-    words=(["park car IOC1/1", "IOC1 to anywhere"], ["takes the car at IOC1"], ["token p(2,2)", "car IOC1/1"]),
+    words=(
+        ["park car IOC1/1", "IOC1 to anywhere"],
+        ["takes the car at IOC1"],
+        ["tokens p(1,1) to p(1,4)", "car IOC1/1"],
+    ),
     drawn=["p(1,5)", "lift ER1", "MR1", "MR2"],
 )

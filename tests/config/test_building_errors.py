@@ -225,6 +225,17 @@ ONE_MISTAKE = {
         's.toml:16: lifts[0].doors = ["p(1,B,9)", "p(2,14)"]: the alleys there lie across each other, and a lift '
         "does not turn; choose doors of alleys in one direction",
     ),
+    "doors beside one alley that do not lie above each other": (
+        'doors = ["p(*,2)N"]',
+        'doors = ["p(1,2)N", "p(2,3)N"]',
+        's.toml:21: lifts[1].doors = ["p(1,2)N", "p(2,3)N"]: not one above the other: that of floor 2 is off by '
+        "2400 mm along and 0 mm across; change doors, the lengths of alleys, or lobby_mm, or leave the floor out",
+    ),
+    "lobby of no length, at a lift whose floors are mistaken": (
+        'doors = ["p(*,2)N"]',
+        'doors = ["p(*,2)N"]\nlobby_mm = 2_500\nfloors = [2, 1]',
+        "s.toml:23: lifts[1].floors = [2, 1]: not from the lowest to the highest; write [1, 2]",
+    ),
     "lift to one floor": (
         'doors = ["p(*,2)N"]',
         'doors = ["p(*,2)N"]\nfloors = [1]',
@@ -271,6 +282,18 @@ ONE_MISTAKE = {
         'places = ["p(2,*,*)"]',
         'places = ["p(3,*)"]',
         's.toml:42: classes[0].places[0] = "p(3,*)": no such place; floors here: 1 to 2, positions 1 to 14',
+    ),
+    "class of a place where a compartment is": (
+        'places = ["p(2,*,*)"]',
+        'places = ["p(2,*,*)", "p(1,5)N"]',
+        's.toml:42: classes[0].places[1] = "p(1,5)N": compartments[0] is there; name other places, or take it '
+        "out of the list",
+    ),
+    "class of a place that is left out": (
+        'positions = 14\n\n[[alleys]]\nname = "B"\nfrom = "p(*,7)"\npositions = 9\n',
+        'positions = 14\nwithout = ["p(2,*,*)"]\n\n[[alleys]]\nname = "B"\nfrom = "p(*,7)"\npositions = 9\n',
+        's.toml:43: classes[0].places[0] = "p(2,*,*)": left out by floors.without; name other places, or take it '
+        "out of the list",
     ),
     "class of cars that do not come in": (
         "max_length_mm = 4_300",
@@ -344,6 +367,59 @@ def test_several_mistakes_are_told_at_once() -> None:
     text = BRANCHED.replace('from = "p(*,7)"', 'from = "p(*,70)"').replace('use = "entry"', 'use = "in"')
     text = text.replace("length = 2", "length = 0").replace('places = ["p(2,*,*)"]', 'places = ["p(9,*)"]')
     assert [line.split(":")[1] for line in problems_of(text)] == ["10", "25", "31", "42"]
+
+
+def test_an_alley_that_is_mistaken_hides_only_what_is_said_of_it() -> None:
+    """What names alley B is not judged, neither are tracks by number; all else is."""
+    text = BRANCHED.replace("positions = 9", "positions = 900").replace('at = "p(1,5)"', 'at = "p(1,55)"')
+    text = text.replace('doors = ["p(*,2)N"]', 'doors = ["p(*,22)N"]').replace('at = "p(*,12)"', 'at = "p(*,32)"')
+    text = text.replace('places = ["p(2,*,*)"]', 'places = ["p(2,B,77)", "p(9,*)"]')
+    assert [line.split(":")[1] for line in problems_of(text)] == ["11", "21", "24", "30", "42"]
+
+
+def test_what_is_proved_of_the_whole_is_told_beside_mistakes_that_say_nothing_of_the_ways() -> None:
+    text = BRANCHED.replace("positions = 9", 'positions = 9\none_way = "rising"')
+    text = text.replace("max_length_mm = 4_300", "max_length_mm = 43")
+    text += '[[robots]]\nname = "MR2"\nnode = 12\nhome = "p(1,7)"\n[timing]\ncall_window_ms = 1\n'
+    assert [line.split(":")[1] for line in problems_of(text)] == ["4", "42", "52", "54"]
+
+
+STRAIGHT = """\
+[site]
+name = "straight"
+[floors]
+count = 2
+positions = 12
+[[lifts]]
+name = "L"
+node = 5
+end = "left"
+[[lifts]]
+name = "R"
+node = 6
+end = "right"
+[[compartments]]
+name = "A"
+node = 1
+at = "p(1,4)"
+[[robots]]
+name = "MR1"
+node = 11
+home = "p(2,10)"
+"""
+
+
+def test_one_alley_a_floor_is_proved_too() -> None:
+    parse_site(STRAIGHT, "s.toml")
+    remedy = "join its alley by a lift or another end, or turn one_way"
+    assert problems_of(STRAIGHT.replace("positions = 12", 'positions = 12\none_way = "rising"')) == [
+        f"s.toml:3: floors: no way from an entry to p(1,1)N, p(1,2)N, p(1,3)N and 27 more; {remedy}",
+        f"s.toml:3: floors: no way to an exit from p(1,5)N, p(1,6)N, p(1,7)N and 13 more; {remedy}",
+    ]
+    assert problems_of(STRAIGHT.replace("positions = 12", "positions = 12\n2.positions = 11")) == [
+        's.toml:14: lifts[1].end = "right": not one above the other: that of floor 2 is off by '
+        "2400 mm along and 0 mm across; change doors, the lengths of alleys, or lobby_mm, or leave the floor out"
+    ]
 
 
 @pytest.mark.parametrize("name", layout_names())

@@ -57,10 +57,6 @@ REFUSED = {
         text_of(4, ["p(2,2)", "p(3,2)", "p(4,2)"], lifts=CHAIN),
         f"s.toml:6: robots: 3 robots, but refuges for 2 (floors 2, 4); {REMEDY}",
     ),
-    "nowhere to stand but on the street": (
-        text_of(2, ["p(1,2)"]).replace("positions = 10", "positions = 10, 2 = {positions = 2}"),
-        f"s.toml:6: robots: 1 robot, but no refuge; {REMEDY}",
-    ),
     "home on the street": (
         text_of(3, ["p(1,2)", "p(3,2)"]),
         f's.toml:6: robots[0].home = "p(1,2)": the alley of floor 1 {NEEDED}; choose one of: floor 2',
@@ -83,6 +79,15 @@ REFUSED = {
 @pytest.mark.parametrize(("text", "line"), REFUSED.values(), ids=REFUSED.keys())
 def test_too_little_room_gives_one_line(text: str, line: str) -> None:
     assert problems_of(text) == [line]
+
+
+def test_nowhere_to_stand_is_told_beside_a_home_that_is_none() -> None:
+    text = text_of(2, ["p(1,2)"], at="p(1,1)").replace("positions = 10", "positions = 2")
+    assert problems_of(text) == [
+        's.toml:6: robots[0].home = "p(1,2)": the sill of lifts[1] is there; choose a segment where a robot may stand '
+        "for ever",
+        f"s.toml:6: robots: 1 robot, but no refuge; {REMEDY}",
+    ]
 
 
 ROOM = {

@@ -67,12 +67,12 @@ def test_gaps_by_place_by_position_and_on_all_floors() -> None:
 
 
 def test_a_floor_may_have_a_length_and_sides_of_its_own() -> None:
-    site = car_park(
-        parse_site(changed("positions = 8\n", 'positions = 8\n[floors.2]\npositions = 6\nsides = ["near"]\n'), "s.toml")
-    )
-    assert [site.tracks[1].length, site.tracks[2].length] == [8, 6]
-    assert site.tracks[129].joins == (Segment(1, 8), Segment(2, 6))
-    assert {str(place) for place in site.places if place.track == 2} == {f"p(2,{index})N" for index in range(1, 7)}
+    text = changed("count = 2\npositions = 8\n", "count = 3\npositions = 8\n3.positions = 6\n3.sides = ['near']\n")
+    text = changed('end = "right"', 'end = "right"\nfloors = [1, 2]', text)
+    site = car_park(parse_site(text, "s.toml"))
+    assert [site.tracks[1].length, site.tracks[3].length] == [8, 6]
+    assert site.tracks[129].joins == (Segment(1, 8), Segment(2, 8))
+    assert {str(place) for place in site.places if place.track == 3} == {f"p(3,{index})N" for index in range(1, 7)}
 
 
 def test_defaults_of_speeds_lengths_and_times() -> None:

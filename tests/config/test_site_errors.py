@@ -55,8 +55,8 @@ ONE_MISTAKE = {
     ),
     "home of two robots": (
         'home = "p(2,3)"',
-        'home = "p(1,2)"\n[[robots]]\nname = "MR2"\nnode = 12\nhome = "p(1, 2)"',
-        's.toml:33: robots[1].home = "p(1, 2)": home of robots[0] already; give each robot a segment of its own',
+        'home = "p(2,3)"\n[[robots]]\nname = "MR2"\nnode = 12\nhome = "p(2, 3)"',
+        's.toml:33: robots[1].home = "p(2, 3)": home of robots[0] already; give each robot a segment of its own',
     ),
     "spur where a compartment is": (
         'at = "p(2,5)"',

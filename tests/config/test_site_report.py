@@ -60,5 +60,6 @@ def test_what_is_stranded_and_what_is_hidden_are_told_apart() -> None:
 
 
 def test_floors_of_different_lengths() -> None:
-    text = changed("positions = 8\n", "positions = 8\n[floors.2]\npositions = 6\n")
-    assert site_report(parse_site(text, "s.toml"))[0] == "floors: 2 of 6 to 8 positions, 1 spur"
+    text = changed("count = 2\npositions = 8\n", "count = 3\npositions = 8\n3.positions = 6\n")
+    text = changed('end = "right"', 'end = "right"\nfloors = [1, 2]', text)
+    assert site_report(parse_site(text, "s.toml"))[0] == "floors: 3 of 6 to 8 positions, 1 spur"

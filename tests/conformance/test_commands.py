@@ -18,6 +18,7 @@ from bus_sim.faults.arm import ACTIONS
 from bus_sim.faults.bus import FRAME_FAULTS
 from bus_sim.faults.table import KINDS
 from bus_sim.options import RunOptions
+from bus_sim.outside import Served
 from bus_sim.processes.plan import ProcessPlan
 from bus_sim.run import FLEET, BusRun
 from bus_sim.sites import site_text
@@ -135,8 +136,8 @@ def test_it_is_published(system: str, run: Callable[..., str], monkeypatch: pyte
     published = []
 
     class Published:
-        def __init__(self, site: object, text: str, url: str, served: tuple[str, int], _: object) -> None:
-            published.append((getattr(site, "system", ""), "[" in text, url, served[0]))
+        def __init__(self, site: object, text: str, url: str, served: Served, _: object) -> None:
+            published.append((getattr(site, "system", ""), "[" in text, url, served.host))
 
         async def __aenter__(self) -> None:
             """As if it had started."""

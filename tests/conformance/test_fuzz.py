@@ -3,11 +3,14 @@
 A minute at most here; a million frames a machine with ``python -m bench.fuzz``.
 """
 
+from functools import cache
+
 import pytest
 
-from bus_sim.campaign.fuzz import Fuzzer
+from bus_sim.campaign.fuzz import Corpus, Fuzzer, record
 from bus_sim.sites import find_site
 from onboard.contract.codes import Reason
+from onboard.core.site import Site
 from tests.conformance.cases import CASES
 from tests.conformance.runs import one_of_each_kind, site_of
 from tests.thinned import is_long
@@ -19,10 +22,24 @@ SYSTEM_FRAMES = 8_000 if is_long() else 4_000
 MOST_ITEMS = 40_000
 
 
+@cache
+def said_on(name: str) -> Corpus:
+    """What all machines of a site are fed with."""
+    return record(site_called(name))
+
+
+def site_called(name: str) -> Site:
+    return find_site(name) if name == "small" else site_of(name)
+
+
+def fuzzer(name: str, machine: str) -> Fuzzer:
+    site = site_called(name)
+    return Fuzzer(site, site.machine(machine), corpus=said_on(name))
+
+
 @pytest.mark.parametrize("name", ["IOC1", "ER1", "MR1"])
 def test_a_controller_survives_whatever_the_wire_brings(name: str) -> None:
-    site = find_site("small")
-    outcome = Fuzzer(site, site.machine(name)).run(FRAMES)
+    outcome = fuzzer("small", name).run(FRAMES)
     assert outcome.errors == []
     assert outcome.uncounted == []
     assert max(outcome.sizes) < MOST_ITEMS
@@ -36,8 +53,7 @@ MACHINES = [(name, machine) for name in CASES if name != "car-park" for machine 
 
 @pytest.mark.parametrize(("name", "machine"), MACHINES)
 def test_a_machine_of_any_system_survives_it_too(name: str, machine: str) -> None:
-    site = site_of(name)
-    outcome = Fuzzer(site, site.machine(machine)).run(SYSTEM_FRAMES)
+    outcome = fuzzer(name, machine).run(SYSTEM_FRAMES)
     assert outcome.errors == []
     assert outcome.uncounted == []
     assert max(outcome.sizes) < MOST_ITEMS
@@ -46,22 +62,22 @@ def test_a_machine_of_any_system_survives_it_too(name: str, machine: str) -> Non
 
 
 def test_a_drop_that_nobody_counts_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    fuzzer = Fuzzer(find_site("small"), find_site("small").machine("MR1"))
+    one = fuzzer("small", "MR1")
     monkeypatch.setattr("onboard.wire.decoder.Decoder.feed", lambda *_: None)
-    assert fuzzer.run(500).uncounted
+    assert one.run(500).uncounted
 
 
 def test_an_exception_in_a_controller_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    fuzzer = Fuzzer(find_site("small"), find_site("small").machine("MR1"))
+    one = fuzzer("small", "MR1")
 
     def fall(*_: object) -> bool:
         raise RuntimeError("planted")
 
     monkeypatch.setattr("onboard.ways.car_words.CarWords.hear", fall)
-    assert "RuntimeError: planted" in fuzzer.run(2_000).errors
+    assert "RuntimeError: planted" in one.run(2_000).errors
 
 
 def test_a_controller_that_wakes_for_ever_at_one_moment_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    fuzzer = Fuzzer(find_site("small"), find_site("small").machine("MR1"))
+    one = fuzzer("small", "MR1")
     monkeypatch.setattr("onboard.systems.car_park.robot.ParkingRobot.next_wake", lambda _: 0)
-    assert any("wakes do not come to rest" in one for one in fuzzer.run(500).errors)
+    assert any("wakes do not come to rest" in error for error in one.run(500).errors)

@@ -16,6 +16,8 @@ from tests.conformance.runs import log_of, site_file
 #: Runs in which machines come back, clocks drift and frames are lost; of each system, and of what its traffic is like.
 STRUCK = {
     "car-park": ("--fault", "crash:target=MR1,at_s=40,restart_s=5", "--fault", "omission:probability=0.02"),
+    # Its parts are polished after 62 s; one whose only word of it is lost would be waited for until the run's own end.
+    "polishing": ("--fault", "omission:probability=0.02", "--for", "90"),
 }
 
 

@@ -1,10 +1,11 @@
 """A machine that is due again at once, whatever is done, halts with a reason and ends a simulated run by its name."""
 
+import signal
 from pathlib import Path
 
 import pytest
 
-from bus_sim.campaign.limits import wall_limit
+from bus_sim.campaign.limits import WallLimitError, wall_limit
 from bus_sim.campaign.report import FAILURES, RunVerdict
 from bus_sim.campaign.trial import play
 from bus_sim.cli import main
@@ -79,6 +80,18 @@ def test_a_decision_that_never_ends_is_torn_out(monkeypatch: pytest.MonkeyPatch)
 def test_a_limit_that_is_kept_leaves_no_alarm_behind() -> None:
     with wall_limit(1000.0):
         pass
+
+
+def test_a_limit_that_is_over_before_anything_is_done_leaves_none_either() -> None:
+    """It was set outside of what takes it away, and fell into whatever came five seconds later."""
+
+    def for_ever() -> None:
+        while True:
+            pass
+
+    with pytest.raises(WallLimitError), wall_limit(1e-6):
+        for_ever()
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 
 
 def test_timers_at_one_moment_for_ever_end_the_loop_with_a_name() -> None:

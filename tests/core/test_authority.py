@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from onboard.contract.codes import Reason, TokenKind
+from onboard.contract.constants import MAX_VERSION
 from onboard.contract.messages import (
     Message,
     TokenDispute,
@@ -17,7 +18,7 @@ from onboard.contract.messages import (
     TokenRequest,
     TokenSeen,
 )
-from onboard.core.authority import MAX_VERSION, TokenBook, TokenKey, segment_token
+from onboard.core.authority import TokenBook, TokenKey, segment_token
 from onboard.core.effects import Effect, Record, Report
 from onboard.core.motion_authority import MotionAuthority, authorised
 from onboard.core.site import Segment

@@ -14,11 +14,13 @@ import pytest
 
 from bus_sim.cli import build_parser, main
 from bus_sim.demand import DemandError
+from bus_sim.sites import find_site
 from bus_sim.systems.car_park.csv_rows import MOST_NAMED
-from bus_sim.systems.car_park.day import asked_day, choose_demand
+from bus_sim.systems.car_park.day import asked_day, brought_in, choose_demand
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.window import EVE_US, MINUTE_US, busiest_hour, with_eve
 from onboard.config.problems import ConfigError
+from onboard.systems.car_park.site import car_park
 
 SHAPES = {
     "offsets": (
@@ -271,6 +273,9 @@ def test_who_has_no_arrival_is_inside_at_the_start_and_who_has_no_departure_stay
     ]
     assert [stay.departure_us for stay in played.stays[:2]] == [7 * 60 * MINUTE_US, 6 * 60 * MINUTE_US]
     assert busiest_hour(recorded).begin_us == (4 * 60 + 1) * MINUTE_US
+    # A compartment for exit brings nobody in.
+    (told,) = brought_in(asked(tmp_path, text, "--day", "2019-07-24"), car_park(find_site("sizes"))).remarks
+    assert told == "1 car is inside at the start, brought in before it, one in 180 s"
 
 
 COUNTS = "Stunde;ein;aus\n2019-07-24 07:00;5;8\n2019-07-24 08:00;6;2\n2019-07-25 07:00;0;1\n"

@@ -49,8 +49,8 @@ def test_all_mistakes_are_told_with_their_lines(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (None, "cannot be read as UTF-8 text"),
-        ("[scenario", "is no TOML"),
+        (None, "does not exist; name an existing scenario file"),
+        ("[scenario", "not TOML: "),
         ("seed = 1\n", "scenario.site: is missing"),
         ('[scenario]\nsite = "small"\n[[fault]]\nkind = "pause"\ntarget = "MR7"\nat_s = 1\n', "no such machine"),
         ('[scenario]\nsite = "small"\n[fault]\nkind = "pause"\n', "write [[fault]] for each"),

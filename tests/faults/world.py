@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 
 from bus_sim.faults.arm import arm
 from bus_sim.faults.bus import frame_faults
@@ -41,8 +42,15 @@ def watch(
     leave_s: float | None = None,
     look: tuple[float, Callable[[Simulation], object]] | None = None,
 ) -> Seen:
-    """Run for so long; ``look`` is a time in s and what to note then."""
+    """Run for so long; ``look`` is a time in s and what to note then. What nothing strikes is played once for all."""
+    if not faults and look is None:
+        return _undisturbed(seconds, cars, leave_s)
     return run(_watch(faults, seconds, cars, leave_s, look))
+
+
+@cache
+def _undisturbed(seconds: float, cars: int, leave_s: float | None) -> Seen:
+    return run(_watch((), seconds, cars, leave_s, None))
 
 
 async def _watch(

@@ -37,7 +37,7 @@ async def play(directory: Path) -> tuple[int | None, str]:
     server = SocketcandServer(simulation.join, lambda time_us: time_us, port=0)
     port = await server.start()
     (directory / "site.toml").write_text(text)
-    (directory / "MR1.toml").write_text(machine_file("MR1", "127.0.0.1", port))
+    (directory / "MR1.toml").write_text(machine_file("MR1", {"host": "127.0.0.1", "port": port}))
     walk = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "hil", "commission", "--machine", "MR1.toml"),
         cwd=directory,
@@ -88,7 +88,7 @@ def test_mistakes_are_one_line_and_status_2(tmp_path: Path, capsys: Capture) -> 
     assert main(["commission", "--machine", str(tmp_path / "none.toml")]) == 2
     assert "does not exist; name an existing machine file" in capsys.readouterr().err
     (tmp_path / "site.toml").write_text((BENCHES / "bench.toml").read_text())
-    (tmp_path / "MR1.toml").write_text(machine_file("MR1", "127.0.0.1", 1))
+    (tmp_path / "MR1.toml").write_text(machine_file("MR1", {"host": "127.0.0.1", "port": 1}))
     assert main(["commission", "--machine", str(tmp_path / "MR1.toml")]) == 2
     assert "is the server running" in capsys.readouterr().err
     assert main([]) == 2

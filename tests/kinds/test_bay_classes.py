@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from onboard.contract.codes import DeskInput, DeskText, DoorPosition, LightColour
+from onboard.contract.codes import DeskInput, DeskText, DoorPosition, LightColour, OperatorAction
 from onboard.contract.messages import (
     BayState,
     CallForProposals,
@@ -14,6 +14,7 @@ from onboard.contract.messages import (
     DeskOrder,
     DoorState,
     Message,
+    OperatorOrder,
     Reference,
 )
 from onboard.core.effects import Effect, Record, Send, Tell
@@ -133,6 +134,26 @@ def test_full_is_full_for_the_class_and_who_charges_is_told_that_it_is_that() ->
         bay = bay_with(car)
         fill(bay, 3)
         assert told(press(bay, DeskInput.CHARGING_KEY)) == [DeskText.NO_CHARGING]
+
+
+@pytest.mark.parametrize(
+    ("actions", "end"),
+    [
+        ([OperatorAction.PRESS_KEY], open_end(2)),
+        ([OperatorAction.CHARGING_KEY], open_end(3)),
+        ([OperatorAction.PRESS_KEY, OperatorAction.CHARGING_KEY], open_end(3)),
+        ([OperatorAction.CHARGING_KEY, OperatorAction.PRESS_KEY], open_end(2)),
+    ],
+    ids=["plain", "to charge", "to charge after all", "not to charge after all"],
+)
+def test_both_keys_can_be_pressed_from_afar_and_the_last_one_counts(actions: list[OperatorAction], end: int) -> None:
+    bay, effects = bay_with(NORMAL_CAR), list[Effect]()
+    bay.sense(DoorState(BAY, DoorPosition.CLOSING, DoorPosition.LOCKED, LightColour.GREEN), 22)
+    for action in actions:
+        effects += bay.receive(OperatorOrder(251, BAY, action, Reference(0, 0)), 25)
+    effects += bay.sense(DoorState(BAY, DoorPosition.OPEN, DoorPosition.LOCKED, LightColour.GREEN), 30)
+    assert told(effects) == [DeskText.TAKE_TICKET]
+    assert called(effects) == [end]
 
 
 def test_who_charges_where_one_cannot_is_told_so() -> None:

@@ -6,6 +6,7 @@ words in their order, and most counterexamples do with those that the crash itse
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from bus_sim.campaign.trial import stage_of
@@ -16,9 +17,12 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from tests.models.engine import Engine, State
+from tests.models.gate import LIFT
 
 #: One car, parked and fetched: who it is by the nodes of `tests.sites.one_floor`, as here.
 SCENE = FaultScenario("level1", 1, 1_200.0, Arrivals(1, 60.0, 20.0, 100.0))
+#: The same where a lift is needed, by its nodes and those of `tests.models.gate`.
+LIFT_SCENE = replace(SCENE, site="small")
 #: The power is back before anybody takes the machine for lost, s: so it is where no while passes.
 RESTART_S = 1.0
 #: By these lines of one kind are told apart.
@@ -27,13 +31,16 @@ _TELLING = ("record", "operation", "kind", "handling", "phase")
 
 def as_scenario(engine: Engine, state: State) -> FaultScenario:
     """The crashes on the way to a state. Raises ``ValueError`` where one of them is not at a line of a journal."""
-    return SCENE.with_faults(_crash(node, line, durable=durable) for node, line, durable in engine.crashes(state))
+    scene = LIFT_SCENE if LIFT in engine.nodes else SCENE
+    return scene.with_faults(
+        _crash(scene, node, line, durable=durable) for node, line, durable in engine.crashes(state)
+    )
 
 
-def _crash(node: int, line: Mapping[str, Any], *, durable: bool) -> Injection:
-    site = find_site(SCENE.site)
+def _crash(scene: FaultScenario, node: int, line: Mapping[str, Any], *, durable: bool) -> Injection:
+    site = find_site(scene.site)
     told = {key: line[key] for key in _TELLING if key in line}
-    written = _written(node)
+    written = _written(scene, node)
     alike = [number for number, entry in enumerate(written, start=1) if told.items() <= entry.items()]
     if not alike:
         raise ValueError(f"the scene's node {node} writes no line with {told}")
@@ -41,14 +48,14 @@ def _crash(node: int, line: Mapping[str, Any], *, durable: bool) -> Injection:
     return Injection("crash", {"target": site.machines[node].name, "at_s": 0, **settings})
 
 
-def _written(node: int) -> list[Mapping[str, Any]]:
+def _written(scene: FaultScenario, node: int) -> list[Mapping[str, Any]]:
     """What a machine writes in the scene without any fault."""
     loop = VirtualTimeLoop()
-    stage = stage_of(find_site(SCENE.site), SCENE, loop)
+    stage = stage_of(find_site(scene.site), scene, loop)
 
     async def play() -> None:
         stage.run.start()
-        await run_until(stage.run, lambda: stage.is_over, round(SCENE.limit_s * 1e6), 1_000_000)
+        await run_until(stage.run, lambda: stage.is_over, round(scene.limit_s * 1e6), 1_000_000)
         stage.run.close()
 
     run_on(loop, play())

@@ -73,6 +73,10 @@ class Body:
         """What its sensors say when an order is carried out."""
         return []
 
+    def meets(self, event: Any) -> list[Message]:
+        """What its sensors say where it goes on by itself, or they see something."""
+        return []
+
     @property
     def state(self) -> Any:
         """All that it remembers, to compare."""
@@ -157,6 +161,13 @@ class AtWork:
                 mirror.admit(node, NOW_US)
         effects = tokens.wake(NOW_US) + self.rights.serve_petitions(NOW_US)
         return self._deeds(effects + self._negotiated(self.fleet.negotiation.wake(NOW_US)))
+
+    def meets(self, event: Any) -> list[Deed]:
+        """Its body goes on by itself, or its sensors see something."""
+        effects: list[Effect] = []
+        for state in self.body.meets(event):
+            effects += self.behaviour.sense(state, NOW_US)
+        return [Moved(self.body.state), *self._deeds(effects)]
 
     def hears(self, word: Message) -> list[Deed]:
         """A word of another machine."""

@@ -10,7 +10,7 @@ worked out once, in its shipped code, and remembered by what decides it (``snaps
 
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
@@ -42,6 +42,19 @@ class State(NamedTuple):
     crashes: int
 
 
+class Explored(Protocol):
+    """One machine that words and time drive; each method returns what it does in order."""
+
+    def starts(self) -> list[Deed]:
+        """Power-up."""
+
+    def hears(self, word: Message) -> list[Deed]:
+        """A word of another machine."""
+
+    def waits(self, down: Iterable[int]) -> list[Deed]:
+        """A while has passed; who is ``down`` has been silent for long."""
+
+
 class Part(Protocol):
     """What is explored: which machines, how they begin, what must not be, and what is to come about."""
 
@@ -57,16 +70,16 @@ class Part(Protocol):
     def body(self, node: int) -> Any:
         """How its body stands at first."""
 
-    def made(self, node: int, journal: tuple[Entry, ...], body: Any) -> AtWork:
+    def made(self, node: int, journal: tuple[Entry, ...], body: Any) -> Any:
         """The machine, at power-up."""
 
     def hears(self, node: int, word: Message) -> bool:
         """Whether a word is anything to a machine: what it is deaf to is lost for it."""
 
-    def is_within(self, machine: AtWork) -> bool:
+    def is_within(self, machine: Any) -> bool:
         """Whether what comes after is explored still: where numbers only grow, it ends somewhere."""
 
-    def view(self, machine: AtWork) -> Any:
+    def view(self, machine: Any) -> Any:
         """What ``wrong`` and ``is_over`` look at of one machine that is up."""
 
     def wrong(self, views: tuple[Any, ...]) -> str:
@@ -114,7 +127,7 @@ class Engine:
     found: Found = field(default_factory=Found)
     came_from: dict[State, tuple[State, Step]] = field(default_factory=dict)
     _minds: Table[Any] = field(default_factory=Table)
-    _machines: list[AtWork] = field(default_factory=list)
+    _machines: list[Explored] = field(default_factory=list)
     _views: list[Any] = field(default_factory=list)
     _within: list[bool] = field(default_factory=list)
     _words: Table[Message] = field(default_factory=Table)
@@ -136,7 +149,7 @@ class Engine:
 
     # --- one machine ---------------------------------------------------------------------------------------------
 
-    def _mind(self, i: int, machine: AtWork) -> int:
+    def _mind(self, i: int, machine: Explored) -> int:
         number = self._minds.number((i, essence(machine, self.part.left_out)))
         if number == len(self._machines):
             self._machines.append(machine)
@@ -145,16 +158,19 @@ class Engine:
         return number
 
     def _does(self, i: int, mind: int, event: Any) -> tuple[int, int]:
-        """What machine i makes of an event: a word by number, or who is down while a while passes."""
+        """What machine i makes of an event: a word by number, who is down while a while passes, or its body's own."""
         known = self._done.get((i, mind, event))
         if known is None:
             self.found.runs += 1
             if isinstance(event, int):
                 machine = copied(self._machines[mind])
                 deeds = machine.hears(self._words.things[event])
-            else:
+            elif isinstance(event, frozenset):
                 machine = copied(self._machines[mind], WHILE_US)
                 deeds = machine.waits(event)
+            else:
+                machine = copied(self._machines[mind])
+                deeds = machine.meets(event)
             known = self._mind(i, machine), self._deeds.number(tuple(deeds))
             self._done[i, mind, event] = known
         return known
@@ -273,6 +289,10 @@ class Engine:
     def _seen(self, state: State) -> tuple[Any, ...]:
         return tuple([None if mind is None else self._views[mind] for mind in state.minds])
 
+    def _judged_by(self, state: State) -> Any:
+        """All that ``wrong`` looks at."""
+        return state.minds
+
     # --- traps ---------------------------------------------------------------------------------------------------
 
     def ends_well(self, state: State) -> bool:
@@ -299,9 +319,9 @@ class Engine:
             self._ends_well[key] = good
         return good
 
-    def _all_hear(self, state: State) -> State:
-        """Each hears all that is said, in turn, until nothing new is said."""
-        heard = [0] * len(self.nodes)
+    def _all_hear(self, state: State, heard: list[int] | None = None) -> State:
+        """Each hears all that is said, but what it has ``heard``, in turn, until nothing new is said."""
+        heard = [0] * len(self.nodes) if heard is None else heard
         while True:
             new = [state.bus & heeds & ~known for heeds, known in zip(self._heeded, heard, strict=True)]
             if not any(new):
@@ -312,6 +332,18 @@ class Engine:
                     mind = state.minds[i]
                     assert mind is not None
                     state = self._all_done(state, i, *self._does(i, mind, word))
+
+    def said(self, state: State, word: Message) -> State:
+        """The same with a word on the bus that somebody said before."""
+        return state._replace(bus=state.bus | 1 << self._word(word))
+
+    def machine(self, state: State, i: int) -> AtWork:
+        """Machine i in a state in which it is up."""
+        mind = state.minds[i]
+        assert mind is not None
+        machine = self._machines[mind]
+        assert isinstance(machine, AtWork)
+        return machine
 
     # --- the search ----------------------------------------------------------------------------------------------
 
@@ -340,7 +372,7 @@ class Engine:
         found, state = self.found, self.begin()
         seen, waiting = {state}, deque([state])
         wrong, remembers, limits = self.part.wrong, self.limits.remembers, self.limits
-        judged: dict[tuple[int | None, ...], str] = {}
+        judged: dict[Any, str] = {}
         began_s, taken = time.process_time(), 0
         while waiting and not found.why and len(seen) < limits.most_states:
             state = waiting.popleft()
@@ -356,9 +388,10 @@ class Engine:
                 seen.add(after)
                 if remembers:
                     self.came_from[after] = state, step
-                why = judged.get(after.minds)
+                what = self._judged_by(after)
+                why = judged.get(what)
                 if why is None:
-                    why = judged[after.minds] = wrong(self._seen(after))
+                    why = judged[what] = wrong(self._seen(after))
                 if why:
                     found.wrong, found.why = after, why
                     break

@@ -9,12 +9,18 @@ from tests.models.as_scenario import as_scenario
 from tests.models.award import AwardPart
 from tests.models.custody import CustodyPart
 from tests.models.explorer import Explorer, Limits
+from tests.models.gate import GatePart
+from tests.models.moving import engine_of
+from tests.models.runs import RunPart
 
 #: What is explored by the engine, by name: made from how many machines and calls.
 PARTS: dict[str, Callable[[int, int], engine.Part]] = {
     "award": lambda machines, calls: AwardPart(calls, nodes=AwardPart.nodes[:machines]),
     "taking": lambda machines, calls: CustodyPart(calls, nodes=AwardPart.nodes[:machines], laden=False),
     "leaving": lambda machines, calls: CustodyPart(calls, nodes=AwardPart.nodes[:machines]),
+    "runs": lambda machines, calls: RunPart(2 * calls, nodes=RunPart.nodes[:machines]),
+    "boarding": lambda machines, calls: GatePart(GatePart.nodes[:machines]),
+    "riding": lambda machines, calls: GatePart(GatePart.nodes[:machines], aboard=True),
 }
 
 
@@ -28,7 +34,7 @@ def main() -> None:
     parser.add_argument("--versions", type=int, default=2, help="tokens: the newest that is explored")
     parser.add_argument("--old-copies", type=int, default=0, help="tokens: starts from an old copy of a journal")
     parser.add_argument("--ghost", action="store_true", help="tokens: a node that the site does not have speaks")
-    parser.add_argument("--calls", type=int, default=2, help="award, taking, leaving: most calls in one life")
+    parser.add_argument("--calls", type=int, default=2, help="most calls in one life; runs: half the versions")
     parser.add_argument("--scenario", type=Path, help="a counterexample is written here, for `bus-sim run --scenario`")
     options = parser.parse_args()
     if options.part != "tokens":
@@ -42,7 +48,7 @@ def main() -> None:
 
 def explore_part(part: engine.Part, limits: engine.Limits, file: Path | None) -> None:
     """Explore one part, and tell the shortest way to what is wrong."""
-    explorer = engine.Engine(part, limits)
+    explorer = engine_of(part, limits)
     found = explorer.run()
     print(
         f"{limits}: {found.states:,} states, {found.transitions:,} transitions, {found.runs:,} runs of shipped code, "

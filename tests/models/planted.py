@@ -1,21 +1,26 @@
 """Bugs that are planted in shipped code to see whether an exploration finds them."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from onboard.contract.constants import NOBODY
 from onboard.core.authority import TokenBook
-from onboard.core.effects import Record
+from onboard.core.effects import Record, Send
 from onboard.core.records import TokenGivenRecord
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.handling import ShuttleWork
+from onboard.systems.car_park.lift import Lift
 from onboard.systems.car_park.records import AwardRecord, HandledRecord
 from onboard.systems.car_park.recovery import JournalRecovery
+from onboard.systems.car_park.riding import Riding
 from onboard.systems.car_park.robot import ParkingRobot
 from onboard.systems.car_park.stewardship import Stewardship
+from onboard.systems.car_park.travel import Carriage
 
 Method = Callable[..., Any]
+GATES = "two have the gate"
 TWO, TRAP, LOST = "two hold the car", "a trap", "its keeper does not know where the car stands"
 
 
@@ -34,6 +39,18 @@ def _turned(method: Method) -> Method:
 
 def _nothing(method: Method) -> Method:
     return lambda *_: []
+
+
+def _none(method: Method) -> Method:
+    return lambda *_: None
+
+
+def _under_no_gate(method: Method) -> Method:
+    def word(lift: Lift, drive: Any) -> Send:
+        said = method(lift, drive)
+        return Send(replace(said.message, itinerary_version=0, leg=0))
+
+    return word
 
 
 def _one_less(method: Method) -> Method:
@@ -109,4 +126,21 @@ LEAVING = {
     "a robot forgets what it has handled": Planted(JournalRecovery, "_take", _without(HandledRecord), TRAP),
     "a car that was left is not passed on": Planted(ShuttleWork, "_finish", _nothing, TRAP),
     "a stroke is not written": Planted(ShuttleWork, "_next", _unwritten, TRAP),
+}
+
+#: Of who stands before the sill.
+BOARDING = {
+    "a grant is said once": Planted(TokenBook, "wake", _nothing, TRAP),
+    "a right is given under its old version": Planted(TokenBook, "own_version", _one_less, TRAP),
+    "a gate that came too early is kept": Planted(Riding, "_return_again", _nothing, TRAP),
+}
+
+#: Of who stands on the platform.
+RIDING = {
+    "a grant is said before it is written": Planted(TokenBook, "give", _turned, GATES),
+    "what was given away is held again after a restart": Planted(TokenBook, "replay", _keeps_given, GATES),
+    "a ride is not written": Planted(Lift, "_do", _unwritten, TRAP),
+    "a lift forgets its ride": Planted(Lift, "_ride_in_journal", _none, TRAP),
+    "a lift does not say under which gate it stands": Planted(Lift, "_word", _under_no_gate, TRAP),
+    "gate and slots are given back on the way": Planted(Carriage, "occupied", _nothing, TRAP),
 }

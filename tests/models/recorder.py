@@ -92,7 +92,7 @@ class Recorder:
         steps = self.tokens.setdefault(key, [])
         node = self.index(key, book.node_id)
         if isinstance(what, TokenKey):
-            steps.append(f"give({node}, {self.index(key, rest[0])})")
+            steps.append(f"give({node}, {self.index(key, rest[0])}, {book.seen[key]})")
         for effect in effects:
             if isinstance(effect, Record) and str(effect.entry["record"]).startswith("token_"):
                 # Of what goes to the journal with a token, such as the place of a car, the model knows nothing.

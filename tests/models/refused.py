@@ -16,7 +16,7 @@ def refused_tokens(folder: Path, recorder: Recorder, most: int | None = None) ->
         if key.kind is TokenKind.CAR:
             # A car's token begins with version 1, all others without one.
             begin += "; seen[0] = 1; kept_seen[0] = 1; stated[AT(1, 0)] = true"
-        sizes = (f"NODES={len(recorder.nodes[key])}", "VERSIONS=60", f"CRASHES={recorder.crashes[key]}")
+        sizes = (f"NODES={len(recorder.nodes[key])}", "VERSIONS=80", f"CRASHES={recorder.crashes[key]}")
         step = first_refused(folder, TOKEN, steps, begin, *sizes)
         if step is not None:
             refused[key] = step

@@ -59,8 +59,10 @@ def verify_rules(*rules: str) -> Verdict:
         (("OLD_COPY", "VERSIONS=4"), ("NO_WITNESS",)),
         (("REGENERATE", "VERSIONS=4"), ("NO_FREEZE",)),
         (("REGENERATE", "VERSIONS=4"), ("NOT_ABOVE",)),
+        (("REGENERATE", "VERSIONS=4"), ("ONE_ABOVE",)),
         (("REGENERATE", "VERSIONS=4"), ("NO_EPOCH",)),
         (("NODES=2", "VERSIONS=7", "CRASHES=0"), ("SERIAL",)),
+        (("NODES=3", "VERSIONS=3", "CRASHES=1"), ("FIRST_OF_RUN",)),
     ],
     ids="-".join,
 )

@@ -15,6 +15,8 @@ from tests.tools import DEADLINE_S, require_tool, run_tool
 
 DEPLOY = Path(__file__).parents[2] / "deploy" / "mqtt"
 ROLES = ("gateway", "dispatcher", "viewer")
+#: A test's own, who reads and writes everything.
+WITNESS = "witness"
 
 
 def free_port() -> int:
@@ -63,10 +65,11 @@ def certificates(folder: Path) -> Path:
         )
 
     authority("ca")
+    authority("gateway-ca")
     authority("stranger")
     member("broker", "ca", "subjectAltName=IP:127.0.0.1,DNS:localhost")
-    for role in (*ROLES, "MR1"):
-        member(role, "ca")
+    for role in (*ROLES, "MR1", WITNESS):
+        member(role, "gateway-ca" if role == "gateway" else "ca")
     member("gateway-false", "stranger")
     return folder
 
@@ -77,6 +80,8 @@ class Mosquitto:
     def __init__(self, folder: Path, *, tls: Path | None = None, extra: str = "") -> None:
         """``tls`` are the certificates: with them it runs ``deploy/mqtt`` as it stands, but for port and paths."""
         self.port = free_port()
+        #: With TLS: where the gateway is let in.
+        self.gateway_port = free_port()
         self._folder, self._tls = folder, tls
         self._process: asyncio.subprocess.Process | None = None
         folder.mkdir(parents=True, exist_ok=True)
@@ -89,12 +94,14 @@ class Mosquitto:
             text += "persistence true\npersistence_location ./data/\nautosave_interval 1\nautosave_on_changes false\n"
         else:
             text = (DEPLOY / "mosquitto.conf").read_text(encoding="utf-8")
-            text = text.replace("listener 8883\n", f"listener {self.port} 127.0.0.1\n")
-            assert str(self.port) in text
+            for shipped, port in ((8883, self.port), (8884, self.gateway_port)):
+                text = text.replace(f"listener {shipped}\n", f"listener {port} 127.0.0.1\n")
+                assert str(port) in text
             acl = (DEPLOY / "acl.conf").read_text(encoding="utf-8")
             acl += (DEPLOY / "acl-machines.conf").read_text(encoding="utf-8")
+            acl += f"user {WITNESS}\ntopic readwrite #\n"
             (self._folder / "acl.conf").write_text(acl, encoding="utf-8")
-            for name in ("ca.pem", "broker.pem", "broker.key"):
+            for name in ("ca.pem", "gateway-ca.pem", "broker.pem", "broker.key"):
                 shutil.copy(self._tls / name, self._folder / name)
         if os.geteuid() == 0:
             text += "user root\n"
@@ -153,8 +160,9 @@ class Mosquitto:
         if self._tls is None:
             return BrokerAddress("127.0.0.1", self.port)
         name = role if certificate is None else certificate
+        port = self.gateway_port if role == "gateway" else self.port
         mine, key = self._tls / f"{name}.pem", self._tls / f"{name}.key"
-        return BrokerAddress("127.0.0.1", self.port, True, None, None, self._tls / "ca.pem", mine, key)
+        return BrokerAddress("127.0.0.1", port, True, None, None, self._tls / "ca.pem", mine, key)
 
     def broker(self, role: str = "gateway") -> MqttBroker:
         """The port, with short patience."""

@@ -81,6 +81,28 @@ def test_one_command_shows_a_site_with_a_broker_of_its_own_and_takes_an_order(tm
         assert site.wait(DEADLINE_S) in (0, 1)
 
 
+@pytest.mark.parametrize(
+    ("url", "is_told"),
+    [
+        ("mqtt://broker.example", True),
+        ("mqtt://192.0.2.1:1883", True),
+        ("mqtts://broker.example", False),
+        ("mqtt://127.0.0.1", False),
+        ("mqtt://[::1]", False),
+        ("mqtt://localhost", False),
+    ],
+)
+def test_a_broker_elsewhere_without_tls_is_warned_of(
+    url: str, is_told: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The bus that it names is none, so that no broker is asked for."""
+    words = ["gateway", "-i", "socketcand-asyncio", "-c", "two words", "--site", "small", "--mqtt", url]
+    assert onboard([*words, "--spool", str(tmp_path)]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert ("no TLS" in said[0] and f"write mqtts://{url[7:].split(':', maxsplit=1)[0]}" in said[0]) == is_told
+    assert len(said) == 1 + is_told, "with the mistake itself"
+
+
 MISTAKES = [
     (["--mqtt", "tcp://x"], "--mqtt tcp://x: not an address; write mqtt://HOST:PORT"),
     (["--mqtt", "mqtt://x:99999"], "port 99999 is not from 1 to 65535"),

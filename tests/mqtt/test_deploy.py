@@ -10,7 +10,7 @@ import pytest
 from onboard.io.broker_address import BrokerAddress
 from onboard.io.mqtt import MqttBroker
 from onboard.ports.broker import BrokerError, Publication
-from tests.mqtt.mosquitto import ROLES, Mosquitto, certificates
+from tests.mqtt.mosquitto import ROLES, WITNESS, Mosquitto, certificates
 from tests.tools import DEADLINE_S
 
 TOLD = ("status", "task", "report", "call", "event", "indicators", "machine/ER1", "log/MR1")
@@ -67,9 +67,9 @@ async def heard_until(broker: MqttBroker, patterns: tuple[str, ...], last: bytes
 
 @pytest.mark.parametrize("role", MAY_WRITE)
 async def test_each_role_writes_what_it_may_and_nothing_else(mosquitto: Mosquitto, role: str) -> None:
-    """What is forbidden vanishes, as MQTT 3.1.1 has it (3.3.5): the dispatcher, who reads it all, does not see it."""
+    """What is forbidden vanishes, as MQTT 3.1.1 has it (3.3.5): who reads it all does not see it."""
     ready = asyncio.Event()
-    witness = asyncio.ensure_future(heard_until(mosquitto.broker("dispatcher"), ("#",), b"last", ready))
+    witness = asyncio.ensure_future(heard_until(mosquitto.broker(WITNESS), ("#",), b"last", ready))
     await ready.wait()
     async with mosquitto.broker(role).session(f"{role}-1", None, ()) as session:
         for topic in sorted(EVERY):
@@ -82,10 +82,9 @@ async def test_each_role_writes_what_it_may_and_nothing_else(mosquitto: Mosquitt
 @pytest.mark.parametrize("role", MAY_READ)
 async def test_each_role_reads_what_it_may_and_nothing_else(mosquitto: Mosquitto, role: str) -> None:
     async with mosquitto.broker(role).session("reader", None, ("#",)) as reader:
-        for writer, topics in (("gateway", TELEMETRY | ANSWERS), ("dispatcher", ORDERS)):
-            async with mosquitto.broker(writer).session("writer", None, ()) as session:
-                for topic in sorted(topics):
-                    await session.publish(Publication(topic, b"x", 1))
+        async with mosquitto.broker(WITNESS).session("writer", None, ()) as session:
+            for topic in sorted(TELEMETRY | ANSWERS | ORDERS):
+                await session.publish(Publication(topic, b"x", 1))
         found: set[str] = set()
         async with asyncio.timeout(DEADLINE_S):
             while len(found) < len(MAY_READ[role]):
@@ -117,6 +116,33 @@ async def test_a_certificate_of_another_authority_or_none_does_not_get_in(mosqui
     for address in (false, none, plain, deceived):
         with pytest.raises(BrokerError):
             await enter(address)
+
+
+async def test_nobody_takes_the_gateways_place_under_its_client_id(mosquitto: Mosquitto) -> None:
+    """A viewer under the gateway's id threw it out, and what waited for it was gone."""
+    mine = ("onboard/+/orders",)
+    async with mosquitto.broker("gateway").session("onboard-site-fleet", None, mine):
+        pass
+    async with mosquitto.broker("viewer").session("onboard-site-fleet", None, ()) as viewer:
+        await viewer.publish(Publication("elsewhere", b"x", 1))
+    async with mosquitto.broker("dispatcher").session("onboard-site-fleet", None, ()) as dispatcher:
+        await dispatcher.publish(Publication("onboard/site/orders", b"A1", 1))
+        async with mosquitto.broker("gateway").session("onboard-site-fleet", None, mine) as gateway:
+            async with asyncio.timeout(DEADLINE_S):
+                assert (await anext(gateway.incoming())).payload == b"A1", "it waited for the gateway"
+            # Both are there still: the broker answers both.
+            await dispatcher.publish(Publication("onboard/site/orders", b"A2", 1))
+            await gateway.publish(Publication("onboard/site/status", b"x", 1))
+
+
+# paho leaves the socket of a failed handshake to the garbage collector, which closes it with a warning.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("role", ["viewer", "dispatcher", "MR1"])
+async def test_only_the_gateways_own_authority_opens_its_port(mosquitto: Mosquitto, role: str) -> None:
+    broker = MqttBroker(replace(mosquitto.address(role), port=mosquitto.gateway_port), keepalive_s=5, timeout_s=0.7)
+    with pytest.raises(BrokerError):
+        async with broker.session("onboard-site-fleet", None, ()) as session:
+            await session.publish(Publication("onboard/site/status", b"x", 1))
 
 
 async def test_a_file_that_is_no_certificate_is_one_clear_line(tmp_path: Path, keys: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 from bus_sim.sites import find_site
 from onboard.contract.codes import CallResult, Operation, OperatorAction
 from onboard.contract.messages import Award, CallForProposals, OperatorOrder, Reference
-from tests.mqtt.ordered import Ordered, park_and_order, said
+from tests.mqtt.ordered import FatalJournal, Ordered, park_and_order, said
 from tests.mqtt.played import MemoryJournal
 from tests.sites import one_floor
 from tests.system.scene import Scene
@@ -88,6 +88,17 @@ def test_an_urgent_order_overtakes_those_that_wait() -> None:
     assert set(pressed) == {OperatorAction.INSERT_TICKET, OperatorAction.URGENT_TICKET}
 
 
+def test_a_car_is_parked_to_be_charged_by_the_key_of_who_asks_for_it_also_after_a_restart() -> None:
+    """The gateway dies right after it has written the order: the wish is in its journal."""
+    order = (20.0, ORDERS.format("sizes"), {"id": "n", "from": "In", "charging": True})
+    journal = FatalJournal(written=True)
+    scene, ordered = park_and_order(find_site("sizes"), 0, [order], journal=journal, extra_s=80)
+    pressed = [(one.compartment, one.action) for one in said(scene, OperatorOrder) if isinstance(one, OperatorOrder)]
+    compartment = next(one for one in find_site("sizes").machines.values() if one.name == "In")
+    assert pressed == [(compartment.node_id, OperatorAction.CHARGING_KEY)]
+    assert "to charge at" in ordered.told("sizes", "n")[-1]["why"]
+
+
 REFUSED: list[tuple[Any, str, str]] = [
     (b"{", "MALFORMED", "$"),
     (b"\xff\xfe", "MALFORMED", "$"),
@@ -109,6 +120,9 @@ REFUSED: list[tuple[Any, str, str]] = [
     ({"id": "x", "car": "1.1", "to": "IOC9"}, "UNKNOWN_PLACE", "$.to"),
     ({"id": "x", "from": "p(1,1)N", "to": "IOC1"}, "UNKNOWN_TICKET", "$.from"),
     ({"id": "x", "car": "999.70000", "to": "IOC1"}, "UNKNOWN_TICKET", "$.car"),
+    ({"id": "x", "from": "IOC1", "charging": "yes"}, "MALFORMED", "$.charging"),
+    ({"id": "x", "from": "IOC1", "charging": True}, "UNSUPPORTED", "$.charging"),
+    ({"id": "x", "car": "1.1", "to": "IOC1", "charging": True}, "UNSUPPORTED", "$.charging"),
 ]
 
 

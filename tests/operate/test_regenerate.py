@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
+from onboard.contract.assignments import assignment_digest
 from onboard.contract.codes import CONTRACT_VERSION, MachineState, Reason, RegenerationPhase, TokenKind
 from onboard.contract.messages import (
     Blocked,
@@ -18,7 +19,6 @@ from onboard.contract.messages import (
     TokenHeld,
     TokenSeen,
 )
-from onboard.core.assignments import assignment_digest
 from onboard.core.authority import TokenKey, genesis_holder, segment_token
 from onboard.core.site import Segment
 from onboard.operate.commands import CommandRequest, maker_of
@@ -143,7 +143,7 @@ def test_the_lost_rights_are_made_anew_above_every_version_and_nobody_elses() ->
     assert hand.order.status == 0 and "MR1 is in epoch 1" in hand.lines
     assert phases(hand) == [FREEZE, READ_BACK, COMMIT]
     anew = assigned(hand)
-    assert anew[segment_token(HERE)] == (5, MR1) and anew[segment_token(NEXT)] == (7, MR1)
+    assert anew[segment_token(HERE)] == anew[segment_token(NEXT)] == (10, MR1), "above all of their track"
     assert anew[segment_token(LEFT)] == (10, STEWARD), "its body is not there: it goes back to its first holder"
     assert segment_token(OTHERS) not in anew
     mine = [key for key in anew if genesis_holder(SITE, key) != MR1 and key.kind is TokenKind.SEGMENT]
@@ -236,7 +236,7 @@ def test_a_lost_steward_gets_back_what_it_did_not_give_away() -> None:
     machines.turn(10)
     anew = assigned(hand)
     assert hand.order.status == 0 and segment_token(given) not in anew
-    assert anew[segment_token(Segment(1, 5))] == (1, STEWARD)
+    assert anew[segment_token(Segment(1, 5))] == (4, STEWARD)
 
 
 def test_what_the_lost_machine_says_to_hold_is_not_believed() -> None:
@@ -337,7 +337,7 @@ def test_an_absent_machine_is_typed_by_name_and_its_slots_stay_blocked_and_nobod
     machines.turn(5)
     anew = assigned(hand)
     assert hand.order.status == 0 and Blocked(251, 1, 3, Reason.OPERATOR) in hand.said
-    assert segment_token(HERE) not in anew and anew[segment_token(NEXT)] == (7, STEWARD)
+    assert segment_token(HERE) not in anew and anew[segment_token(NEXT)] == (10, STEWARD)
     assert MR1 not in {holder for _, holder in anew.values()}
 
 

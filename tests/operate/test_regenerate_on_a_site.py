@@ -12,7 +12,7 @@ from tests.system.scene import Scene, play, stays
 from tests.thinned import some
 
 SITE = find_site("small")
-CARS = stays((0, 400), (60, 500), (120, 600), (300, None))
+CARS = stays((0, 320), (60, 380), (120, 440), (300, None))
 #: A machine loses its journal, and when; its person comes 20 s later and sees where it stands.
 LOSSES = [("MR1", 50, "p(1;5)"), ("MR2", 20, "p(3;8)"), ("IOC1", 50, ""), ("IOC1", 190, ""), ("ER1", 50, "")]
 

@@ -26,7 +26,7 @@ from tests.system.scene import Scene, play, stays
 from tests.thinned import some
 
 SITE = find_site("small")
-CARS = stays((0, 400), (60, 500), (120, 600), (300, None))
+CARS = stays((0, 320), (60, 380), (120, 440), (300, None))
 MR2 = SITE.machine("MR2").node_id
 
 
@@ -72,7 +72,7 @@ SHORT = (("MR1", 50, ",body=p(1;5)"), ("MR2", 20, ",body=p(3;8)"), ("IOC1", 190,
 
 
 @pytest.mark.parametrize(
-    ("name", "at_s", "body", "again"), some([(*one, again) for one in SHORT for again in (False, True)], 5)
+    ("name", "at_s", "body", "again"), some([(*one, again) for one in SHORT for again in (False, True)], 4)
 )
 def test_a_short_journal_is_brought_back_by_the_operator(name: str, at_s: int, body: str, again: bool) -> None:
     came_s, node = at_s + 30, SITE.machine(name).node_id
@@ -147,7 +147,7 @@ def test_who_was_told_that_its_journal_is_old_vouches_for_nothing_any_more() -> 
 
 @pytest.mark.parametrize(
     ("name", "at_s", "body", "entries", "again"),
-    [("IOC1", 190, "", 10, False), ("IOC1", 190, "", 40, True), ("MR1", 50, ",body=p(1;5)", 10, True)],
+    [("IOC1", 190, "", 10, False), ("IOC1", 190, "", 40, True), ("MR1", 50, ",body=p(1;5)", 8, True)],
 )
 def test_an_old_journal_is_forgotten_before_its_rights_are_made_anew(
     name: str, at_s: int, body: str, entries: int, again: bool

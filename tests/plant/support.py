@@ -47,6 +47,7 @@ at = "p(1,4)"
 name = "ER1"
 node = 5
 end = "left"
+floors = {left}
 [[lifts]]
 name = "ER2"
 node = 6
@@ -63,8 +64,12 @@ home = "p(3,4)"
 
 
 def three_floors(home: str = "p(1,2)", upper: int = 6) -> CarPark:
-    """Three alleys between two lifts; MR1 (node 11) at ``home``, MR2 at p(3,4); ``upper`` positions on floor 3."""
-    return car_park(parse_site(THREE_FLOORS.format(home=home, upper=upper), "test.toml", crowded=True))
+    """Three alleys between two lifts; MR1 (node 11) at ``home``, MR2 at p(3,4); ``upper`` positions on floor 3.
+
+    Where these are fewer than below, the alley begins further to the right, and the left lift does not stop there.
+    """
+    text = THREE_FLOORS.format(home=home, upper=upper, left=[1, 2, 3] if upper == 6 else [1, 2])
+    return car_park(parse_site(text, "test.toml", crowded=True))
 
 
 @dataclass

@@ -52,6 +52,7 @@ IMPURE_BUILTINS = frozenset({"breakpoint", "compile", "eval", "exec", "hash", "i
 ORDERING = frozenset({"heappush", "heapify", "insort", "max", "min", "nlargest", "nsmallest", "sort", "sorted"})
 
 ALL_OF_ONBOARD = (
+    "onboard.bounded_file",
     "onboard.config",
     "onboard.contract",
     "onboard.controller",
@@ -121,6 +122,8 @@ FINDER = "onboard/systems/folders.py"
 #: ``__main__``.
 LAYERS: dict[str, Layer] = {
     "onboard.contract": Layer(only_stdlib=PURE_STDLIB),
+    # Whoever reads a file of others.
+    "onboard.bounded_file": Layer(not_stdlib=frozenset({"asyncio", "random", "socket", "threading"})),
     # Writes the rest of it; runs where somebody changes a DBC, never on a board.
     "onboard.contract.generate": Layer(("onboard.wire.dbc_file", "dbc")),
     "onboard.core": Layer(only_stdlib=PURE_STDLIB, pure=True),
@@ -134,10 +137,14 @@ LAYERS: dict[str, Layer] = {
     **{layer: rule for system in SYSTEMS for layer, rule in _parts_of(system)},
     # The one fold of the bus: whoever shows, counts or publishes it is a view of this.
     "onboard.history": Layer((*CORE_TYPES, *REGISTRY), only_stdlib=PURE_STDLIB, pure=True),
-    "onboard.wire": Layer((*CORE_TYPES, "dbc"), ("cantools",), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
+    "onboard.wire": Layer(
+        (*CORE_TYPES, "onboard.core.effects", "dbc"),
+        ("cantools",),
+        not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"},
+    ),
     "onboard.ports": Layer(CORE_TYPES, not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.config": Layer(
-        ("onboard.core", "onboard.systems", "onboard.ways", "onboard.work.timing"),
+        ("onboard.bounded_file", "onboard.core", "onboard.systems", "onboard.ways", "onboard.work.timing"),
         not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"},
     ),
     "onboard.controller": Layer(
@@ -218,7 +225,7 @@ LAYERS: dict[str, Layer] = {
     "onboard.operate.cli": Layer(
         (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.systems", "onboard.operate", "onboard.wire")
     ),
-    "onboard.gateway.options": Layer((*CORE_TYPES, "onboard.gateway", "onboard.io")),
+    "onboard.gateway.options": Layer((*CORE_TYPES, "onboard.bounded_file", "onboard.gateway", "onboard.io")),
     "onboard": Layer(
         (
             *ALL_OF_ONBOARD,

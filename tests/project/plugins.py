@@ -68,13 +68,15 @@ def named_by(tree: ast.Module, *, is_home: bool) -> set[str]:
     return found
 
 
+@cache
+def named() -> dict[str, set[str]]:
+    """Of every file the systems that it names."""
+    return {file: named_by(tree, is_home=bool(home(file))) for file, tree in files().items()}
+
+
 def outsiders(system: str) -> set[str]:
     """Files outside its two folders that name a system."""
-    return {
-        file
-        for file, tree in files().items()
-        if home(file) != system and system in named_by(tree, is_home=bool(home(file)))
-    }
+    return {file for file, systems in named().items() if home(file) != system and system in systems}
 
 
 def _is_site(node: ast.expr) -> bool:
@@ -86,7 +88,9 @@ def asks_for_site_type() -> dict[str, int]:
     found = {}
     for file, tree in files().items():
         calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call) and len(node.args) == 2)
-        count = sum(ast.unparse(one.func) == "isinstance" and _is_site(one.args[0]) for one in calls)
+        count = sum(
+            isinstance(one.func, ast.Name) and one.func.id == "isinstance" and _is_site(one.args[0]) for one in calls
+        )
         if count and not home(file):
             found[file] = count
     return found
@@ -97,14 +101,16 @@ def casts(top: str) -> list[str]:
     return [
         f"{file}:{node.lineno}"
         for file, tree in files().items()
-        if file.startswith(f"{top}/") and {"typing", "typing.cast"} & set(imports(tree))
+        if file.startswith(f"{top}/")
         for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and ast.unparse(node.func) in _casts(tree)
+        if isinstance(node, ast.Call) and _is_cast(node.func, tree)
     ]
 
 
-def _casts(tree: ast.Module) -> set[str]:
-    return {"typing.cast"} | ({"cast"} if "typing.cast" in imports(tree) else set())
+def _is_cast(called: ast.expr, tree: ast.Module) -> bool:
+    if isinstance(called, ast.Name):
+        return called.id == "cast" and "typing.cast" in imports(tree)
+    return isinstance(called, ast.Attribute) and called.attr == "cast" and ast.unparse(called.value) == "typing"
 
 
 def circles() -> list[list[str]]:

@@ -15,7 +15,6 @@ or, where a row is not done on purpose, ``not_done = "why"``.
 import ast
 import re
 import tomllib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -90,11 +89,18 @@ def rows_of(test: str) -> list[str]:
     return [row.upper() for row in re.findall(r"_([pmgca]\d\d)", found.group(1))] if found else []
 
 
-def functions_of(path: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    """All test functions of a file."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name.startswith("test_"):
-            yield node
+@cache
+def functions_of(path: Path) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
+    """All test functions of a file, and of the classes in it."""
+    found: list[ast.FunctionDef | ast.AsyncFunctionDef] = []
+    bodies = [ast.parse(path.read_text(encoding="utf-8")).body]
+    while bodies:
+        for node in bodies.pop(0):
+            if isinstance(node, ast.ClassDef):
+                bodies.append(node.body)
+            elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name.startswith("test_"):
+                found.append(node)
+    return found
 
 
 @cache

@@ -53,9 +53,13 @@ def check_text(place: str, text: str) -> list[str]:
     lines = text.count("\n")
     if lines > MAX_LINES:
         breaches.append(f"{place}:{MAX_LINES}: {lines} lines; split it by noun")
-    comments = dict(_comments(text))
+    nodes = list(ast.walk(ast.parse(text, place)))
+    # To cut a text into its tokens takes longer than all else, and few texts have anything that comments matter for.
+    is_broad = any(isinstance(node, ast.ExceptHandler) and _is_broad(node) for node in nodes)
+    is_told = is_broad or _SUPPRESSION.search(text) or _LEFT_TO_DO.search(text)
+    comments = dict(_comments(text)) if is_told else {}
     breaches += [f"{place}:{number}: {what}" for number, what in _bad_comments(comments)]
-    breaches += [f"{place}:{number}: {what}" for number, what in _bad_statements(ast.parse(text, place), comments)]
+    breaches += [f"{place}:{number}: {what}" for number, what in _bad_statements(nodes, comments)]
     return breaches
 
 
@@ -93,11 +97,11 @@ def _bad_comments(comments: dict[int, str]) -> Iterator[tuple[int, str]]:
             yield number, f"{what} gives no reason beside it"
 
 
-def _bad_statements(tree: ast.AST, comments: dict[int, str]) -> Iterator[tuple[int, str]]:
-    for node in ast.walk(tree):
+def _bad_statements(nodes: list[ast.AST], comments: dict[int, str]) -> Iterator[tuple[int, str]]:
+    for node in nodes:
         if isinstance(node, ast.ImportFrom) and node.module == "time" and any(a.name == "sleep" for a in node.names):
             yield node.lineno, "sleeps in real time"
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == "time.sleep":
+        if isinstance(node, ast.Attribute) and node.attr == "sleep" and ast.unparse(node.value) == "time":
             yield node.lineno, "sleeps in real time"
         if isinstance(node, ast.ExceptHandler) and _is_broad(node):
             where = {node.lineno, node.lineno + 1, node.lineno - 1}

@@ -25,6 +25,8 @@ LOOK = {
     "onboard/systems/*/checks.py": "a judge",
     "onboard/systems/*/checks/*.py": "a judge",
     "bus_sim/campaign/*.py": "a judge of a trial, or what strikes at a moment that was heard",
+    # What it is about decides when a word may go, and which one makes another needless.
+    "onboard/controller/outgoing.py": "the words of its own machine on their way out",
     # Who asked something on the bus waits for the answer, and remembers nothing of it.
     "onboard/gateway/pauses.py": "a conversation",
     "onboard/operate/blocks.py": "a conversation",
@@ -40,7 +42,7 @@ LOOK = {
     "bus_sim/systems/*/planted/*.py": "a planted bug",
     # A run's own figures: each counts one or two messages.
     "bus_sim/systems/*/stage.py": "counts messages",
-    "bus_sim/systems/*/response.py": "counts messages",
+    "bus_sim/systems/*/meter.py": "counts messages",
     "bus_sim/systems/terminal/run.py": "feeds a mirror of the machines themselves, for drawing what they know",
     "bus_sim/systems/cell/view.py": "the paper's printed answer, whose offers and costs nothing else shows",
     "hil/*": "a bench that waits for a word on real buses",

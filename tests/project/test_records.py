@@ -21,6 +21,8 @@ LOOK_UPS = (
 
 def look_ups(text: str) -> Iterator[int]:
     """Lines in which an entry, or what calls itself a record, is looked into by a string."""
+    if "entry" not in text and "record" not in text:
+        return
     for node in ast.walk(ast.parse(text)):
         match node:
             case ast.Subscript(value=of, slice=ast.Constant(value=str(key))) if _is_entry(of) or key == "record":

@@ -25,6 +25,8 @@ def run_pytest(folder: Path, source: str, require: str) -> subprocess.CompletedP
     plugins = ["-p", "tests.skips", "-p", "no:cacheprovider"]
     where = ["--rootdir", str(folder), "-c", str(folder / "pytest.ini"), str(folder / "test_it.py")]
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST", "COV"))}
+    # What else is installed for tests takes longer to load than all of this.
+    environment["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
     return subprocess.run(
         [sys.executable, "-m", "pytest", "-rs", *plugins, *where],
         cwd=ROOT,

@@ -13,6 +13,7 @@ from bus_sim.systems.car_park.plant.bodies import CarBody
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.contract.messages import Message
+from onboard.contract.runs import singles
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.trace.check.checks import Checks, LogVerdict
@@ -150,7 +151,7 @@ def _listen(scene: Scene, name: str, codec: Codec, node_id: int | None = None) -
 
     def on_frame(frame: Frame, time_us: int, _: str) -> None:
         message = decoder.feed(frame, time_us)
-        if message is not None:
-            scene.said.append(Said(time_us, name, message))
+        for word in singles(message) if message is not None else ():
+            scene.said.append(Said(time_us, name, word))
 
     medium.tap(on_frame, errors=False)

@@ -85,13 +85,13 @@ def test_equal_seeds_give_equal_logs_in_processes_with_different_hash_seeds(tmp_
     for hash_seed in ("1", "2"):
         log = tmp_path / f"{hash_seed}.log"
         done = run_program(
-            "bus_sim.cli", "run", "level1", "--random", "200", "60", "--cars", "4", "--seed", "5", "--devices",
+            "bus_sim.cli", "run", "level1", "--random", "200", "60", "--cars", "2", "--seed", "5", "--devices",
             "--fault", "omission:receivers=11,probability=0.05,seed=3", "--trace", str(log),
             cwd=tmp_path, PYTHONHASHSEED=hash_seed,
         )  # fmt: skip
         assert done.returncode in (0, 1), done.stderr
         logs.append(log.read_bytes())
-    assert logs[0] == logs[1] and len(logs[0]) > 100_000
+    assert logs[0] == logs[1] and len(logs[0]) > 50_000
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,6 @@ import sys
 from asyncio.subprocess import PIPE, Process
 from pathlib import Path
 
-import pytest
-
 from onboard.contract.messages import Heartbeat
 from onboard.io.open_bus import BusSettings, open_bus
 from tests.io.test_socketcand import free_port
@@ -92,20 +90,20 @@ async def test_a_signal_ends_the_waiting(tmp_path: Path) -> None:
         assert await ended(robot) == 0
 
 
-@pytest.mark.parametrize("result", ["watchdog", ""])
-async def test_how_the_last_life_ended_is_told(tmp_path: Path, result: str) -> None:
+async def test_how_the_last_life_ended_is_told(tmp_path: Path) -> None:
     port = free_port()
     machine_file(tmp_path, port)
     async with asyncio.timeout(DEADLINE_S):
         fleet = await site(tmp_path, port)
         robot = await start(tmp_path, "onboard", "--machine", "mr1.toml")
-        await heard_from_mr1(port)
-        robot.kill()
-        await robot.communicate()
-        if result:
-            (tmp_path / "journal-MR1.ended").write_text(f"{result}\n")
-        robot = await start(tmp_path, "onboard", "--machine", "mr1.toml")
-        told = await said(robot, "MR1: the last life")
-        assert ("watchdog" in told) == bool(result)
+        for result in ("watchdog", ""):
+            await heard_from_mr1(port)
+            robot.kill()
+            await robot.communicate()
+            seen = tmp_path / "journal-MR1.ended"
+            seen.write_text(f"{result}\n") if result else seen.unlink(missing_ok=True)
+            robot = await start(tmp_path, "onboard", "--machine", "mr1.toml")
+            told = await said(robot, "MR1: the last life")
+            assert ("watchdog" in told) == bool(result)
         assert await ended(robot) == 0
         await ended(fleet)

@@ -23,6 +23,7 @@ from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.ways.lifts import gate, platform
 from onboard.ways.site import way_site
 from tests.system.scene import Scene, play, stays
+from tests.thinned import is_long
 
 
 @pytest.fixture(scope="module")
@@ -102,9 +103,10 @@ def test_a_lift_never_moves_while_somebody_holds_its_gate(entry: Scene) -> None:
                 assert holder == lift, f"at {said.time_us / 1e6:.3f} s"
 
 
-@pytest.mark.parametrize(("site", "cars"), [("small", 8), ("standard", 8)])
-def test_several_robots_share_lifts_and_serve_everybody(site: str, cars: int) -> None:
-    demand = stays(*[(45.0 * number, 700.0 + 60.0 * number) for number in range(cars)])
+@pytest.mark.parametrize("site", ["small", "standard"])
+def test_several_robots_share_lifts_and_serve_everybody(site: str) -> None:
+    cars = 8 if is_long() else 5
+    demand = stays(*[(45.0 * number, 90.0 * cars + 60.0 * number) for number in range(cars)])
     scene = play(find_site(site), demand, limit_s=3_000)
     scene.assert_sound()
     summary = scene.simulation.plant.street.summary()

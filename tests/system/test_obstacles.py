@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import pytest
 
@@ -42,6 +43,12 @@ def scene_with(
     return play(replace(car_park(find_site("small")), rides=rides), stays(*CARS), plant=plant, limit_s=900)
 
 
+@cache
+def undisturbed() -> Scene:
+    """The same cars with nothing in the way."""
+    return scene_with()
+
+
 def assert_all_served(scene: Scene) -> None:
     scene.assert_sound()
     street = scene.simulation.plant.street.summary()
@@ -71,10 +78,10 @@ def test_a_blocked_segment_is_gone_around_and_touches_only_the_plans_through_it(
 
 
 def test_a_segment_off_all_plans_changes_none() -> None:
-    scene, undisturbed = scene_with("blocked:track=1,index=9,at_s=44,for_s=10"), scene_with()
+    scene, free = scene_with("blocked:track=1,index=9,at_s=44,for_s=10"), undisturbed()
     assert_all_served(scene)
     for node in (FIRST, OTHER):
-        assert plans(scene, node, 44, 90) == plans(undisturbed, node, 44, 90)
+        assert plans(scene, node, 44, 90) == plans(free, node, 44, 90)
 
 
 def test_a_machine_that_starts_later_hears_of_a_blocked_segment() -> None:
@@ -182,7 +189,7 @@ def test_all_counters_may_wrap_in_the_middle_of_the_work() -> None:
 
 
 def test_an_initiator_lost_between_deadline_and_award_calls_anew_and_one_machine_does_the_task() -> None:
-    award_us = scene_with().first(Award)[0]
+    award_us = undisturbed().first(Award)[0]
     scene = scene_with(f"crash:target=IOC1,at_s={(award_us - 2_000) / 1e6},restart_s=4")
     assert_all_served(scene)
     first_us, first = scene.first(Award, lambda award: award.sender == 1 and award.result is CallResult.AWARDED)

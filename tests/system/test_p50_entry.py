@@ -34,13 +34,13 @@ from onboard.contract.messages import (
 )
 from onboard.ways.mirror import way_mirror
 from onboard.ways.site import way_site
-from tests.sites import one_floor, telling
+from tests.sites import at_the_key, one_floor, telling
 from tests.system.scene import Scene, play, stays
 
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    found = play(telling(one_floor()), stays((0, None)), extra_s=300)
+    found = play(at_the_key(telling(one_floor())), stays((0, None)), extra_s=300)
     found.assert_sound()
     return found
 

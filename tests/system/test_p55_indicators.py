@@ -14,10 +14,12 @@ from bus_sim.cli import main as bus_sim
 from bus_sim.options import RunOptions
 from bus_sim.session import run_site
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.bay_times import BayTimes, bay_lines
 from bus_sim.systems.car_park.day import ParkingDay
 from bus_sim.systems.car_park.summary import RunSummary
-from onboard.contract.codes import CallResult, Operation, TaskPhase
-from onboard.contract.messages import Award, Bid, CallForProposals, Progress, TaskReport
+from onboard.contract.codes import CallResult, DoorPosition, Operation, TaskPhase
+from onboard.contract.messages import Award, Bid, CallForProposals, DoorState, Progress, TaskReport
+from onboard.contract.runs import singles
 from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.indicators import FleetIndicators, Indicators
@@ -92,8 +94,8 @@ def test_p55_any_log_of_the_fleet_bus_gives_the_same_figures(tmp_path: Path) -> 
     indicators, decoder = Indicators(site, epoch_us), Decoder(fleet_codec())
     for record in records:
         message = decoder.feed(record.frame, record.time_us)
-        if message is not None:
-            indicators.feed(message, record.time_us)
+        for word in singles(message) if message is not None else ():
+            indicators.feed(word, record.time_us)
     found = indicators.figures(epoch_us + round(summary.simulated_s * 1e6))
     assert found == summary.fleet
     assert found.tasks >= 2 and found.sub_calls > 0
@@ -247,3 +249,29 @@ def test_a_run_that_was_ended_at_once_has_no_figures_and_no_line_is_wider_than_t
     assert " ".join(" ".join(folded).split()) == " ".join(" ".join(summary.lines()).split())
     head = next(line for line in folded if line.startswith("machine"))
     assert "max wait s" in head, "the table is not folded"
+
+
+def test_each_compartments_time_is_told_by_what_holds_its_bay() -> None:
+    times: list[BayTimes] = []
+    scene = play(
+        one_floor(), stays((0, 400), (5, 700)), before=lambda simulation: times.append(BayTimes(simulation.plant))
+    )
+    (bay,) = times[0].figures()
+    seconds = scene.simulation.loop.now_us() / 1e6
+    assert (bay.cars_in, bay.cars_out) == (2, 2)
+    assert bay.free + bay.person + bay.door + bay.shuttle + bay.robot == pytest.approx(1)
+    # The output door is the shuttle's as long as it stands open, by its own word.
+    opened_s, since_us = 0.0, 0
+    for time_us, doors in scene.all(DoorState):
+        if since_us:
+            opened_s += (time_us - since_us) / 1e6
+        since_us = time_us if doors.output_door is DoorPosition.OPEN else 0
+    assert bay.shuttle * seconds == pytest.approx(opened_s, abs=0.1) and opened_s > 60
+    # The second car waits outside from its coming until the first is gone; each owner asks until the car is there.
+    streets = [customer.visit for customer in scene.simulation.plant.street.customers]
+    asked_s = sum(visit.out_wait_us or 0 for visit in streets) / 1e6
+    assert bay.queue_most == 1 and 30 < bay.queue_mean * seconds < (streets[1].in_wait_us or 0) / 1e6
+    assert bay.asking_most == 1 and asked_s - 80 < bay.asking_mean * seconds < asked_s
+    # It was free for hours while nobody could use it, and never for long while somebody could.
+    assert bay.free > 0.5 and bay.idle == 0
+    assert bay_lines((bay,))[1].startswith(f"{bay.compartment} ")

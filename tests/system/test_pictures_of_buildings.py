@@ -8,10 +8,13 @@ import pytest
 from bus_sim.cli import main
 from bus_sim.sites import find_site, layout_names
 from bus_sim.systems.car_park.show_plan import draw_plans
+from onboard.config.site import parse_site
 from onboard.contract.codes import DeskText, Side
 from onboard.contract.messages import DeskOrder, Reference
 from onboard.core.site import Station
 from onboard.systems.car_park.building import draw
+from onboard.systems.car_park.diagram import TrackDiagram
+from onboard.systems.car_park.diagram import draw as draw_diagram
 from onboard.systems.car_park.outlines import Outlines
 from onboard.systems.car_park.scene import CarParkScene
 from onboard.systems.car_park.site import car_park
@@ -77,6 +80,46 @@ def test_a_drawing_is_svg_with_the_highest_floor_first(capsys: pytest.CaptureFix
     assert {"Mid", "Fast", "Street", "Roof", "MR1", "MR2"} <= {text for text, _ in words}
 
 
+SKIPPING = """
+[site]
+name = "skipping"
+[floors]
+count = 5
+positions = 9
+[floors.1]
+height_mm = 4000
+[floors.3]
+height_mm = 2200
+[[lifts]]
+name = "Odd"
+node = 5
+end = "left"
+floors = [1, 3, 5]
+[[lifts]]
+name = "Mid"
+node = 6
+doors = ["p(2-4,5)F"]
+floors = [2, 3, 4]
+[[compartments]]
+name = "IOC1"
+node = 1
+at = "p(1,4)"
+[[robots]]
+name = "MR1"
+node = 11
+home = "p(2,2)"
+"""
+
+
+def test_floors_lie_as_high_as_the_file_says_though_no_lift_joins_one_to_the_next() -> None:
+    svg = str(draw(car_park(parse_site(SKIPPING, "s.toml"))))
+    heads = re.findall(r"floor \d, [^<]*", svg)
+    assert heads == ["floor 5, 11.2 m", "floor 4, 8.7 m", "floor 3, 6.5 m", "floor 2, 4 m", "floor 1, 0 m"]
+    # What is written on an alley is written over the way to its lift.
+    assert svg.index(">p(5,1)<") > svg.index("floor 5, 11.2 m")
+    assert 'fill="#e4e4e4"' not in svg[svg.index(">p(5,1)<") : svg.index("floor 4, 8.7 m")]
+
+
 @pytest.mark.parametrize("name", ["level1", "standard"])
 def test_a_straight_building_is_drawn_as_well(name: str) -> None:
     assert str(draw(car_park(find_site(name)))).endswith("</svg>\n")
@@ -93,3 +136,14 @@ def test_the_page_is_told_classes_places_to_charge_and_what_desks_show() -> None
     bay = next(iter(site.compartments))
     scene.feed_device(bay, DeskOrder(bay, 1, DeskText.NO_CHARGING, Reference(0, 0)), 0)
     assert scene.machine(bay, 0)["desk"] == "no charging"
+
+
+def test_a_diagram_names_its_panels_as_the_site_file_does() -> None:
+    svg = str(draw_diagram(car_park(find_site("ring")), TrackDiagram(last_us=1_000_000), 0))
+    floor = ["", ", alley B", ", alley C", ", alley D", ", lobby", ", lobby"]
+    # Behind the panels of the floors come the lifts', which name their floors again.
+    assert re.findall(r">((?:floor|lift) [^<]*)<", svg)[:15] == [
+        *(f"floor 2{one}" for one in (*floor, ", spur 193")),
+        *(f"floor 1{one}" for one in (*floor, ", spur 192")),
+        "lift ER1",
+    ]

@@ -53,17 +53,17 @@ BAY_S = (12, 18, 24, 26, 27, 28, 30, 34, 38, 42, 46, 50, 54, 205, 209, 213, 221,
 RIDE_S = (27, 28, 30, 33, 36, 50, 54, 57, 214, 218, 222, 280)
 
 
-@pytest.mark.parametrize("at_s", some(BAY_S, 8))
+@pytest.mark.parametrize("at_s", some(BAY_S, 6))
 def test_p50_a_compartment_killed_at_any_step_goes_on_with_its_customer(at_s: int) -> None:
     assert_served(killed("IOC1", at_s))
 
 
-@pytest.mark.parametrize("at_s", some(RIDE_S, 5))
+@pytest.mark.parametrize("at_s", some(RIDE_S, 4))
 def test_p50_a_lift_killed_with_a_carrier_aboard_ends_its_ride(at_s: int) -> None:
     assert_served(killed(LIFT, at_s))
 
 
-@pytest.mark.parametrize("at_s", some(ENTRY_S + EXIT_S, 12))
+@pytest.mark.parametrize("at_s", some(ENTRY_S + EXIT_S, 8))
 def test_p50_a_robot_killed_at_any_step_finds_its_place_and_the_car_arrives(at_s: int) -> None:
     scene = killed(ROBOT, at_s)
     assert_served(scene)

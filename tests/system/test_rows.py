@@ -2,6 +2,7 @@
 
 import dataclasses
 from dataclasses import dataclass, field
+from functools import cache
 
 import pytest
 
@@ -262,12 +263,18 @@ def test_p20_p49_a_compartment_is_a_participant_too_asked_twice() -> None:
     assert any("lock the input door; call for a robot" in text for _, _, text in scene.simulation.log.lines)
 
 
+@cache
+def first_moves_us() -> int:
+    """When the robot of the one-floor site begins to drive for the first car."""
+    scene = play(one_floor(), stays((0, None)), limit_s=30, extra_s=0)
+    return scene.first(DriveState, lambda m: m.mode is DriveMode.MOVING)[0]
+
+
 @pytest.mark.parametrize("under_way_s", [0.3, 1.5, 3.0, 5.0, 8.0])
 def test_a_drive_without_fresh_orders_stops_inside_its_machines_authority(under_way_s: float) -> None:
     """The controller dies while the robot moves: the drive brakes by itself, on segments whose tokens it holds."""
     site = one_floor()
-    moving_us, _ = play(site, stays((0, None)), limit_s=60).first(DriveState, lambda m: m.mode is DriveMode.MOVING)
-    killed_s = moving_us / 1e6 + under_way_s
+    killed_s = first_moves_us() / 1e6 + under_way_s
 
     def kill(simulation: Simulation) -> None:
         def pull_the_plug() -> None:

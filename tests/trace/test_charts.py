@@ -18,6 +18,7 @@ from tests.tools import require_tool
 from tests.trace.runs import SITE, SITE_FILE, fleet_of, run_log
 
 _SVG = "{http://www.w3.org/2000/svg}"
+_PANEL_NAMES_X = 8
 
 
 def _chart(number: int = 1) -> SequenceChart:
@@ -91,9 +92,9 @@ def test_the_diagram_is_svg_with_a_panel_for_every_track(tmp_path: Path) -> None
     out = tmp_path / "run.svg"
     assert main(["diagram", str(run_log()), "--site", str(SITE_FILE), "--out", str(out)]) == 0
     root = ET.parse(out).getroot()
-    texts = [one.text or "" for one in root.iter(f"{_SVG}text")]
-    assert [text for text in texts if re.match(r"track \d|lift ", text)] == [
-        *("track 3", "track 2", "track 1", "lift ER1", "lift ER2")
+    # The names of panels stand at the left; those of a lift's floors beside it.
+    assert [one.text for one in root.iter(f"{_SVG}text") if float(one.get("x", "0")) == _PANEL_NAMES_X] == [
+        *("floor 3", "floor 2", "floor 1", "lift ER1", "lift ER2")
     ]
     notes = {one.text for one in root.iter(f"{_SVG}title")}
     assert {"MR1: reserved", "MR1: authority", "MR2: reserved", "MR2: authority"} <= notes

@@ -12,6 +12,7 @@ from onboard.contract.codes import (
     DoorPosition,
     DriveMode,
     LightColour,
+    OperatorAction,
     Reason,
     ShuttleAction,
     ShuttleMode,
@@ -28,6 +29,7 @@ from onboard.contract.messages import (
     DriveOrder,
     DriveState,
     Message,
+    OperatorOrder,
     Reference,
     ShuttleOrder,
     ShuttleState,
@@ -178,8 +180,9 @@ def test_full_means_full_for_the_class_of_the_car_before_the_desk() -> None:
     of_place = {**{place.number: 1 for place in short}, long.number: 2, plug.number: 3}
     site = replace(site, classes=classes, place_class=of_place)
     other, charging = Reference(1, 9), DeskEvent(1, 1, DeskInput.CHARGING_KEY, Reference(0, 0))
+    from_afar = OperatorOrder(251, 1, OperatorAction.CHARGING_KEY, Reference(0, 0))
 
-    def is_true(*taken: Message, pressed: DeskEvent, text: DeskText) -> bool:
+    def is_true(*taken: Message, pressed: Message, text: DeskText) -> bool:
         tape = Tape(site).say(1, *taken, bay(1400), pressed).say(2, word(text))
         return "full-means-full" not in tape.broken()
 
@@ -188,7 +191,9 @@ def test_full_means_full_for_the_class_of_the_car_before_the_desk() -> None:
     assert is_true(*both, pressed=key(), text=DeskText.FULL)
     assert not is_true(both[0], pressed=key(), text=DeskText.FULL)
     assert is_true(both[1], pressed=charging, text=DeskText.NO_CHARGING)
+    assert is_true(both[1], pressed=from_afar, text=DeskText.NO_CHARGING)
     assert not is_true(both[0], pressed=charging, text=DeskText.NO_CHARGING)
+    assert not is_true(both[0], pressed=from_afar, text=DeskText.NO_CHARGING)
 
 
 # --- life

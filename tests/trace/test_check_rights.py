@@ -66,6 +66,13 @@ def test_two_holders_are_found(messages: list[Message]) -> None:
     assert Tape(one_alley()).say(1, *messages).broken() == {"one-holder": 1}
 
 
+def test_segments_in_line_go_under_a_version_newer_than_each() -> None:
+    neighbour = SLOT._replace(index=SLOT.index - 1)
+    said = [grant(neighbour, 1, 1, MR1), grant(neighbour, 2, MR1, 1), grant(SLOT, 3, 1, MR1)]
+    assert Tape(one_alley()).say(1, *said).broken() == {}
+    assert Tape(one_alley()).say(1, *said, grant(SLOT, 5, MR1, 1)).broken() == {"one-holder": 1}
+
+
 def test_a_right_that_was_given_on_is_not_claimed_later() -> None:
     tape = Tape(one_alley()).say(1, grant(SLOT, 1, 1, MR1), grant(SLOT, 2, MR1, 1))
     assert tape.say(3, held(MR1, 1)).broken() == {"one-holder": 1}

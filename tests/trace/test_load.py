@@ -46,8 +46,8 @@ def test_a_busy_stretch_bounds_the_response_of_its_frames() -> None:
 def test_the_load_of_a_run_is_what_the_run_said_and_within_the_bounds(capsys: pytest.CaptureFixture[str]) -> None:
     with Log(str(run_log())) as log:
         fleet = loads(log, codecs(), SITE.bitrate)["fleet"]
-    # As the run's own summary says: 0.15 % in the mean, 1.92 % in the worst second, that of power-up.
-    assert fleet.mean == pytest.approx(0.00127, abs=0.0001)
+    # As the run's own summary says: 0.12 % in the mean, 1.36 % in the worst second, that of power-up.
+    assert fleet.mean == pytest.approx(0.00116, abs=0.0001)
     assert fleet.worst_second == pytest.approx(0.01357, abs=0.0002)
     bounds = bounds_of(SITE)
     for name, longest_us in fleet.longest_us.items():

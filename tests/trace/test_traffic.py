@@ -4,11 +4,15 @@ import dataclasses
 
 import pytest
 
+from bus_sim.campaign.power_up import large_with
 from bus_sim.sites import find_site
-from bus_sim.systems.car_park.response import Measured, measure
+from bus_sim.systems.car_park.burst import burst
+from bus_sim.systems.car_park.meter import Meter
+from bus_sim.systems.car_park.response import Measured, judge, measure, worst_by_message
 from onboard.contract.codes import KindCode
+from onboard.core.mirror import MISSED_HEARTBEATS
 from onboard.systems.car_park.site import RideCalls, car_park
-from onboard.systems.car_park.traffic import excess, operation, power_up, reasons
+from onboard.systems.car_park.traffic import excess, operation, power_up, reasons, waits
 from onboard.trace.response import ANYBODY, Stream, fifo_bounds
 from onboard.wire.dbc_file import fleet_layouts
 
@@ -59,6 +63,33 @@ def test_every_shipped_site_has_bounds_at_its_own_bit_rate(site: str) -> None:
     loaded = find_site(site)
     bounds = fifo_bounds(operation(loaded), loaded.bitrate)
     assert all(bound.response_us is not None for bound in bounds)
+
+
+@pytest.mark.parametrize("bit_rate", [125_000, 250_000, 500_000])
+def test_26_machines_have_bounds_and_nobody_who_lives_counts_as_silent(bit_rate: int) -> None:
+    site = large_with(26, bit_rate)
+    bounds = worst_by_message(operation(site), bit_rate)
+    assert all(fifo_us is not None for fifo_us, _ in bounds.values())
+    beats_us = bounds["Heartbeat"][0]
+    assert beats_us is not None
+    assert beats_us + waits(site)["Heartbeat"] < MISSED_HEARTBEATS * site.timing.heartbeat_us
+
+
+def test_where_all_say_more_than_they_may_no_frame_is_later_than_its_bound() -> None:
+    site = large_with(26, 125_000)
+    judged = judge(site, Meter(), 0.0, 0.0)
+    assert judged.wrong == []
+    assert judged.burst_us > 1_000_000, "it is a burst"
+    played = burst(site)
+    assert excess(operation(site), played.queued) == []
+    assert played.replaced > 1_000
+    assert all(played.worst[False, name] == played.on_bus[False, name] for name in ("EmergencyStop", "Award", "Bid"))
+
+
+def test_without_budgets_the_same_is_more_than_the_bounds_allow_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("onboard.controller.outgoing.Bucket.take", lambda _bucket, _now_us: True)
+    judged = judge(large_with(26, 125_000), Meter(), 0.0, 0.0)
+    assert any(line.startswith("ItineraryLeg of node") for line in judged.wrong)
 
 
 @pytest.fixture(scope="module", params=[125_000, 500_000])

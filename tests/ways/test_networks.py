@@ -10,7 +10,7 @@ from onboard.contract.messages import Itinerary, Stamp
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.program import CarStep, Program, to_itinerary
 from onboard.systems.car_park.site import CarPark, SizeClass, class_of_end, open_end
-from onboard.ways.floor_plan import at_mm, floor_plan
+from onboard.ways.floor_plan import Mismatch, Point, at_mm, floor_plan
 from onboard.ways.lift_uses import are_compatible
 from onboard.ways.occupancy import final_position, itinerary_windows, leg_windows, lift_uses
 from onboard.ways.refuges import open_refuges, refuges
@@ -166,7 +166,7 @@ def test_a_ring_that_does_not_close_is_told_with_both_places() -> None:
         bays=(Station(1, 3, Side.NEAR),),
     )
     (told,) = floor_plan(open_ring).mismatches
-    assert told == "the end of track 4 is at (2400, 0) mm, and p(1,1) at (0, 0) mm"
+    assert told == Mismatch(4, at(1, 1), Point(2_400, 0), Point(0, 0))
 
 
 def test_everything_has_a_place_in_mm() -> None:

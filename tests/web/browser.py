@@ -35,6 +35,12 @@ def start(words: list[str], folder: Path) -> tuple[subprocess.Popen[str], str]:
     raise AssertionError("the page's address was not printed")
 
 
+def live_of(address: str) -> str:
+    """The socket of a page's address."""
+    where, _, asked = address.removeprefix("http").partition("?")
+    return f"ws{where}live?{asked}"
+
+
 def end(process: subprocess.Popen[str], how: signal.Signals = signal.SIGINT) -> int:
     """End the program that serves; its exit status."""
     process.send_signal(how)

@@ -41,8 +41,12 @@ class Shown:
         await asyncio.Event().wait()
 
 
-def client(token: str | None = None) -> TestClient:
-    return TestClient(create_app(Shown(), token))
+TOKEN = "a-token"
+LIVE = f"ws://127.0.0.1/live?token={TOKEN}"
+
+
+def client(host: str = "127.0.0.1") -> TestClient:
+    return TestClient(create_app(Shown(), TOKEN, frozenset({"gate7"})), base_url=f"http://{host}")
 
 
 def answer(socket: Any, text: str) -> dict[str, Any]:
@@ -54,13 +58,13 @@ def answer(socket: Any, text: str) -> dict[str, Any]:
 
 
 def test_a_viewer_gets_the_layout_then_a_snapshot_with_the_figures() -> None:
-    with client().websocket_connect("/live") as socket:
+    with client().websocket_connect(LIVE) as socket:
         assert json.loads(socket.receive_text()) == {"layout": {"site": "test", "mode": "simulated"}}
         assert json.loads(socket.receive_text()) == {"snapshot": {"now_us": 5}, "figures": {"tasks": 0}}
 
 
 def test_the_page_and_all_that_it_asks_for_come_from_here_and_nothing_else_may() -> None:
-    page = client().get("/")
+    page = client().get(f"/?token={TOKEN}")
     assert page.status_code == 200 and "default-src 'self'" in page.headers["content-security-policy"]
     for name in ("page.js", "draw.js", "page.css"):
         assert name in page.text or name in client().get("/page.js").text
@@ -84,32 +88,61 @@ def test_the_page_and_all_that_it_asks_for_come_from_here_and_nothing_else_may()
     ],
 )
 def test_a_command_is_answered_in_one_line(text: str, told: str) -> None:
-    with client().websocket_connect("/live") as socket:
+    with client().websocket_connect(LIVE) as socket:
         found = answer(socket, text)
         assert found["answer"] == told
         assert found["ok"] is (told == "2")
         assert found["snapshot"] == {"now_us": 5}, "what has come of it is shown at once"
 
 
-def test_beyond_loopback_nothing_is_shown_without_the_token() -> None:
-    assert client("secret").get("/").status_code == 403
-    assert client("secret").get("/?token=wrong").status_code == 403
-    assert client("secret").get("/?token=secret").status_code == 200
-    for path in ("/live", "/live?token=wrong"):
-        with pytest.raises(WebSocketDisconnect), client("secret").websocket_connect(path):
-            pass
-    with client("secret").websocket_connect("/live?token=secret") as socket:
-        assert "layout" in socket.receive_text()
+def is_let_in(told: TestClient, path: str = LIVE, **headers: str) -> bool:
+    try:
+        with told.websocket_connect(path, headers=headers) as socket:
+            return "layout" in socket.receive_text()
+    except WebSocketDisconnect as refused:
+        return refused.code != 1008
+
+
+def test_nothing_is_shown_without_the_token_on_loopback_either() -> None:
+    assert client().get("/").status_code == 403
+    assert client().get("/?token=wrong").status_code == client().get("/?token=%C3%A9").status_code == 403
+    assert client().get(f"/?token={TOKEN}").status_code == 200
+    assert not is_let_in(client(), "ws://127.0.0.1/live") and not is_let_in(client(), "ws://127.0.0.1/live?token=wrong")
+    assert is_let_in(client())
 
 
 def test_a_page_of_another_host_cannot_command_this_one() -> None:
-    with (
-        pytest.raises(WebSocketDisconnect),
-        client().websocket_connect("/live", headers={"origin": "http://evil.test"}),
-    ):
-        pass
-    with client().websocket_connect("/live", headers={"origin": "http://testserver"}) as socket:
-        assert "layout" in socket.receive_text()
+    assert not is_let_in(client(), origin="http://evil.test")
+    assert not is_let_in(client(), origin="null")
+    assert is_let_in(client(), origin="http://127.0.0.1")
+
+
+@pytest.mark.parametrize("host", ["evil.test", "evil.test:8080", "127.0.0.1.evil.test", "localhost.evil.test", "[::1"])
+def test_a_name_that_was_made_to_point_here_opens_nothing(host: str) -> None:
+    """DNS rebinding: the page and its socket agree about their host, and it is the attacker's."""
+    told = client()
+    assert told.get(f"/?token={TOKEN}", headers={"host": host}).status_code == 421
+    assert told.get("/page.js", headers={"host": host}).status_code == 421
+    assert not is_let_in(told, host=host, origin=f"http://{host}")
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:8080", "localhost", "LOCALHOST.:80", "[::1]:8080", "192.0.2.7", "gate7"])
+def test_its_own_names_and_numbers_open_it(host: str) -> None:
+    assert is_let_in(client(), host=host, origin=f"http://{host}")
+
+
+def test_bytes_and_deep_nests_are_refused_quietly(caplog: pytest.LogCaptureFixture) -> None:
+    """Each was a traceback before an operator's eyes; the viewer of the first is cut off, and nobody else."""
+    with client() as told, told.websocket_connect(LIVE) as other:
+        with told.websocket_connect(LIVE) as socket:
+            socket.send_bytes(b"\xff\xfe")
+            with pytest.raises(WebSocketDisconnect) as ended:
+                list(iter(socket.receive_text, None))
+            assert ended.value.code == 1003
+        for deep in ("[" * 4_000, '{"a":' * 800):
+            assert answer(other, deep)["answer"] == "not a command"
+        assert answer(other, '{"command": "speed", "arguments": {"factor": 2}}')["ok"]
+    assert not caplog.records
 
 
 def test_an_address_is_a_port_or_a_host_with_one() -> None:

@@ -99,7 +99,8 @@ def test_another_system_is_simulated_and_obeys(browser: Page, errors: list[str],
 
 def test_a_lost_line_says_so_and_comes_back_by_itself(browser: Page, errors: list[str], tmp_path: Path) -> None:
     words = ["onboard", "web", str(log_of("graph")), "--site", str(SITE_FILES / "graph.toml"), "--web"]
-    process, address = start([*words, "0"], tmp_path)
+    kept = ["--web-token", "token"]
+    process, address = start([*words, "0", *kept], tmp_path)
     try:
         browser.goto(address)
         expect(browser.locator("#link")).to_have_text("connected")
@@ -107,7 +108,7 @@ def test_a_lost_line_says_so_and_comes_back_by_itself(browser: Page, errors: lis
         end(process, signal.SIGKILL)
     expect(browser.locator("#link")).to_have_text("connection lost, trying again")
     assert "is-lost" in (browser.locator("body").get_attribute("class") or "")
-    process, again = start([*words, address.rstrip("/").rpartition(":")[2]], tmp_path)
+    process, again = start([*words, address.partition("/?")[0].rpartition(":")[2], *kept], tmp_path)
     assert again == address
     try:
         expect(browser.locator("#link")).to_have_text("connected")

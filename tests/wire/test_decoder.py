@@ -210,6 +210,15 @@ def test_a_leg_without_its_head_is_inert_and_counted() -> None:
     assert decoder.drops == {Reason.INCOMPLETE_SET: 3}
 
 
+def test_legs_that_follow_each_other_slowly_make_one_itinerary() -> None:
+    """As a sender beyond its budget tells them: the time-out is for the next frame, not for all of them."""
+    decoder, heard = Decoder(fleet_codec()), []
+    for number, frame in enumerate(fleet_codec().encode(a_plan(11, 9, 31))):
+        heard.append(decoder.feed(frame, number * SET_TIMEOUT_US // 4))
+    assert heard[-1] == a_plan(11, 9, 31)
+    assert not decoder.drops
+
+
 def test_a_set_ends_at_its_time_out_and_not_before() -> None:
     for late_us, whole in ((0, True), (1, False)):
         decoder = Decoder(fleet_codec())

@@ -7,10 +7,12 @@ import csv
 import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from bus_sim.demand import DemandError
 from bus_sim.systems.car_park.moments import CellError, MomentForm
+from onboard.bounded_file import MOST_EXPORT, read_bounded
 
 #: Bad rows that are named one by one; the others are counted.
 MOST_NAMED = 20
@@ -18,6 +20,8 @@ MOST_NAMED = 20
 _NOTHING = frozenset({"", "-", "null", "none", "nan", "nat", "n/a", "na"})
 #: How files begin whose encoding is told by their byte-order mark.
 _MARKS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
+#: Longest word about a row, characters.
+_MOST_TOLD = 300
 #: Delimiters by name, for command lines.
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|"}
 
@@ -89,7 +93,10 @@ class CsvTable:
 
     def note(self, row: CsvRow, error: CellError) -> None:
         """Keep what is wrong with one row, and what to do about it, for the line that names it."""
-        self.bad.append(f"{self.name}:{row.line}: {error}")
+        told = str(error)
+        # What stands in a cell may be as long as a file.
+        told = told if len(told) <= _MOST_TOLD else f"{told[: _MOST_TOLD // 2]} ... {told[-_MOST_TOLD // 2 :]}"
+        self.bad.append(f"{self.name}:{row.line}: {told}")
 
     def rows(self, source: Readable, needed: Sequence[str], optional: Sequence[str]) -> Iterator[CsvRow]:
         """All rows that have as many cells as the first line has names.
@@ -182,7 +189,7 @@ def _decoded(source: Readable, encoding: str | None) -> str:
     """The text of a file. Raises ``DemandError`` for one that is not there, or not text in this encoding."""
     remedy = "name a CSV file"
     try:
-        held = source.read_bytes()
+        held = read_bounded(source, MOST_EXPORT) if isinstance(source, Path) else source.read_bytes()
         if held.startswith(b"PK\x03\x04"):
             raise DemandError(f"{source.name}: is a spreadsheet or an archive, no text; save it as CSV")
         told = next((name for mark, name in _MARKS if held.startswith(mark)), None)

@@ -14,7 +14,7 @@ from bus_sim.systems.car_park.sizes import misfits
 from bus_sim.systems.car_park.window import with_eve
 from onboard.core.site import Site
 from onboard.systems.car_park.site import CarPark
-from onboard.ways.site import way_site
+from onboard.ways.site import BayUse, way_site
 
 #: Word of ``--inside`` for the cars that the table itself says were there.
 RECORDED = "recorded"
@@ -84,7 +84,7 @@ def brought_in(demand: Demand, site: CarPark) -> Demand:
         cars = f"{len(demand.inside)} cars inside at the start"
         raise DemandError(f"{cars}: {site.name} has {len(site.places)} places; name a larger site, or fewer cars")
     refused = misfits([stay.car for stay in (*demand.inside, *demand.stays)], site)
-    played = with_eve(demand, len(site.compartments))
+    played = with_eve(demand, len(site.fronts(BayUse.ENTRY, BayUse.BOTH)))
     return replace(played, remarks=(*played.remarks, *at_most(refused)))
 
 

@@ -120,7 +120,8 @@ class Demand:
         stays = [Stay(one.arrival_us or 0, one.departure_us, car) for one, car in zip(drawn, cars, strict=True)]
         held = sum(one.arrival_us is None for one in drawn)
         if held > inside:
-            remarks.append(f"{source.name}: {held} cars are inside at the start: so many leave before they came")
+            who = "1 car is" if held == 1 else f"{held} cars are"
+            remarks.append(f"{source.name}: {who} inside at the start: so many leave before they came")
         return cls(
             tuple(stays[held:]), day_zero(chosen), len(counts) - len(chosen), tuple(stays[:held]), tuple(remarks)
         )

@@ -26,6 +26,7 @@ from onboard.contract.codes import KindCode
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.site import Site
 from onboard.systems.car_park.site import CarPark
+from onboard.ways.site import BayUse
 
 #: Simulated seconds a second while a window is shown: an hour in a minute.
 WINDOW_SPEED = 60.0
@@ -146,7 +147,7 @@ def _coming(site: CarPark, options: RunOptions) -> ComingCustomers:
     window = choose_window(demand, wanted.window) if wanted.window is not None else None
     demand = brought_in(demand, site)
     if window is not None and wanted.short_eve:
-        demand = with_short_eve(demand, window, len(site.compartments))
+        demand = with_short_eve(demand, window, len(site.fronts(BayUse.ENTRY, BayUse.BOTH)))
     # The first to come, or what is shown, is so long after power-up.
     first_us = min((stay.arrival_us for stay in demand.stays), default=0)
     first_us = first_us if window is None else min(first_us, window.begin_us)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from bus_sim.systems.car_park.bay_times import BayTimes
 from bus_sim.systems.car_park.by_hand import ByHand
 from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.plant.bodies import random_car
@@ -73,6 +74,7 @@ class CarParkStage(SystemStage[Plant]):
         self._street.add_all(coming.demand, coming.origin_us)
         self._clock = DayClock(coming.zero)
         self._indicators = Indicators(run.site)
+        self._bays = BayTimes(run.plant)
         self._hurried: list[Customer] = []
 
     # --- how it stands -----------------------------------------------------------------------------------------
@@ -164,6 +166,7 @@ class CarParkStage(SystemStage[Plant]):
         """Indicators begin anew at ``now_us``, and the terminal gets a line more often."""
         super().measure_from(now_us)
         self._indicators.begin(now_us)
+        self._bays.begin()
         self._show.every(WINDOW_LINE_US)
 
     def listen(self) -> None:
@@ -221,6 +224,7 @@ class CarParkStage(SystemStage[Plant]):
             wait_out=Durations.of(street.out_wait_us),
             burst=self._burst(ended),
             fleet=fleet,
+            bays=self._bays.figures(),
             messages=sum(fleet.messages.values()),
             frames=frames,
             error_frames=errors,

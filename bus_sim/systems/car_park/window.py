@@ -13,8 +13,8 @@ HOUR_US = 60 * MINUTE_US
 DAY_US = 24 * HOUR_US
 #: Arrivals are densest in so long a time, us: the worst five minutes are reported by themselves.
 BURST_US = 5 * MINUTE_US
-#: On a short eve a car comes to each compartment once in so long, us. Parking one takes half a minute and the way
-#: back as long (bound in docs/figures.md), so nobody queues when the window begins.
+#: On a short eve a car comes to each compartment for entry once in so long, us. Parking one takes half a minute and
+#: the way back as long (bound in docs/figures.md), so nobody queues when the window begins.
 EVE_US = 3 * MINUTE_US
 
 
@@ -75,15 +75,16 @@ def _best_hour(demand: Demand, worth: Callable[[int, int], tuple[int, int]]) -> 
     return DayWindow(begin_us, begin_us + HOUR_US)
 
 
-def with_short_eve(demand: Demand, window: DayWindow, compartments: int) -> Demand:
+def with_short_eve(demand: Demand, window: DayWindow, entries: int) -> Demand:
     """The same window without the hours before it: who is inside when it begins came shortly before, one by one.
 
     Who has left by then does not come at all. Nobody comes sooner than they did, and the window itself is as it was.
+    ``entries`` are the compartments at which cars come in.
     """
     before = [stay for stay in demand.stays if stay.arrival_us < window.begin_us]
     inside = [stay for stay in before if stay.departure_us is None or stay.departure_us >= window.begin_us]
     inside.sort(key=lambda stay: stay.arrival_us)
-    every_us = EVE_US // max(1, compartments)
+    every_us = EVE_US // max(1, entries)
     eve = [
         replace(stay, arrival_us=max(stay.arrival_us, window.begin_us - every_us * (len(inside) - at)))
         for at, stay in enumerate(inside)
@@ -92,16 +93,17 @@ def with_short_eve(demand: Demand, window: DayWindow, compartments: int) -> Dema
     return replace(demand, stays=(*eve, *later))
 
 
-def with_eve(demand: Demand, compartments: int) -> Demand:
+def with_eve(demand: Demand, entries: int) -> Demand:
     """The cars that are inside at the start come before it, one by one: no machine knows a car that it has not seen."""
     if not demand.inside:
         return demand
     both = (*demand.inside, *demand.stays)
     moments = [stay.departure_us for stay in both if stay.departure_us is not None]
     begin_us = min([*moments, *(stay.arrival_us for stay in demand.stays)], default=0)
-    every_us, count = EVE_US // max(1, compartments), len(demand.inside)
+    every_us, count = EVE_US // max(1, entries), len(demand.inside)
     eve = [replace(one, arrival_us=begin_us - every_us * (count - at)) for at, one in enumerate(demand.inside)]
-    told = f"{count} cars are inside at the start: they come before it, one in {every_us / 1e6:g} s"
+    who = "1 car is" if count == 1 else f"{count} cars are"
+    told = f"{who} inside at the start, brought in before it, one in {every_us / 1e6:g} s"
     return replace(demand, stays=(*eve, *demand.stays), inside=(), remarks=(*demand.remarks, told))
 
 

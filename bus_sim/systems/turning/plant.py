@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from math import hypot
 
 from bus_sim.devices.link import BusDeviceLink, DeviceBusLink
@@ -33,6 +33,12 @@ def contour_of(drawing: Drawing) -> list[tuple[float, float]]:
     for element in drawing.elements:
         points += _points_of(element)
     return points
+
+
+@lru_cache(maxsize=256)
+def _off_drawing_mm(text: str, drawing: Drawing) -> float:
+    """How far what a program cuts is from the drawing, mm; the same program is sent again and again."""
+    return contour_error_mm(run_program(text), contour_of(drawing))
 
 
 def _points_of(element: ContourElement) -> list[tuple[float, float]]:
@@ -271,7 +277,7 @@ class TurningPlant:
             self.note(f"{lathe.name} got a program for a drawing that does not exist")
             return
         if (lathe.node_id, drawing.number) not in self.programs or self.programs[lathe.node_id, drawing.number] != text:
-            error_mm = contour_error_mm(run, contour_of(drawing))
+            error_mm = _off_drawing_mm(text, drawing)
             self.errors_mm[drawing.number] = max(error_mm, self.errors_mm.get(drawing.number, 0.0))
             if error_mm > TOLERANCE_MM:
                 self.note(f"{lathe.name}: {drawing.name} would be {error_mm:.3f} mm off its drawing")

@@ -170,7 +170,7 @@ def unpack_operator_order(sender: int, data: bytes) -> OperatorOrder | None:
     if compartment < 1:
         return None
     action = word_1 & 0xF
-    if action > 3:
+    if action > 4:
         return None
     car_origin = word_1 >> 4 & 0xFF
     car_number = word_1 >> 12 & 0xFFFF

@@ -51,7 +51,7 @@ def pack_token_grant(message: TokenGrant) -> bytes:
 def unpack_token_grant(sender: int, data: bytes) -> TokenGrant | None:
     (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
-    if token_kind > 3:
+    if token_kind > 4:
         return None
     token = word_0 >> 4 & 0xFFFFFF
     version = word_0 >> 28 & 0xFFFFFFF
@@ -74,7 +74,7 @@ def pack_token_held(message: TokenHeld) -> bytes:
 def unpack_token_held(sender: int, data: bytes) -> TokenHeld | None:
     (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
-    if token_kind > 3:
+    if token_kind > 4:
         return None
     token = word_0 >> 4 & 0xFFFFFF
     version = word_0 >> 28 & 0xFFFFFFF
@@ -102,7 +102,7 @@ def pack_token_refusal(message: TokenRefusal) -> bytes:
 def unpack_token_refusal(sender: int, data: bytes) -> TokenRefusal | None:
     (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
-    if token_kind > 3:
+    if token_kind > 4:
         return None
     token = word_0 >> 4 & 0xFFFFFF
     version = word_0 >> 28 & 0xFFFFF
@@ -138,7 +138,7 @@ def pack_token_request(message: TokenRequest) -> bytes:
 def unpack_token_request(sender: int, data: bytes) -> TokenRequest | None:
     (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
-    if token_kind > 3:
+    if token_kind > 4:
         return None
     token = word_0 >> 4 & 0xFFFFFF
     version_seen = word_0 >> 28 & 0xFFFFF
@@ -165,7 +165,7 @@ def pack_token_dispute(message: TokenDispute) -> bytes:
 def unpack_token_dispute(sender: int, data: bytes) -> TokenDispute | None:
     (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
-    if token_kind > 3:
+    if token_kind > 4:
         return None
     token = word_0 >> 4 & 0xFFFFFF
     version = word_0 >> 28 & 0xFFFFFFF
@@ -193,7 +193,7 @@ def pack_token_given(message: TokenGiven) -> bytes:
 def unpack_token_given(sender: int, data: bytes) -> TokenGiven | None:
     (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
-    if token_kind > 3:
+    if token_kind > 4:
         return None
     token = word_0 >> 4 & 0xFFFFFF
     version = word_0 >> 28 & 0xFFFFFFF
@@ -221,7 +221,7 @@ def pack_token_seen(message: TokenSeen) -> bytes:
 def unpack_token_seen(sender: int, data: bytes) -> TokenSeen | None:
     (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
-    if token_kind > 3:
+    if token_kind > 4:
         return None
     token = word_0 >> 4 & 0xFFFFFF
     version = word_0 >> 28 & 0xFFFFFFF
@@ -249,7 +249,7 @@ def pack_token_assigned(message: TokenAssigned) -> bytes:
 def unpack_token_assigned(sender: int, data: bytes) -> TokenAssigned | None:
     (word_0,) = _UNPACK_Q(data)
     token_kind = word_0 & 0xF
-    if token_kind > 3:
+    if token_kind > 4:
         return None
     token = word_0 >> 4 & 0xFFFFFF
     version = word_0 >> 28 & 0xFFFFFFF

@@ -18,6 +18,8 @@ from onboard.core.records import RetiredRecord, TokenGivenRecord
 from onboard.core.serial import successor
 from onboard.systems.car_park.bay_task import queue_ticket
 from onboard.systems.car_park.records import (
+    AheadOverRecord,
+    AheadRecord,
     BayFreeRecord,
     BayJobRecord,
     CarAtRecord,
@@ -57,6 +59,16 @@ def job_record(
     return Record(BayJobRecord(task, operation, car, wheelbase_mm, car_class))
 
 
+def ahead_record(task: Reference, car: Reference, wheelbase_mm: int) -> Record:
+    """The journal's word that a car is called for before the bay is free."""
+    return Record(AheadRecord(task, car, wheelbase_mm))
+
+
+def ahead_over_record(task: Reference) -> Record:
+    """It is called for no more."""
+    return Record(AheadOverRecord(task))
+
+
 def job_over_record() -> Record:
     """The bay is free again."""
     return Record(BayFreeRecord())
@@ -80,6 +92,8 @@ _READ = (
     RetiredRecord,
     TicketRecord,
     BayJobRecord,
+    AheadRecord,
+    AheadOverRecord,
     BayFreeRecord,
     NumberRecord,
     TokenGivenRecord,
@@ -105,6 +119,8 @@ class BayMemory:
     car_class: int = ANY_CLASS
     #: Whether the winner has had the bay since the task began.
     was_granted: bool = False
+    #: Task, car and wheelbase of what is called for while the task in hand still has the bay.
+    ahead: tuple[Reference, Reference, int] | None = None
 
     def read(self, entries: Iterable[Entry]) -> "BayMemory":
         """Take up all entries; those of other kinds are passed over."""
@@ -139,6 +155,14 @@ class BayMemory:
                 self.car_class = record.car_class
                 if operation is Operation.RETRIEVE and car in self.tickets:
                     self.tickets.remove(car)
+                if self.ahead is not None and self.ahead[0] == record.task:
+                    self.ahead = None
+            case AheadRecord(car=car):
+                self.ahead = record.task, car, record.wheelbase_mm
+                if car in self.tickets:
+                    self.tickets.remove(car)
+            case AheadOverRecord():
+                self.ahead = None
             case NumberRecord():
                 self.number = record.number
             case BayFreeRecord():

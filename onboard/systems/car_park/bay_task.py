@@ -37,6 +37,7 @@ DESK_INPUT = {
     OperatorAction.INSERT_TICKET: DeskInput.TICKET,
     OperatorAction.CANCEL: DeskInput.CANCEL,
     OperatorAction.URGENT_TICKET: DeskInput.TICKET,
+    OperatorAction.CHARGING_KEY: DeskInput.CHARGING_KEY,
 }
 #: The keys of who brings a car.
 KEYS = (DeskInput.KEY, DeskInput.CHARGING_KEY)
@@ -57,6 +58,7 @@ class BayPhase(Enum):
     CLOSING = "closing"
     HANDOVER = "handover"
     RESERVING = "reserving"
+    ENTERING = "entering"
 
 
 @dataclass
@@ -80,6 +82,10 @@ class BayTask:
     refusals: int = 0
     reason: Reason = Reason.CANCELLED
     car_class: int = ANY_CLASS
+    #: From when on the bay can take its car, bus us; 0: at once.
+    ready_us: int = 0
+    #: Called for while its driver still drives in: the car is not measured, and no journal knows of it.
+    is_coming: bool = False
 
     @property
     def is_given_back(self) -> bool:
@@ -107,6 +113,7 @@ class BayTask:
             load=self.car,
             load_mm=self.wheelbase_mm,
             task_version=self.version,
+            ready_us=self.ready_us,
             floor=floor,
         )
 

@@ -98,6 +98,8 @@ class _Building:
         self.foot = top + (box.high - box.low) * self.scale
         self.low = box.low
         self.drawing.text(10, top - 6, f"floor {level}, {self.heights_mm[level] / 1000:g} m", fill="#000000")
+        for lift in self.outlines.lifts_on(level):
+            self._approach(lift, level)
         for number in self.outlines.tracks_on(level):
             self._way(number)
         for place in self.site.places:
@@ -148,13 +150,16 @@ class _Building:
             self._fill(box, colour(number - 1), 0.3)
         self._frame(*self._rectangle(box), _PLACE, 0.7)
 
+    def _approach(self, lift: int, level: int) -> None:
+        """The way from each sill to a platform, below what is written on the alley."""
+        for sill in self._sills(lift, level):
+            self._fill(self.outlines.slot(sill).around(self.outlines.platform(lift)), _WAY, 1.0)
+
     def _platform(self, lift: int, level: int) -> None:
         x, y, wide, high = self._rectangle(self.outlines.platform(lift))
-        for sill in self.site.tracks[lift].joins:
-            if self.site.level(sill.track) == level:
-                boxes = (self.outlines.slot(sill), self.outlines.platform(lift))
-                self._fill(boxes[0].around(boxes[1]), _WAY, 1.0)
-                self.drawing.line([self._middle(box) for box in boxes], _LIFT, width=2)
+        for sill in self._sills(lift, level):
+            boxes = (self.outlines.slot(sill), self.outlines.platform(lift))
+            self.drawing.line([self._middle(box) for box in boxes], _LIFT, width=2)
         self.drawing.area(_corners(x, y, wide, high), "#ffffff", opacity=1)
         self._frame(x, y, wide, high, _LIFT, 2)
         self.drawing.line([(x, y), (x + wide, y + high)], _LIFT, width=0.4)
@@ -174,6 +179,9 @@ class _Building:
         x, y, wide, high = self._rectangle(self.outlines.slot(home))
         self.drawing.area(_corners(x + wide * 0.15, y + high * 0.15, wide * 0.7, high * 0.7), _HOME, opacity=0.75)
         self.drawing.text(x + wide / 2, y + high / 2 + 4, name, anchor="middle", fill="#ffffff")
+
+    def _sills(self, lift: int, level: int) -> list[Segment]:
+        return [sill for sill in self.site.tracks[lift].joins if self.site.level(sill.track) == level]
 
     # --- px ----------------------------------------------------------------------------------------------------
 
@@ -208,15 +216,20 @@ def _level_heights_mm(site: CarPark, levels: list[int]) -> dict[int, int]:
     """How high each floor lies above the lowest, as lifts' stops tell; floors that none joins are as high as usual."""
     known: dict[int, int] = {}
     for level in reversed(levels):
-        known.setdefault(level, _told(site, level, known))
+        if level not in known:
+            known[level] = (level - 1) * site.floor_height_mm
+            _tell_above(site, known)
     low = min(known.values())
     return {level: height_mm - low for level, height_mm in known.items()}
 
 
-def _told(site: CarPark, level: int, known: dict[int, int]) -> int:
-    for lift in site.lifts:
-        stops = {site.level(sill.track): stop_mm(site, lift, at) for at, sill in enumerate(site.tracks[lift].joins, 1)}
-        below = [one for one in stops if one in known]
-        if level in stops and below:
-            return known[below[-1]] + stops[level] - stops[below[-1]]
-    return (level - 1) * site.floor_height_mm
+def _tell_above(site: CarPark, known: dict[int, int]) -> None:
+    """Add the heights of all floors that are joined to known ones, if over several lifts."""
+    shafts = [
+        {site.level(sill.track): stop_mm(site, lift, at) for at, sill in enumerate(site.tracks[lift].joins, start=1)}
+        for lift in site.lifts
+    ]
+    while shaft := next((one for one in shafts if known.keys() & one.keys() and one.keys() - known.keys()), None):
+        first = min(known.keys() & shaft.keys())
+        for level, height_mm in shaft.items():
+            known.setdefault(level, known[first] + height_mm - shaft[first])

@@ -24,7 +24,7 @@ from onboard.contract.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.contract.constants import NOBODY, OUTSIDE, TASK_VERSION_BITS
+from onboard.contract.constants import OUTSIDE
 from onboard.contract.messages import (
     BayState,
     CarAt,
@@ -40,10 +40,10 @@ from onboard.contract.messages import (
 from onboard.core.authority import TokenKey, station_token
 from onboard.core.behaviour import NEVER_US, OverheardWord
 from onboard.core.effects import Effect, Report, Send
-from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, NegotiationEvent
-from onboard.core.serial import successor
+from onboard.core.negotiation import Awarded, AwardedAgain, Closed, NegotiationEvent
 from onboard.core.site import Station
 from onboard.systems.car_park import bay_task, custody
+from onboard.systems.car_park.bay_calls import BayCalls
 from onboard.systems.car_park.bay_generation import BayGeneration
 from onboard.systems.car_park.bay_memory import (
     BayMemory,
@@ -51,11 +51,17 @@ from onboard.systems.car_park.bay_memory import (
     job_record,
     ticket_record,
 )
-from onboard.systems.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask
+from onboard.systems.car_park.bay_task import (
+    DESK_INPUT,
+    SETTLING_US,
+    BayPhase,
+    BayTask,
+)
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.outputs import BayOutputs
+from onboard.systems.car_park.pipeline import Pipeline
 from onboard.systems.car_park.program import Program
-from onboard.systems.car_park.site import car_park, open_end
+from onboard.systems.car_park.site import ANY_CLASS, car_park
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.ways.mirror import WayFleet
 from onboard.ways.site import BayUse
@@ -70,13 +76,14 @@ class Compartment:
     generation: BayGeneration
     kind: KindCode = KindCode.COMPARTMENT
     phase: BayPhase = BayPhase.STARTING
-    job: BayTask | None = None
     doors: DoorState | None = None
     bay: BayState | None = None
     tickets: deque[Reference] = field(default_factory=deque)
     stewardship: Stewardship = field(init=False)
     memory: BayMemory = field(init=False)
     outputs: BayOutputs = field(init=False)
+    calls: BayCalls = field(init=False)
+    pipeline: Pipeline = field(init=False)
     _desk_sequence: int | None = None
     _key: DeskInput | None = None
     _robot_waits: bool = False
@@ -90,6 +97,9 @@ class Compartment:
         self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)
         self.stewardship.replay(self.memory)
         self.tickets.extend(self.memory.tickets)
+        self.calls = BayCalls(self.fleet, self.station, self.stewardship, self.memory, self._robots.floor, self._on_won)
+        self.calls.take_up()
+        self.pipeline = Pipeline(self.fleet, self._park, self.calls, self.memory, self.tickets)
         self._table: dict[BayPhase, Callable[[int], list[Effect]]] = {
             BayPhase.STARTING: self._when_starting,
             BayPhase.FREE: self._when_free,
@@ -100,9 +110,19 @@ class Compartment:
             BayPhase.CLOSING: self._when_closing,
             BayPhase.HANDOVER: self._when_handover,
             BayPhase.RESERVING: self._when_reserving,
+            BayPhase.ENTERING: self._when_entering,
         }
 
     # --- the Behaviour -----------------------------------------------------------------------------------------
+
+    @property
+    def job(self) -> BayTask | None:
+        """The task that has the bay."""
+        return self.calls.job
+
+    @job.setter
+    def job(self, task: BayTask | None) -> None:
+        self.calls.job = task
 
     @property
     def station(self) -> Station:
@@ -144,46 +164,15 @@ class Compartment:
             urgent = message.action is OperatorAction.URGENT_TICKET
             return self._at_desk(DESK_INPUT[message.action], message.car, urgent=urgent)
         if isinstance(message, TaskReport):
-            return self.stewardship.hear(message, now_us) + self._on_report(message, now_us)
-        job = self.job
-        if isinstance(message, TokenRequest) and job is not None:
-            wanted = TokenKey(message.token_kind, message.token)
-            return job.remind(self.fleet.node_id, message.sender) if wanted == car_token(*job.car) else []
-        if isinstance(message, TokenRefusal) and job is not None and job.is_unknown_to(message, self.fleet.mirror):
-            job.reminders += 1
-            # Whoever has not heard the call does not know by the award which car it is about.
-            return [Send(job.award(self.fleet.node_id))] if job.reminders < REMINDERS else self._call_again(job, now_us)
+            is_starting, heard = self.phase is BayPhase.STARTING, self.stewardship.hear(message, now_us)
+            return heard + self.calls.on_report(message, now_us, is_starting=is_starting)
+        if isinstance(message, TokenRequest) and self.calls.in_hand():
+            return self.calls.remind(message)
+        if isinstance(message, TokenRefusal):
+            answer = self.calls.refused_to_winner(message, now_us)
+            if answer is not None:
+                return answer
         return self.stewardship.hear(message, now_us)
-
-    def _on_report(self, report: TaskReport, now_us: int) -> list[Effect]:
-        """What its winner, or who has won it once, says of a task of mine; or the custodian of its car."""
-        job, machine = self.job, self.fleet.site.machines.get(report.sender)
-        if job is not None and report.task == job.task and report.phase is TaskPhase.FORFEITED:
-            return self._on_forfeit(job, report.sender, now_us)
-        is_robot = machine is not None and machine.kind is KindCode.ROBOT
-        if not is_robot or self.phase is BayPhase.STARTING:
-            return self.stewardship.claimed(report, self.memory) if is_robot else []
-        if job is None or report.task != job.task:
-            return bay_task.withdrawal(self.fleet.node_id, report)
-        if report.phase is TaskPhase.AWARDED and not job.winner and job.retry_at_us is not None and not job.call:
-            return self._won_by(report.sender, job.call)
-        return job.remind(self.fleet.node_id, report.sender)
-
-    def _on_forfeit(self, job: BayTask, sender: int, now_us: int) -> list[Effect]:
-        """The winner gives the task back, or the custodian of the car has taken the right to it back."""
-        record = self.fleet.mirror.cars.get(job.car)
-        if job.winner and sender == job.winner:
-            return self._call_again(job, now_us)
-        if record is None or sender != record.custodian:
-            return []
-        if not job.winner:
-            return self._call_again(job, now_us) if self._is_unheard(job, now_us) else []
-        heard = job.winner not in self.fleet.mirror.obstacles.machines
-        if heard and job.version != 1 and job.reminders < REMINDERS:
-            # It has not heard of the newest award yet.
-            job.reminders += 1
-            return [Send(job.award(self.fleet.node_id))]
-        return self._call_again(job, now_us)
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """An own call closed: note the winner, or tell why not. Awarded a RECEIVE: the car is fetched to this bay."""
@@ -192,44 +181,24 @@ class Compartment:
             return [steps, self._accepts(event.call.task), *self._take_ticket(event.call.car)]
         if isinstance(event, AwardedAgain):
             return [self._accepts(event.call.task)]
-        if not isinstance(event, Closed) or self.job is None or event.call.task != self.job.task:
+        task = self.calls.named(event.call.task) if isinstance(event, Closed) else None
+        if not isinstance(event, Closed) or task is None:
             return []
         if event.result is CallResult.AWARDED:
-            return self._won_by(event.winner, event.call.call)
+            return self.calls.won_by(task, event.winner, event.call.call)
         if event.result is CallResult.REJECTED:
             # The winner gave the task back before it began: it is called anew, by the custodian of the car.
-            return self._call_again(self.job, now_us)
-        return self._refused(self.job, event.reason, now_us)
+            return self.calls.call_again(task, now_us)
+        return self._refused(task, event.reason, now_us)
 
     def _accepts(self, task: Reference) -> Effect:
         return Send(TaskReport(self.fleet.node_id, task, TaskPhase.AWARDED, self.station.number, Reason.NONE))
 
-    def _won_by(self, winner: int, call: int) -> list[Effect]:
-        job = self.job
-        assert job is not None
-        job.winner, job.call, job.retry_at_us, job.reminders, job.refusals = winner, call, None, 0, 0
-        if self.phase is BayPhase.HANDOVER:
-            self._go(BayPhase.LOCKING)
-        return self.stewardship.won(job.car, winner, job.task, job.version)
-
-    def _call_again(self, job: BayTask, now_us: int) -> list[Effect]:
-        """Its winner gave the task back, or is lost: it is called anew under a raised version, noted before said."""
-        job.winner, job.version, self._robot_waits = 0, successor(job.version, TASK_VERSION_BITS), False
-        effects = self.stewardship.won(job.car, 0, job.task, job.version)
-        outcome = self.fleet.negotiation.abandon(job.task, Reason.NODE_SILENT, now_us)
-        effects += [item for item in outcome if not isinstance(item, EVENT_TYPES)]
-        return effects + self._call_for(job, now_us)
-
-    def _call_for(self, job: BayTask, now_us: int) -> list[Effect]:
-        source, sink = self.station.number, open_end(job.car_class)
-        if job.operation is Operation.RETRIEVE:
-            where = custody.place_of(self.fleet, job.car)
-            if where is None:
-                job.retry_at_us = now_us + RETRY_US
-                return [Report(f"car {job.car.number} is nowhere to be fetched from")]
-            source, sink = where.number, source
-        job.retry_at_us = None
-        return list(self.fleet.negotiation.open(job.terms(source, sink, self._robots.floor), now_us))
+    def _on_won(self, task: BayTask) -> None:
+        if task is self.job:
+            self._robot_waits = False
+            if self.phase is BayPhase.HANDOVER:
+                self._go(BayPhase.LOCKING)
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Bay and the car in it: to the winner while the output door is open. All else by the steward's rules."""
@@ -248,33 +217,20 @@ class Compartment:
 
     def advance(self, now_us: int) -> list[Effect]:
         """One step of the phase table, where its condition is met."""
-        effects = self._review(now_us)
+        effects = self.calls.review(now_us)
         if self.doors is None or self.bay is None:
             return effects
-        return effects + self._table[self.phase](now_us)
-
-    def _review(self, now_us: int) -> list[Effect]:
-        """As custodian: winners that are lost; for my own task I call anew at once."""
-        effects = self.stewardship.review(now_us)
-        job = self.job
-        if job is None:
-            return effects
-        # Nobody has a right by an award that was not heard: its car is mine, and goes to the winner only.
-        is_lost = effects and self.stewardship.is_given_back(job.car) if job.winner else self._is_unheard(job, now_us)
-        return effects + self._call_again(job, now_us) if is_lost else effects
-
-    def _is_unheard(self, job: BayTask, now_us: int) -> bool:
-        return custody.is_mine(self.fleet, job.car) and self.fleet.negotiation.silent_winner(job.task, now_us) != NOBODY
+        return effects + self._table[self.phase](now_us) + self.pipeline.look_ahead(self.phase, now_us)
 
     def next_wake(self) -> int | None:
         """When a refused call is made again, or a winner counts as lost."""
-        waits = self.job is not None and self.phase in (BayPhase.AWAITING, BayPhase.HANDOVER)
-        retry_us = self.job.retry_at_us if self.job is not None and waits else None
-        return min([one for one in (retry_us, self.stewardship.next_wake()) if one is not None], default=None)
+        waits = self.phase in (BayPhase.AWAITING, BayPhase.HANDOVER)
+        times = self.calls.next_wake(is_job_asked=waits), self.pipeline.next_wake(self.phase)
+        return min((one for one in times if one is not None), default=None)
 
     def looks_from(self) -> int:
         """It looks often whether an award of its own was never heard."""
-        return 0 if self.job is not None and not self.job.winner else NEVER_US
+        return 0 if any(not task.winner for task in self.calls.in_hand()) else NEVER_US
 
     def heeds(self, message: OverheardWord) -> bool:
         """Others' slots, cars and places are nothing to it."""
@@ -300,7 +256,8 @@ class Compartment:
         job = self.job if self.job is not None and self.job.car == car else None
         if self._use is BayUse.ENTRY and job is None:
             return [self.outputs.show(DeskText.OUT_OF_ORDER, car)]
-        in_hand = job is not None and job.operation is Operation.RETRIEVE
+        about = self.calls.of_car(car)
+        in_hand = about is not None and about.operation is Operation.RETRIEVE
         new = not in_hand and bay_task.queue_ticket(self.tickets, car, urgent=urgent)
         noted: list[Effect] = [ticket_record(car, urgent=urgent)] if new else []
         if job is not None and job.is_given_back and job.retry_at_us is not None:
@@ -345,6 +302,7 @@ class Compartment:
     def _to_free(self) -> list[Effect]:
         over: list[Effect] = [job_over_record()] if self.job is not None else []
         self.job, self._robot_waits, self._key = None, False, None
+        self.pipeline.free_from_us = None
         self._go(BayPhase.FREE)
         return over + self.outputs.door(DoorName.INPUT, DoorAction.OPEN)
 
@@ -357,11 +315,20 @@ class Compartment:
         if self._key is not None:
             key, self._key = self._key, None
             return self._admit(key, now_us)
-        bay_task.forget_tickets(self.tickets, self.fleet.mirror)
-        is_empty = not self.bay.load_kg and not self.bay.person_inside
-        if self.tickets and is_empty and custody.place_of(self.fleet, self.tickets[0]) is not None:
-            self._go(BayPhase.RESERVING)
-            return [self.outputs.light_up(LightColour.RED), *self.outputs.door(DoorName.INPUT, DoorAction.CLOSE)]
+        if self.bay.load_kg or self.bay.person_inside:
+            comes = not self.bay.load_kg and self.outputs.light is LightColour.GREEN
+            called = self.pipeline.enters(now_us) if comes else []
+            self._go(BayPhase.ENTERING if called else BayPhase.FREE)
+            return called or self._invite()
+        is_out_next, called = self.pipeline.is_out_next(now_us)
+        if not is_out_next:
+            return called + self._invite()
+        self._go(BayPhase.RESERVING)
+        called.append(self.outputs.light_up(LightColour.RED))
+        return called + self.outputs.door(DoorName.INPUT, DoorAction.CLOSE)
+
+    def _invite(self) -> list[Effect]:
+        assert self.bay is not None
         colour = LightColour.RED if self._use is BayUse.EXIT else LightColour.GREEN
         return [self.outputs.light_up(colour)] if self.outputs.light is not colour and not self.bay.load_kg else []
 
@@ -373,16 +340,42 @@ class Compartment:
         found = bay_task.admitted(bay, self._park, self.fleet.mirror, charging=key is DeskInput.CHARGING_KEY)
         if isinstance(found, DeskText):
             return [self.outputs.show(found, Reference(0, 0))]
-        car, number = self.memory.next_reference(self.fleet)
-        self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm, car_class=found)
-        # The number first: one that is not used is no harm, one used twice would be.
-        effects: list[Effect] = [number, *self.fleet.tokens.create(car_token(*car))]
+        effects: list[Effect] = []
+        is_called = self.job is not None and found == ANY_CLASS
+        if self.job is not None and not is_called:
+            effects += self.calls.not_come(now_us)
+        if self.job is None:
+            car, number = self.memory.next_reference(self.fleet)
+            self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm, car_class=found)
+            # The number first: one that is not used is no harm, one used twice would be.
+            effects.append(number)
+        car = self.job.car
+        effects += self.fleet.tokens.create(car_token(*car))
         effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm, found))
+        if is_called:
+            effects += self.calls.has_come(bay.wheelbase_mm)
         stated = custody.state(self.fleet, car, self.station.number, bay.wheelbase_mm)
         effects += [*stated, self.outputs.show(DeskText.TAKE_TICKET, car)]
-        effects += self._call_for(self.job, now_us)
+        if not is_called:
+            effects += self.calls.call_for(self.job, now_us)
         self._go(BayPhase.LOCKING)
         return [*effects, self.outputs.light_up(LightColour.RED)]
+
+    def _when_entering(self, now_us: int) -> list[Effect]:
+        """Somebody drives in, and a robot is called for: until the key is pressed, or nobody is there any more."""
+        assert self.bay is not None and self.job is not None
+        if self._key is not None:
+            key, self._key = self._key, None
+            admitted = self._admit(key, now_us)
+            if self.phase is BayPhase.LOCKING:
+                return admitted
+            self._go(BayPhase.FREE)
+            return [*self.calls.not_come(now_us), *admitted]
+        is_gone = not self.bay.person_inside and not self.bay.load_kg
+        if is_gone or now_us >= self.pipeline.entering_until_us:
+            self._go(BayPhase.FREE)
+            return self.calls.not_come(now_us)
+        return []
 
     def _when_locking(self, now_us: int) -> list[Effect]:
         assert self.bay is not None and self.job is not None
@@ -404,18 +397,22 @@ class Compartment:
             return self.outputs.door(DoorName.INPUT, DoorAction.OPEN)
         if not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
-        car = self.tickets.popleft()
-        task, number = self.memory.next_reference(self.fleet)
-        self.job = BayTask(task, Operation.RETRIEVE, car, self.fleet.mirror.cars[car].wheelbase_mm)
+        called = [] if self.calls.ahead is not None else self.pipeline.call(0, now_us)
+        return called + (self._promote() if self.calls.ahead is not None else self._to_free())
+
+    def _promote(self) -> list[Effect]:
+        """The next one gets the bay, which is empty and locked."""
+        job = self.calls.ahead
+        assert job is not None
+        self.job, self.calls.ahead, self._robot_waits, self._key = job, None, False, None
         self._go(BayPhase.AWAITING)
-        job = job_record(task, Operation.RETRIEVE, car, self.job.wheelbase_mm)
-        return [number, job, *self._call_for(self.job, now_us)]
+        return [job_record(job.task, Operation.RETRIEVE, job.car, job.wheelbase_mm)]
 
     def _when_awaiting(self, now_us: int) -> list[Effect]:
         assert self.bay is not None and self.job is not None
         if self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
             has_left = self.job.operation is Operation.PARK and not self.bay.load_kg
-            return self._left(self.job) if has_left else self._call_for(self.job, now_us)
+            return self._left(self.job) if has_left else self.calls.call_for(self.job, now_us)
         if not self._robot_waits or not self.job.winner or not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
         self._go(BayPhase.OPENING)
@@ -440,7 +437,7 @@ class Compartment:
         if not self._is(DoorName.OUTPUT, DoorPosition.LOCKED):
             return []
         if job.operation is Operation.PARK and not job.is_given_back:
-            return self._to_free()
+            return self._to_free() if self.calls.ahead is None else [job_over_record(), *self._promote()]
         self._go(BayPhase.HANDOVER)
         text = DeskText.CAR_READY
         if job.is_given_back:
@@ -476,6 +473,9 @@ class Compartment:
 
     def _refused(self, job: BayTask, reason: Reason, now_us: int) -> list[Effect]:
         """Nobody could: it is called for again; meanwhile a car to be parked is its driver's to take, who is told."""
+        if job.is_coming:
+            self._go(BayPhase.FREE)
+            return self.calls.not_come(now_us)
         job.refused(reason, now_us)
         said = f"nobody can {job.operation.name.lower()} car {job.car.number}: {reason.name}; called again later"
         return [Report(said), *(self._give_back(job) if job.operation is Operation.PARK else [])]

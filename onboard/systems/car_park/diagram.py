@@ -18,6 +18,7 @@ from onboard.history.history import History
 from onboard.history.places import Place, PlaceTold
 from onboard.history.plans import PlanTold
 from onboard.history.rights import RightTold
+from onboard.systems.car_park.site import CarPark
 from onboard.trace.chart.over_time import BOTTOM, GAP, LEFT, RIGHT, TOP, WIDTH, name_machines, time_axis
 from onboard.trace.chart.svg import SvgDrawing, colour, dashes
 from onboard.trace.listener import LoggedMessage
@@ -215,11 +216,9 @@ def draw(site: Site, picture: TrackDiagram, start_us: int) -> SvgDrawing:
     top = float(TOP)
     for track, height in zip(tracks, heights, strict=True):
         is_lift = track.number in ways.lifts
-        lift_name = next((one.name for one in site.machines.values() if one.home.track == track.number), "")
-        name = f"lift {lift_name}" if is_lift else f"track {track.number}"
         drawing.area([(LEFT, top), (WIDTH - RIGHT, top), (WIDTH - RIGHT, top + height), (LEFT, top + height)],
                      "#f3f3f3", opacity=1)  # fmt: skip
-        drawing.text(8, top + 12, name)
+        drawing.text(8, top + 12, _panel_name(ways, track))
         speed_mm_s = (ways.lift if is_lift else ways.carrier).speed_mm_s
         panel = _Panel(
             drawing,
@@ -242,6 +241,19 @@ def draw(site: Site, picture: TrackDiagram, start_us: int) -> SvgDrawing:
         top += height + GAP
     time_axis(drawing, picture.first_us, picture.last_us, start_us, top)
     return drawing
+
+
+def _panel_name(ways: WaySite, track: Track) -> str:
+    """A track by its floor and the name that the site file gives it."""
+    if track.kind is TrackKind.LIFT:
+        return f"lift {next((one.name for one in ways.machines.values() if one.home.track == track.number), '')}"
+    floor = f"floor {ways.level(track.number)}"
+    if track.kind is TrackKind.SPUR:
+        return f"{floor}, spur {track.number}"
+    name = ways.alley_names.get(track.number) if isinstance(ways, CarPark) else None
+    if name:
+        return f"{floor}, alley {name}"
+    return f"{floor}, lobby" if track.ends else floor
 
 
 def _segments(ways: WaySite, track: Track) -> float:

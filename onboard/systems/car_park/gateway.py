@@ -9,7 +9,7 @@ from typing import Any
 from onboard.contract.codes import Operation, OperatorAction
 from onboard.contract.constants import ANY_STATION, OUTSIDE
 from onboard.contract.messages import OperatorOrder, Reference
-from onboard.gateway.bus_orders import BusOrders, NoBusOrders, OrderMessages, RefusedError, refuse_load
+from onboard.gateway.bus_orders import BusOrders, NoBusOrders, OrderMessages, RefusedError, refuse_charging, refuse_load
 from onboard.gateway.dialect import Json
 from onboard.gateway.edge import PhysicalLimits, SystemEdge
 from onboard.gateway.order import GatewayOrder, OrderRequest
@@ -18,20 +18,21 @@ from onboard.history.history import Fact
 from onboard.history.loads import LoadTold
 from onboard.systems.car_park.site import CarPark
 from onboard.trace.view import SiteView
-from onboard.ways.site import WaySite, way_site
+from onboard.ways.site import way_site
 
 #: A ticket is put in again so often until the call for it is heard, us; a compartment passes a second one over.
 TICKET_AGAIN_US = 30_000_000
 #: A key press is not repeated, for the next car may be another's: heard within this, or refused, us.
 KEY_PATIENCE_US = 20_000_000
+_NOT_CALLED_FOR = "the compartment has not called for it: no car in it, it is not ready, or no place is free "
 
 
 class CarParkOrders(NoBusOrders):
     """A robotized car park; ``view`` is what was heard of it."""
 
-    def __init__(self, site: WaySite, view: SiteView, place: Callable[[int], str | None]) -> None:
+    def __init__(self, site: CarPark, view: SiteView, place: Callable[[int], str | None]) -> None:
         super().__init__(site)
-        self._view, self._place = view, place
+        self._park, self._view, self._place = site, view, place
         self._desks = {machine.name: node for node, machine in site.machines.items() if node in site.compartments}
 
     def transport(self, body: dict[str, Any]) -> OrderRequest:
@@ -42,21 +43,24 @@ class CarParkOrders(NoBusOrders):
             node = self._desk(body["to"], "$.to")
             if "car" not in body and "from" not in body:
                 raise RefusedError("INCOMPLETE", "name the car, or from where", "$.car")
+            refuse_charging(body, "say it when the car is parked")
             car = _car(body["car"]) if "car" in body else self._standing(body["from"])
             return OrderRequest("fetch", node, car, urgent=urgent)
         if "from" not in body:
             raise RefusedError("INCOMPLETE", "name a compartment to hand out at, or one to park from", "$.to")
-        return OrderRequest("park", self._desk(body["from"], "$.from"), urgent=urgent)
+        charging = body.get("charging", False)
+        if not any(one.charging for one in self._park.classes):
+            refuse_charging(body, "this site has no place to charge; leave it out")
+        return OrderRequest("park", self._desk(body["from"], "$.from"), urgent=urgent, charging=charging)
 
     def say(self, order: GatewayOrder, sender: int, wall_us: int) -> OrderMessages:
         """A ticket, or the key."""
         request = order.request
         if request.car is None:
             if order.was_said:
-                raise RefusedError("NOT_TAKEN", "the compartment has not called for it: no car in it, or not ready")
-            return OrderMessages(
-                (OperatorOrder(sender, request.node, OperatorAction.PRESS_KEY, Reference(0, 0)),), KEY_PATIENCE_US
-            )
+                raise RefusedError("NOT_TAKEN", _NOT_CALLED_FOR + ("to charge at" if request.charging else "for it"))
+            key = OperatorAction.CHARGING_KEY if request.charging else OperatorAction.PRESS_KEY
+            return OrderMessages((OperatorOrder(sender, request.node, key, Reference(0, 0)),), KEY_PATIENCE_US)
         if request.car not in self._view.history.loads.stations:
             raise RefusedError("UNKNOWN_TICKET", "no such car is in the park", "$.car")
         action = OperatorAction.URGENT_TICKET if request.urgent else OperatorAction.INSERT_TICKET

@@ -26,6 +26,7 @@ from onboard.systems.car_park.program import (
     StationWork,
     steps_of,
     to_itinerary,
+    waiting_at,
 )
 from onboard.systems.car_park.site import CarPark, class_of_end, end_at, one_a_segment, open_class
 from onboard.ways.effort import Effort, Search
@@ -98,7 +99,8 @@ class CarParkGeneration:
             return None
         limits = self.site.cars
         # On the bus a wheelbase is rounded down to 10 mm; the desk has measured it to the millimetre.
-        if not limits.min_wheelbase_mm - 9 <= call.wheelbase_mm <= limits.max_wheelbase_mm:
+        is_measured = call.wheelbase_mm or not call.ready_ms
+        if is_measured and not limits.min_wheelbase_mm - 9 <= call.wheelbase_mm <= limits.max_wheelbase_mm:
             return None
         _, segment, start_us = self._start(call, now_us)
         bounds = self._lower_bounds(call, self._candidates(call, now_us), segment, start_us)
@@ -429,15 +431,13 @@ class CarParkGeneration:
 
     def _visits(self, call: CallForProposals, place: Station, near_us: int) -> tuple[Visit, Visit]:
         source, sink = self.ends(call, place)
-        ready_us = 0
-        if source in self.site.compartments.values():
+        is_in, called_us = source in self.site.compartments.values(), self._deadline_us(call, near_us)
+        ready_us = called_us + call.ready_ms * 1000 if call.ready_ms else 0
+        if is_in and not ready_us:
             # The customer walks out, then the input door locks; only then may the output door open.
-            called_us = self._deadline_us(call, near_us) - self.site.timing.call_window_us
-            ready_us = called_us + CUSTOMER_US + self.site.timing.door_us
-        return (
-            Visit(source.segment, self.handling_us(source), ready_us),
-            Visit(sink.segment, self.handling_us(sink)),
-        )
+            ready_us = called_us - self.site.timing.call_window_us + CUSTOMER_US + self.site.timing.door_us
+        take = Visit(source.segment, self.handling_us(source), ready_us if is_in else 0)
+        return take, Visit(sink.segment, self.handling_us(sink), 0 if is_in else ready_us)
 
     def handling_us(self, station: Station) -> int:
         """Reach, grip or release, retract; at a compartment its output door opens first."""
@@ -486,7 +486,8 @@ class CarParkGeneration:
             StationWork(CarHandling.TAKE, source, call.car, call.wheelbase_mm, call),
             StationWork(CarHandling.LEAVE, sink, call.car, call.wheelbase_mm, call),
         ]
-        return steps_of(route, works)
+        steps = steps_of(route, works)
+        return waiting_at(self.site.compartments.values(), steps) if call.ready_ms else steps
 
     def _deadline_us(self, call: CallForProposals, now_us: int) -> int:
         """When a call closes, or closed; now where that is read in a time that was not its caller's: work in hand."""

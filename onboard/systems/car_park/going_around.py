@@ -17,6 +17,7 @@ from onboard.core.site import Segment
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
+from onboard.systems.car_park.kept_out import KeptOut
 from onboard.systems.car_park.places import PlaceChoice
 from onboard.systems.car_park.program import CarHandling, CarStep, HandlingPhase, Program, StationWork, to_itinerary
 from onboard.systems.car_park.recovery import forfeited_record, sink_record
@@ -69,6 +70,7 @@ class GoingAround:
     def __post_init__(self) -> None:
         self.places = PlaceChoice(self.fleet, self.generation, self.shuttle)
         self.standoff = Standoff(self.fleet, self.carriage)
+        self.kept_out = KeptOut(self.fleet, self.shuttle)
 
     @property
     def program(self) -> Program:
@@ -78,7 +80,14 @@ class GoingAround:
     def next_wake(self) -> int | None:
         """When to try again, or to say again what was given back."""
         stands_us = None if self._stands_since_us is None else self._stands_since_us + KEEP_US
-        times = [self.next_word(), self._retry_at_us, self._place_at_us, stands_us, self.standoff.due_us]
+        times = [
+            self.next_word(),
+            self._retry_at_us,
+            self._place_at_us,
+            stands_us,
+            self.standoff.due_us,
+            self.kept_out.next_wake(),
+        ]
         return min((time for time in times if time is not None), default=None)
 
     def next_word(self) -> int | None:
@@ -101,6 +110,9 @@ class GoingAround:
             return effects + self._make_room(now_us)
         if self._retry_at_us is not None and self._retry_at_us <= now_us:
             effects += self._try(now_us)
+        kept_out = self.kept_out.look(self.program, now_us)
+        if kept_out is not None:
+            effects += self._choose_for(kept_out, now_us)
         other = self.standoff.look(now_us)
         if other != NOBODY:
             effects += self._turn_away(other, now_us)

@@ -152,10 +152,20 @@ class ShuttleWork:
         return authorised(self.fleet.motion, self._rights())
 
     def _acquire(self, now_us: int) -> list[Effect]:
+        assert self.work is not None
         effects: list[Effect] = []
-        for key in self._rights():
+        rights = self._rights()
+        if not self.work.wheelbase_mm and self.work.car not in self.fleet.mirror.cars:
+            # Its driver still drives in: nobody has the right to a car that is not there.
+            rights = rights[:1]
+        for key in rights:
             effects += self.fleet.tokens.want(key, now_us)
         return effects
+
+    def _wheelbase_mm(self, work: StationWork) -> int:
+        """As it was called for; of a car that was called for before it was measured, as its custodian tells it."""
+        record = self.fleet.mirror.cars.get(work.car)
+        return work.wheelbase_mm or (0 if record is None else record.wheelbase_mm)
 
     def _next(self, now_us: int) -> list[Effect]:
         assert self.work is not None
@@ -168,7 +178,7 @@ class ShuttleWork:
             return []
         self.phase = following
         self.sequence = successor(self.sequence, 8)
-        side, wheelbase_mm = self.work.station.side, self.work.wheelbase_mm
+        side, wheelbase_mm = self.work.station.side, self._wheelbase_mm(self.work)
         self._ordered = ShuttleOrder(self.fleet.node_id, self.sequence, order, side, wheelbase_mm)
         self._unheard.ordered("shuttle")
         self.stall.ordered(now_us)
@@ -180,7 +190,8 @@ class ShuttleWork:
         key = car_token(*work.car)
         taken = work.handling is CarHandling.TAKE
         # After a restart it may be with its new custodian already, who states it then.
-        effects = custody.state(self.fleet, work.car, ANY_STATION if taken else work.station.number, work.wheelbase_mm)
+        where, wheelbase_mm = ANY_STATION if taken else work.station.number, self._wheelbase_mm(work)
+        effects = custody.state(self.fleet, work.car, where, wheelbase_mm)
         owner = custody.keeper(self.fleet.site, work.station)
         given = [station_token(work.station)] if taken else [key, station_token(work.station)]
         for token in given:

@@ -7,14 +7,13 @@ lower stamp; the other leaves its car elsewhere. A place in which a car stands i
 
 from dataclasses import dataclass
 
-from onboard.contract.codes import LegAction
-from onboard.contract.messages import Itinerary
 from onboard.core.authority import station_token
 from onboard.core.serial import ranks_before
 from onboard.core.site import Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
+from onboard.systems.car_park.kept_out import works_at
 from onboard.systems.car_park.program import CarHandling, HandlingPhase, StationWork
 from onboard.systems.car_park.site import ANY_CLASS, class_of_end
 from onboard.ways.mirror import WayFleet
@@ -54,13 +53,5 @@ class PlaceChoice:
         holder = self.fleet.tokens.holder_of(station_token(station))
         if holder == me or mine is None:
             return False
-        rivals = [one for one in mirror.itineraries.values() if one.sender != me and _works_at(one, station)]
+        rivals = [one for one in mirror.itineraries.values() if one.sender != me and works_at(one, station)]
         return any(one.sender == holder or ranks_before(one.stamp, mine.stamp) for one in rivals)
-
-
-def _works_at(itinerary: Itinerary, station: Station) -> bool:
-    return any(
-        leg.action is LegAction.WORK
-        and (leg.track, leg.to_index, leg.side) == (station.track, station.index, station.side)
-        for leg in itinerary.legs
-    )

@@ -4,7 +4,7 @@ A step is one leg of the itinerary together with what is done in it, so the prog
 happened, and sent as an itinerary, all from one value.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
@@ -286,6 +286,22 @@ def steps_of(route: Route, works: Sequence[StationWork]) -> tuple[CarStep, ...]:
         )
         for leg in route.legs
     )
+
+
+def waiting_at(bays: Collection[Station], steps: Sequence[CarStep]) -> tuple[CarStep, ...]:
+    """The same steps, but a wait right before work at one of ``bays`` is part of it: there one waits for a door.
+
+    The work begins when its robot is there, and ends when it was planned to, or sooner.
+    """
+    found: list[CarStep] = []
+    for step in steps:
+        last = found[-1] if found else step
+        is_at_bay = step.work is not None and step.work.station in bays
+        if is_at_bay and last.action is LegAction.STAND and last.destination == step.destination:
+            found[-1] = step._replace(begin_us=last.begin_us)
+        else:
+            found.append(step)
+    return tuple(found)
 
 
 def ends_at(site: WaySite, step: CarStep) -> Segment:

@@ -165,13 +165,39 @@ class BayJobRecord(JournalRecord):
     """A task of the bay begins, for this car; its class matters where it is to be parked."""
 
     NAME = "job"
-    RULES = (Keep("job"), RecordEnd(("ticket",), _CAR, ("operation", (Operation.RETRIEVE,))))
+    RULES = (
+        Keep("job"),
+        RecordEnd(("ticket",), _CAR, ("operation", (Operation.RETRIEVE,))),
+        RecordEnd(("ahead",), _TASK),
+    )
 
     task: Reference
     operation: Operation
     car: Reference
     wheelbase_mm: int
     car_class: int = field(default=0, metadata=UNSAID)
+
+
+@dataclass(frozen=True, slots=True)
+class AheadRecord(JournalRecord):
+    """A car is called for that is to come into the bay after the task in hand; the bay's task ends it."""
+
+    NAME = "ahead"
+    RULES = (Keep("ahead", _TASK), RecordEnd(("ticket",), _CAR))
+
+    task: Reference
+    car: Reference
+    wheelbase_mm: int
+
+
+@dataclass(frozen=True, slots=True)
+class AheadOverRecord(JournalRecord):
+    """That car has left another way."""
+
+    NAME = "ahead_over"
+    RULES = (RecordEnd(("ahead",), _TASK),)
+
+    task: Reference
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,6 +266,8 @@ RECORDS: RecordTypes = (
     WinnerRecord,
     TicketRecord,
     BayJobRecord,
+    AheadRecord,
+    AheadOverRecord,
     BayFreeRecord,
     NumberRecord,
     DoorRecord,

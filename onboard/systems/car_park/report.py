@@ -5,7 +5,15 @@ from collections import Counter
 from onboard.config.site_report import counted, machines_line
 from onboard.contract.codes import KindCode
 from onboard.core.site import Machine, Segment, Station
-from onboard.systems.car_park.room import ranges_text, robots_of, robots_text, room_text
+from onboard.systems.car_park.room import (
+    MORE,
+    ranges_text,
+    refuge_tracks,
+    robots_of,
+    robots_text,
+    room_text,
+    tracks_text,
+)
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.reach import hidden_by, reached, stranded_by
 from onboard.ways.room import reachable
@@ -22,10 +30,18 @@ def lines(site: CarPark) -> list[str]:
         _places_line(site),
         _reached_line(site),
         machines_line(site, _KINDS),
-        f"{room_text(site, robots_of(site))}, {robots_text(robots_of(site))}",
+        f"{_room_words(site)}, {robots_text(robots_of(site))}",
         *(_loss_line(site, lift) for lift in lifts),
         *_one_way_lines(site),
     ]
+
+
+def _room_words(site: CarPark) -> str:
+    """How many robots can rest together; a lone one in more places, where nobody else has to pass."""
+    if robots_of(site) > 1 or not site.is_charted:
+        return room_text(site, robots_of(site))
+    lone = tracks_text(site, refuge_tracks(site, 1))
+    return f"{room_text(site, MORE)}; a lone one may rest on {lone}"
 
 
 def _floors_lines(site: CarPark) -> list[str]:
@@ -90,7 +106,7 @@ def _one_way_lines(site: CarPark) -> list[str]:
             seen |= set(ring)
             lines.append(f"one way round on floor {site.level(first)}: alleys {', '.join(map(str, ring))}")
     alone = [number for number in after if number not in seen]
-    return lines + ([f"one way: alleys {ranges_text(alone)}"] if alone else [])
+    return lines + ([f"one way: alley{'s' if len(alone) > 1 else ''} {ranges_text(alone)}"] if alone else [])
 
 
 def _next_one_way(site: CarPark, track: Track) -> int | None:

@@ -283,8 +283,8 @@ class ParkingRobot:
         return Send(TaskReport(self.fleet.node_id, task, TaskPhase.FORFEITED, 0, Reason.CANCELLED))
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
-        """A robot passes segments and stations back to their stewards by itself; until then it refuses."""
-        return Reason.TOKEN_NOT_GRANTABLE_YET
+        """All goes back to the stewards by itself, and is refused until then; a slot that was left goes on at once."""
+        return self.carriage.left.may_grant(key, requester, now_us)
 
     def advance(self, now_us: int) -> list[Effect]:
         """Carry on with the step in hand."""

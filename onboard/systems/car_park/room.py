@@ -17,6 +17,9 @@ from onboard.ways.refuges import open_refuges
 from onboard.ways.room import resting_room
 from onboard.ways.site import TrackKind, WaySite
 
+#: More robots than a lone one, which nobody has to pass.
+MORE = 2
+
 
 def robots_of(site: WaySite) -> int:
     """How many carriers the site has."""
@@ -25,8 +28,10 @@ def robots_of(site: WaySite) -> int:
 
 def refuge_tracks(site: WaySite, robots: int) -> list[int]:
     """Alleys and spurs, by track number, in each of which one of ``robots`` carriers may stand for ever."""
+    if robots > 1 and site.is_charted:
+        return sorted(resting_room(site).stretches)
     found = {segment.track for segment in open_refuges(site, ())}
-    if robots > 1 and not site.is_charted:
+    if robots > 1:
         alleys = {track.number for track in site.tracks.values() if track.kind is TrackKind.ALLEY}
         found -= passages(site) if len(alleys) > 1 else alleys
     return sorted(found)
@@ -41,8 +46,9 @@ def check_room(root: TomlTable, site: WaySite, fleet: FleetReader) -> None:
         root.bad("robots", None, f"{robots_text(robots)}, but {room_text(site, robots)}", remedy)
         return
     taken: dict[int, str] = {}
-    free = set(tracks) - {home.track for _, home in fleet.robots}
-    for table, home in fleet.robots:
+    homes = [(table, home) for table, home in fleet.robots if "home" not in table.wrong]
+    free = set(tracks) - {home.track for _, home in homes}
+    for table, home in homes:
         why = _why_not(site, home, tracks, taken)
         if why:
             table.bad("home", table.values["home"], why, f"choose one of: {tracks_text(site, sorted(free))}")
@@ -80,7 +86,7 @@ def room_text(site: WaySite, robots: int) -> str:
     tracks = refuge_tracks(site, robots)
     if tracks:
         return f"refuges for {len(tracks)} ({tracks_text(site, tracks)})"
-    return "refuges for a lone one only" if refuge_tracks(site, 1) else "no refuge"
+    return "refuges for a lone one only" if robots > 1 and refuge_tracks(site, 1) else "no refuge"
 
 
 def tracks_text(site: WaySite, tracks: list[int]) -> str:

@@ -37,7 +37,7 @@ class SillProof:
         if isinstance(message, Progress):
             machine = self.fleet.site.machines.get(message.sender)
             return machine is not None and machine.kind is KindCode.LIFT
-        return message.token_kind is not TokenKind.SEGMENT
+        return message.token_kind not in (TokenKind.SEGMENT, TokenKind.RUN)
 
     def stands_at(self, lift_track: int) -> int | None:
         """The lift index at which the platform stands for as long as I hold its gate; None where that is not proved."""

@@ -96,12 +96,25 @@ class RideCalls(Enum):
     BEFORE = "before"
 
 
+class CallAt(Enum):
+    """When a compartment calls for a robot.
+
+    With the KEY, and for a car to be fetched once the bay is locked for it: the order of the paper (row P50); or when
+    somebody ARRIVES, at the bay or with a ticket, while the bay still works for whoever was before.
+    """
+
+    KEY = "key"
+    ARRIVAL = "arrival"
+
+
 @dataclass(frozen=True, kw_only=True)
 class CarPark(WaySite):
     """A robotized car park (rows P30 to P33)."""
 
     system: ClassVar[str] = "car-park"
     has_regeneration: ClassVar[bool] = True
+    #: When a compartment calls is its own affair: nobody is a stranger to one that calls at another moment.
+    demand: ClassVar[frozenset[str]] = frozenset({"call_at"})
     moved_by: ClassVar[Mapping[str, MotionNeeds]] = {
         "DriveOrder": MotionNeeds.RIGHT,
         "ShuttleOrder": MotionNeeds.RIGHT,
@@ -113,6 +126,7 @@ class CarPark(WaySite):
     shuttle_reach_mm: int
     cars: CarLimits
     rides: RideCalls = RideCalls.PLANNED
+    call_at: CallAt = CallAt.KEY
     #: Whether a bid brings its tentative itinerary: to be seen, as in the paper; nobody plans around it.
     tells_offers: bool = False
     #: In the order in which a car is tried against them; numbers are from 1.

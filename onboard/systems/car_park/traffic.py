@@ -1,28 +1,38 @@
 """How much the machines of a site may put on the fleet bus, message by message: what response-time bounds start from.
 
 Most messages are sent on events, so their bounds need a stated most. Each row below says how many frames may be queued
-at once and after which time as many again, and why; ``excess`` tells whether a bus kept to that. Two rows of life:
+at once and after which time as many again, and why; ``excess`` tells whether a bus kept to that. What has a budget is
+held to it by its sender, whatever its program wants to say (``onboard/wire/pace.py``); what answers is bounded by what
+it answers. Two rows of life:
 ``operation`` (all machines run, nobody asks anybody to say everything again) and ``power_up`` (all start together).
 Gateways, whose orders a person gives, and lost frames, which are sent again, are not counted.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from onboard.contract.codes import KindCode
-from onboard.core.site import BEATS_APART_US, Site
+from onboard.contract.codes import KindCode, Reason
+from onboard.core.site import Site
 from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.trace.frame_length import longest_frame_bits
 from onboard.trace.response import ANYBODY, Stream
 from onboard.ways.site import way_site
 from onboard.wire.dbc_file import MessageLayout, fleet_layouts
+from onboard.wire.pace import HELD_US, Pace, paces_of
 
 _SECOND_US = 1_000_000
 #: Legs that an itinerary's head can announce (dbc/fleet.dbc).
-_MOST_LEGS = 31
+MOST_LEGS = 31
+#: What a machine says after its plans, where these wait (``onboard/controller/outgoing.py``).
+_AFTER_PLANS = (
+    *("ItineraryHead", "ItineraryLeg", "TokenRequest", "Progress", "Waiting", "TaskReport", "CarAt"),
+    *("Blocked", "Clear", "SyncRequest", "SyncDone", "Heartbeat", "Diagnostic"),
+)
 #: A robot asks for the segments that it covers while it brakes and in this time (kinds/car_park/travel.py), us.
 _LOOKAHEAD_US = 3_000_000
+#: Segments that it asks for beyond those (travel.py): in one frame, but they may be refused and granted one by one.
+_MORE_AHEAD = 4
 #: Beside segments ahead: a lift's platform and gate. A car and a place are asked for where no way is ahead.
 _OTHER_RIGHTS = 2
 #: Rides that one bid may ask for: a part's number has 4 bits (dbc/fleet.dbc).
@@ -40,7 +50,8 @@ _STEWARDS = (KindCode.COMPARTMENT, KindCode.LIFT)
 class Numbers(NamedTuple):
     """What bursts and periods are made of: machines by kind, rights that a robot asks for at once, times in us.
 
-    ``rides`` are those that all robots may call for within one call window.
+    ``rides`` are those that all robots may call for within one call window; ``segment_us`` is the shortest segment at
+    top speed.
     """
 
     nodes: int
@@ -48,10 +59,12 @@ class Numbers(NamedTuple):
     compartments: int
     rights: int
     rides: int
-    token_repeat_us: int
+    segment_us: int
+    grip_us: int
     heartbeat_us: int
     bus_time_us: int
     call_window_us: int
+    paces: Mapping[str, Pace]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,36 +107,43 @@ def _late(_: Numbers) -> int:
     return _TIMER_JITTER_US
 
 
+def _grip(numbers: Numbers) -> int:
+    return max(_SECOND_US, numbers.grip_us)
+
+
+def _paced(message: str, kinds: tuple[KindCode, ...], why: str) -> TrafficBound:
+    """Its sender keeps to its budget."""
+    return TrafficBound(
+        message,
+        kinds,
+        _one,
+        lambda n: n.paces[message].apart_us,
+        why,
+        lambda n: (n.paces[message].burst - 1) * n.paces[message].apart_us,
+    )
+
+
+def _answers(message: str, times: int, why: str) -> TrafficBound:
+    """So many for each request, by whoever is asked."""
+
+    def apart_us(numbers: Numbers) -> int:
+        return numbers.paces["TokenRequest"].apart_us // (times * numbers.robots)
+
+    def ahead_us(numbers: Numbers) -> int:
+        return (times * numbers.robots * numbers.paces["TokenRequest"].burst - 1) * apart_us(numbers)
+
+    return TrafficBound(message, (), _one, apart_us, why, ahead_us)
+
+
 _OPERATION = (
     TrafficBound("EmergencyStop", _ALL, _one, _second, "a person presses a button"),
-    TrafficBound(
-        "TokenRequest",
-        _ROBOT,
-        lambda n: n.rights,
-        lambda n: n.token_repeat_us,
-        "each right is asked for again so often",
-    ),
-    TrafficBound(
-        "TokenRefusal",
-        (),
-        lambda n: n.robots * n.rights,
-        lambda n: n.token_repeat_us,
-        "the holder answers each request",
-    ),
-    TrafficBound("TokenGrant", (), lambda n: 2 * n.robots * n.rights, _second, "all rights of all robots come and go"),
-    TrafficBound("TokenHeld", (), lambda n: 2 * n.robots * n.rights, _second, "one for each grant"),
+    _paced("TokenRequest", _ROBOT, "its budget; rights are asked for ahead of the way, and again"),
+    _answers("TokenRefusal", 1, "the holder answers each request"),
+    _answers("TokenGrant", 2, "a right that was asked for comes, and goes to the next or back"),
+    _answers("TokenHeld", 2, "one for each grant"),
     TrafficBound("BusTime", (), _one, lambda n: n.bus_time_us, "its period; one machine sends it", _late),
-    TrafficBound(
-        "Heartbeat",
-        _ALL,
-        lambda n: 1 + -(-n.heartbeat_us // BEATS_APART_US),
-        lambda n: n.heartbeat_us,
-        "its period, and after its own words, so far apart",
-        _late,
-    ),
-    TrafficBound(
-        "Diagnostic", _ALL, _two, lambda n: n.heartbeat_us, "with a heartbeat, for each reason that grew", _late
-    ),
+    _paced("Heartbeat", _ALL, "its budget; its period, and after its own words"),
+    _paced("Diagnostic", _ALL, "its budget; with a heartbeat, for each reason that grew"),
     *(
         row
         for part in ("Call", "CallTerms", "CallLoad")
@@ -139,26 +159,23 @@ _OPERATION = (
     TrafficBound("ManualState", (), _two, _second, "it answers, and comes to rest"),
     TrafficBound("Bid", _ROBOT, lambda n: n.compartments, _window, "one for each desk's call"),
     TrafficBound("Bid", (), _rides, _window, "one for each ride asked for"),
-    TrafficBound(
-        "ItineraryHead", _ROBOT, _two, _window, "with an award, a delay, and a bid where offers are told", _window
-    ),
-    TrafficBound(
-        "ItineraryLeg", _ROBOT, lambda _: _MOST_LEGS, _window, "the most legs, of all these together", _window
-    ),
+    _paced("ItineraryHead", _ROBOT, "its budget; with an award, a delay, and a bid where offers are told"),
+    _paced("ItineraryLeg", _ROBOT, "its budget; of all itineraries together"),
     TrafficBound(
         "Progress",
-        (KindCode.ROBOT, KindCode.LIFT),
+        _ROBOT,
         _three,
-        lambda _: _SECOND_US // 2,
-        "segments at top speed; it stops, is at its place, and the next leg begins",
+        lambda n: max(_SECOND_US // 2, n.segment_us),
+        "a segment at top speed; it stops, is at its place, and the next leg begins",
     ),
+    TrafficBound("Progress", _LIFT, _three, lambda _: _SECOND_US // 2, "a floor; it stops, and the next leg begins"),
     TrafficBound("Blocked", _STEWARDS, _one, _second, "a person says so, and the track's steward says it again, once"),
     TrafficBound("Clear", _STEWARDS, _one, _second, "the same"),
-    TrafficBound("Waiting", _ROBOT, _two, _second, "once for each thing waited for"),
-    TrafficBound("TaskReport", _ROBOT, _two, _second, "one phase ends and the next begins"),
+    TrafficBound("Waiting", _ROBOT, _two, _grip, "once for each thing waited for"),
+    TrafficBound("TaskReport", _ROBOT, _two, _grip, "one phase ends and the next begins"),
     TrafficBound("TaskReport", (), _rides, _window, "one for each ride won"),
-    TrafficBound("TaskReport", _COMPARTMENT, _two, _second, "as a robot"),
-    TrafficBound("CarAt", _ALL, _two, _second, "a car changes hands"),
+    TrafficBound("TaskReport", _COMPARTMENT, _two, _grip, "as a robot"),
+    TrafficBound("CarAt", _ALL, _two, _grip, "a car changes hands, in no less than a grip"),
 )
 
 #: Every machine asks all once, and who was not answered; it says all it has once to all who ask within a quarter of a
@@ -173,15 +190,8 @@ _POWER_UP = (
     TrafficBound(
         "BusTime", (), lambda n: 3 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks, by two for a moment"
     ),
-    TrafficBound(
-        "Heartbeat",
-        _ALL,
-        lambda n: 4 + -(-n.heartbeat_us // BEATS_APART_US),
-        lambda n: n.heartbeat_us,
-        "at once, when bus time is heard and when it has started, then as in operation",
-        _late,
-    ),
-    TrafficBound("Diagnostic", _ALL, _two, lambda n: n.heartbeat_us, "as in operation", _late),
+    _paced("Heartbeat", _ALL, "at once, when bus time is heard and when it has started, then as in operation"),
+    _paced("Diagnostic", _ALL, "as in operation"),
 )
 
 
@@ -193,17 +203,20 @@ def numbers_of(site: Site) -> Numbers:
     carrier = ways.carrier
     braking_mm = carrier.speed_mm_s**2 // (2 * carrier.acceleration_mm_s2)
     ahead_mm = braking_mm + carrier.speed_mm_s * _LOOKAHEAD_US // _SECOND_US
+    paces = paces_of(site)
     shortest_mm = min(track.pitch_mm for number, track in ways.tracks.items() if number not in ways.lifts)
     return Numbers(
         len(kinds),
         kinds.count(KindCode.ROBOT),
         kinds.count(KindCode.COMPARTMENT),
-        2 + -(-ahead_mm // shortest_mm) + _OTHER_RIGHTS,
+        2 + -(-ahead_mm // shortest_mm) + _MORE_AHEAD + _OTHER_RIGHTS,
         _MOST_PARTS * kinds.count(KindCode.ROBOT) * kinds.count(KindCode.COMPARTMENT) if asks else 0,
-        site.timing.token_repeat_us,
+        shortest_mm * _SECOND_US // carrier.speed_mm_s,
+        car_park(site).timing.grip_us,
         site.timing.heartbeat_us,
         site.timing.bus_time_us,
         site.timing.call_window_us,
+        paces,
     )
 
 
@@ -215,6 +228,20 @@ def operation(site: Site) -> list[Stream]:
 def power_up(site: Site) -> list[Stream]:
     """Everything that may be queued when all machines of a site start together."""
     return list(_streams(site, _POWER_UP))
+
+
+def waits(site: Site) -> dict[str, int]:
+    """How long a frame may wait for its sender's budgets at most, us by message; those that are not here never wait.
+
+    Of itineraries there is at most one of which others have heard the beginning, and one after it.
+    """
+    numbers, paces = numbers_of(site), paces_of(site)
+    plans_us = 2 * (MOST_LEGS * paces["ItineraryLeg"].apart_us + paces["ItineraryHead"].apart_us)
+    found = dict.fromkeys(_AFTER_PLANS, plans_us)
+    found["TokenRequest"] += numbers.rights * paces["TokenRequest"].apart_us
+    found["Diagnostic"] += len(Reason) * paces["Diagnostic"].apart_us
+    found["Heartbeat"] = HELD_US + paces["Heartbeat"].apart_us
+    return found
 
 
 def reasons() -> Iterator[tuple[str, str]]:
@@ -270,6 +297,6 @@ def _too_many(stream: Stream, times: list[int]) -> str:
             if last - first + 1 > allowed:
                 at = f"{last - first + 1} frames within {span_us} us up to {until_us / 1e6:.6f} s"
                 return f"{stream.name} of node {stream.node}: {at}, at most {allowed} expected"
-            if span_us > 10 * stream.period_us:
+            if span_us > 10 * stream.period_us + stream.jitter_us:
                 break
     return ""

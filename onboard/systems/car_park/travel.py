@@ -10,6 +10,7 @@ slot and the one inside before it turns.
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from itertools import takewhile
 
 from onboard.contract.codes import DriveMode, Reason, TokenKind
 from onboard.contract.messages import DriveOrder, DriveState, Progress, Waiting
@@ -24,8 +25,9 @@ from onboard.systems.car_park.sill import SillProof
 from onboard.systems.car_park.stall import Stall
 from onboard.ways.all_or_none import AllOrNone
 from onboard.ways.kinematics import run_duration_us
+from onboard.ways.left_behind import LeftBehind
 from onboard.ways.lifts import GATE_INDEX, MARK_TOLERANCE_MM, gate, platform
-from onboard.ways.mirror import WayFleet
+from onboard.ways.mirror import WayFleet, slot_of
 from onboard.ways.refuges import refuges
 from onboard.ways.site import TrackKind
 
@@ -35,6 +37,9 @@ LOOKAHEAD_US = 3_000_000
 #: A holder's view of the order that has differed from mine for this long will not be mended by asking again, us:
 #: several answers have come and gone.
 ORDER_PATIENCE_US = 5_000_000
+#: Slots that are asked for at once beyond those that are needed soon: a run is one request, one grant and one answer.
+#: Not the front of a compartment: who gets stuck before it would close it.
+MORE_AHEAD = 4
 
 
 @dataclass
@@ -65,6 +70,9 @@ class Carriage:
     #: Whether nothing stands out of the carrier, by its sensors: it gets no order to move else (row P32).
     is_clear: Callable[[], bool] = lambda: True
     whole: AllOrNone = field(init=False)
+    left: LeftBehind = field(init=False)
+    #: Whether the goal is another than when what was left was given back last.
+    _turned: bool = False
     sill: SillProof = field(init=False)
     stall: Stall = field(default_factory=Stall)
     placing: Placing = field(init=False)
@@ -72,6 +80,7 @@ class Carriage:
     def __post_init__(self) -> None:
         self.placing = Placing(self.fleet.site)
         self.whole = AllOrNone(self.fleet.tokens)
+        self.left = LeftBehind(self.fleet)
         self.sill = SillProof(self.fleet)
 
     @property
@@ -206,6 +215,7 @@ class Carriage:
         """Set the goal; ``advance`` does the rest."""
         if goal != self.goal:
             self.goal = goal
+            self._turned = True
             self.target = None
             self.blocked = None
             if goal not in self.whole.slots:
@@ -249,7 +259,7 @@ class Carriage:
             self.stall.rests()
             return []
         ahead = self._ahead()
-        effects: list[Effect] = []
+        effects = self._return_left(now_us) if self._turned else []
         for slot in self.occupied():
             # Pushed there by hand, or found there after a restart: a body asks for what it is in.
             effects += self.fleet.tokens.want(segment_token(slot), now_us)
@@ -258,7 +268,7 @@ class Carriage:
         if self.whole.slots and not self.whole.is_complete:
             reach, reason = None, Reason.NOT_AUTHORISED
         if reach is None:
-            return effects + self._hold(ahead, reason)
+            return effects + self._hold(ahead, reason) + self._return_left(now_us)
         if reach != self.target:
             self.target = reach
             self.sequence = successor(self.sequence, 8)
@@ -276,8 +286,8 @@ class Carriage:
 
     def _asks_at_us(self) -> int | None:
         """When something is to be done about missing tokens, while it is on its way."""
-        due = (self.whole.due_us, self._patience_over_us(), self.sill.next_wake())
-        if due == (None, None, None) or self.goal is None or self.sensed is None or self.arrived or not self.is_clear():
+        due = (self.whole.due_us, self._patience_over_us(), self.sill.next_wake(), self.left.due_us)
+        if not any(due) or self.goal is None or self.sensed is None or self.arrived or not self.is_clear():
             return None
         return min(time for time in due if time is not None)
 
@@ -289,11 +299,18 @@ class Carriage:
         self.whole.passed(self.occupied())
         if self.whole.slots:
             return self.whole.advance(self.occupied(), now_us)
-        effects: list[Effect] = []
-        for slots in self.axis.rights(ahead)[: self._lookahead_segments()]:
-            for slot in slots:
-                effects += self.fleet.tokens.want(segment_token(slot), now_us)
+        effects, tokens, soon = list[Effect](), self.fleet.tokens, self._lookahead_segments()
+        line = self.axis.rights(ahead)[: soon + MORE_AHEAD]
+        if all(self._is_asked(slot) for slots in line[:soon] for slot in slots):
+            return effects
+        more = takewhile(self.left.fronts.isdisjoint, line[soon:])
+        for slot in (slot for slots in (*line[:soon], *more) for slot in slots):
+            effects += tokens.want(segment_token(slot), now_us)
         return effects
+
+    def _is_asked(self, slot: Segment) -> bool:
+        key = segment_token(slot)
+        return key in self.fleet.tokens.wanted or self.fleet.tokens.holds(key)
 
     def _ask_lifts(self, ahead: list[int], now_us: int) -> list[Effect]:
         """Have the word of the lift at the end of this way while its gate is held; one that is elsewhere waits for us.
@@ -428,18 +445,19 @@ class Carriage:
         needed = {*here, *gates, *self.whole.slots, *self._may_come_to()}
         if self.goal is not None and not self.arrived:
             needed.update(slot for slots in self.axis.rights(self._ahead()) for slot in slots)
-        effects: list[Effect] = []
         tokens = self.fleet.tokens
         for key in [key for key in tokens.wanted if key.kind is TokenKind.SEGMENT]:
-            if _segment(key) not in needed:
+            if slot_of(key) not in needed:
                 tokens.forget(key)
-        for key in self._held_segments():
-            segment = _segment(key)
-            steward = self.fleet.site.stewards[segment.track]
-            if segment not in needed and steward != self.fleet.node_id:
-                effects += tokens.give(key, steward, now_us)
-                self.fleet.mirror.order.on_return(self.fleet.node_id, segment)
-        return effects
+        free = [slot for slot in map(slot_of, self._held_segments()) if slot not in needed]
+        is_under_way = self.goal is not None and not self.arrived and self.target is not None
+        return self.left.give_back(free, now_us, is_under_way=is_under_way)
+
+    def _return_left(self, now_us: int) -> list[Effect]:
+        self._turned = False
+        if not self.left.slots:
+            return []
+        return self.left.give_all({*self.occupied(), *self._may_come_to()}, now_us)
 
     def _may_come_to(self) -> set[Segment]:
         """Slots up to where the drive may still be on its way, and those in which it brakes; none where it stands."""
@@ -466,7 +484,3 @@ class Carriage:
         if home not in tokens.held and tokens.holds(home):
             keys.append(home)
         return keys
-
-
-def _segment(key: TokenKey) -> Segment:
-    return Segment(key.number >> 8, key.number & 0xFF)

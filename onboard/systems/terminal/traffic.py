@@ -387,9 +387,18 @@ def earliest(floors: dict[StepDate, int], edges: list[DateConstraint]) -> Dates:
 
 
 def _on_circle(out: dict[StepDate, list[DateConstraint]], left: set[StepDate]) -> set[int]:
-    """Machines on circles: what is only behind one is taken away from its end."""
-    while True:
-        dead = {node for node in left if not any(edge.to in left for edge in out[node])}
-        if not dead:
-            return {node.owner for node in left}
-        left = left - dead
+    """Machines on circles: what is only behind one is taken away from its end, each edge looked at once."""
+    behind: dict[StepDate, list[StepDate]] = {node: [] for node in left}
+    ahead = dict.fromkeys(left, 0)
+    for node in left:
+        for edge in out[node]:
+            if edge.to in ahead:
+                behind[edge.to].append(node)
+                ahead[node] += 1
+    dead = [node for node, count in ahead.items() if not count]
+    while dead:
+        for node in behind[dead.pop()]:
+            ahead[node] -= 1
+            if not ahead[node]:
+                dead.append(node)
+    return {node.owner for node, count in ahead.items() if count}

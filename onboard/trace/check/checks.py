@@ -4,10 +4,11 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from onboard.contract.codes import MachineState, Reason
 from onboard.contract.messages import BusTime, Heartbeat, Message
+from onboard.contract.runs import singles
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.systems.contract import codecs_for
@@ -16,14 +17,20 @@ from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.picture import SETTLING_US, BusPicture
 from onboard.trace.check.rule import Rule
 from onboard.trace.check.systems import rules_for
+from onboard.trace.raw import RawFrame, data_frame
 from onboard.wire.codec import Codec
 from onboard.wire.decoder import Decoder
 from onboard.wire.speakers import why_unheard
+
+if TYPE_CHECKING:
+    from onboard.trace.columns.block import FrameBlock
 
 #: Findings that are kept word for word; all are counted.
 MOST_FINDINGS = 1_000
 #: Channels of a log that are told apart; a name more is taken for one of them.
 MOST_CHANNELS = 300
+#: Frames whose messages are remembered, half a kilobyte each: heartbeats come again for minutes.
+MOST_KNOWN = 1 << 12
 #: Rules look at the time this often, us of the log.
 TICK_US = 1_000_000
 #: Times of a log, or bus time, that go back by more than this begin another run, us.
@@ -124,6 +131,8 @@ class Checks:
         #: Messages of this run that rules were shown, by class.
         self._seen: Counter[type[Message]] = Counter()
         self._whole = self._codecs[0].whole
+        #: By ``FrameBlock.keys``, as ``_learn`` gives them.
+        self._known: dict[bytes, tuple[tuple[Message, ...], Frame]] = {}
         self._decoders: dict[str, tuple[Decoder, Decoder]] = {}
         rules = rules_for(site) if rules is None else rules
         self.verdict = LogVerdict(tuple(rule for rule in rules if not self._why_not(rule)))
@@ -147,12 +156,14 @@ class Checks:
         self._picture.excused_us = self._excused_us
         self._picture.clock_settles_us = self._clocks_until_us
         self._rules = [rule(self._picture, self._keep) for rule in self.verdict.rules]
+        self._ticks = [rule.tick for rule in self._rules if type(rule).tick is not Rule.tick]
         self._handlers: dict[type[Message], list[Callable[[Any], None]]] = {}
         self._names: dict[type[Message], list[str]] = {}
         for rule in self._rules:
             for kind, handler in rule.handlers().items():
                 self._handlers.setdefault(kind, []).append(handler)
                 self._names.setdefault(kind, []).append(rule.name)
+        #: When rules look at the time again; None: at once.
         self._tick_us: int | None = None
 
     def excuse(self, until_us: int) -> None:
@@ -188,32 +199,82 @@ class Checks:
 
     def feed_message(self, time_us: int, message: Message, channel: str = "", frame: Frame | None = None) -> None:
         """One whole message, with the frame that completed it where there is one."""
+        why = self._why_unheard(message)
+        if why is Reason.NONE:
+            for word in singles(message):
+                self._judge(time_us, word, channel, frame)
+        else:
+            self.verdict.unknown[why.name] += 1
+
+    def feed_block(self, block: "FrameBlock") -> None:
+        """A stretch of a log by columns: the same as its frames one by one, but what was said before is known."""
+        if block.others:
+            for raw in block.frames():
+                self.feed_raw(raw)
+            return
+        known, judge = self._known, self._judge
+        for time_us, channel, key in zip(block.time_us.tolist(), block.names, block.keys, strict=True):
+            words, frame = known.get(key) or self._learn(key)
+            if not words:
+                self.feed(time_us, channel, frame)
+                continue
+            self.verdict.frames += 1
+            for word in words:
+                judge(time_us, word, channel, frame)
+
+    def feed_raw(self, raw: RawFrame) -> None:
+        """One frame of a log, of whatever kind."""
+        frame = raw.classic()
+        if frame is None:
+            self.verdict.unknown["CAN FD frame"] += 1
+        else:
+            self.feed(raw.time_us, raw.channel, frame)
+
+    def _learn(self, key: bytes) -> tuple[tuple[Message, ...], Frame]:
+        """A data frame, and its words where it is a whole message that somebody listens to."""
+        can_id, data, is_extended = data_frame(key)
+        frame = Frame(can_id, data, is_extended)
+        message = self._whole(can_id, data) if is_extended else None
+        if message is not None and self._why_unheard(message) is not Reason.NONE:
+            message = None
+        if len(self._known) >= MOST_KNOWN:
+            self._known.clear()
+        found = self._known[key] = () if message is None else tuple(singles(message)), frame
+        return found
+
+    def _judge(self, time_us: int, message: Message, channel: str, frame: Frame | None) -> None:
+        """A message that the site listens to: every rule that reads such messages, and the picture, see it."""
         kind = type(message)
-        if self._site is not None:
-            why = self._why_unheard(message, (kind, message.sender))
-            if why is not Reason.NONE:
-                self.verdict.unknown[why.name] += 1
-                return
-        time_us = self._orderly(time_us, message)
+        last_us = self._last_us
+        is_started = isinstance(message, Heartbeat) and message.state is MachineState.STARTING
+        if last_us is None or time_us < last_us or is_started or isinstance(message, BusTime):
+            time_us = self._orderly(time_us, message)
+        self._last_us = time_us
         self.verdict.messages += 1
-        event: LogEvent[Message] = _event_of((time_us, message, channel, frame))
-        if self._tick_us is None or time_us - self._tick_us >= TICK_US:
-            self._tick_us = time_us
-            self._picture.now_us = time_us
-            for rule in self._rules:
-                rule.tick(time_us)
+        picture = self._picture
+        if self._tick_us is None or time_us >= self._tick_us:
+            self._tick_us = time_us + TICK_US
+            picture.now_us = time_us
+            for tick in self._ticks:
+                tick(time_us)
         handlers = self._handlers.get(kind)
         if handlers is not None:
             self._seen[kind] += 1
+            event: LogEvent[Message] = _event_of((time_us, message, channel, frame))
             for handler in handlers:
                 handler(event)
-        self._picture.feed(event)
+        picture.now_us = time_us
+        take = picture.taken.get(kind)
+        if take is not None:
+            take(message, time_us)
 
-    def _why_unheard(self, message: Message, said: tuple[type[Message], int]) -> Reason:
+    def _why_unheard(self, message: Message) -> Reason:
         """Why nobody of the site listens: by class and sender, so worked out once for each."""
+        if self._site is None:
+            return Reason.NONE
+        said = type(message), message.sender
         why = self._unheard.get(said)
         if why is None:
-            assert self._site is not None, "asked with a site only"
             why = self._unheard[said] = why_unheard(message, self._site.machines, self._codecs[0].speakers)
         return why
 
@@ -250,7 +311,6 @@ class Checks:
         elif back_us > 0:
             self.verdict.backwards += 1
             time_us = last_us or 0
-        self._last_us = time_us
         return time_us
 
     def _is_anew(self, time_us: int, message: BusTime | Heartbeat) -> bool:

@@ -1,6 +1,8 @@
 """What has been on a bus so far, for all rules together. A rule is shown an event before the picture takes it up."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from onboard.contract.codes import KindCode, MachineState, ManualMode
 from onboard.contract.constants import STILL
@@ -20,7 +22,6 @@ from onboard.contract.messages import (
 from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment, Site
-from onboard.trace.check.event import LogEvent
 from onboard.trace.check.geometry import ReportedPosition, body_at, body_of, floors_of
 from onboard.trace.check.tokens_seen import TokensSeen
 from onboard.ways.site import way_site
@@ -31,11 +32,6 @@ SILENT_US = 7_000_000
 JUMP_US = 100_000
 #: A clock that is far off is set anew by the second word, and that comes within two periods of 5 s, us.
 SETTLING_US = 11_000_000
-#: What the picture is made of: half of what is said on a bus is none of it.
-_TAKEN = {
-    *(BusTime, TokenGrant, TokenHeld, TokenAssigned, Regeneration),
-    *(Progress, DriveState, ManualState, Heartbeat, Halted),
-}
 
 
 class BusPicture:
@@ -47,6 +43,7 @@ class BusPicture:
 
     def __init__(self, site: Site | None, *, disturbed: bool = False) -> None:
         self.disturbed = disturbed
+        #: The time of the log, us, as whoever feeds the picture tells it.
         self.now_us = 0
         self.offset_us: int | None = None
         self.tokens = TokensSeen(site)
@@ -67,6 +64,19 @@ class BusPicture:
         #: Bus time has jumped: until then (us of the log) machines wait for a second word, and decide no call.
         self.clock_settles_us = 0
         self._site = site
+        #: The body that was told of last, by what and when.
+        self._told: tuple[Progress | None, int, ReportedPosition | None] = None, 0, None
+        #: What the picture is made of, and what takes it up at a time in us, after the rules have seen it: half of what
+        #: is said on a bus is none of it.
+        self.taken: dict[type[Message], Callable[[Any, int], None]] = {
+            **dict.fromkeys((TokenGrant, TokenHeld, TokenAssigned, Regeneration), self.tokens.feed),
+            Heartbeat: self._on_heartbeat,
+            BusTime: self._on_bus_time,
+            Progress: self._on_progress,
+            DriveState: self._on_drive,
+            ManualState: self._on_manual,
+            Halted: self._on_halted,
+        }
 
     @property
     def site(self) -> Site:
@@ -123,47 +133,43 @@ class BusPicture:
         sensed_mm = self._sensed_mm.get(body.node)
         return None if sensed_mm is None else body_at(self.site, body, sensed_mm)
 
-    def feed(self, event: LogEvent[Message]) -> None:
-        """Take up one message before the rules see it."""
-        self.now_us = event.time_us
-        if type(event.message) in _TAKEN:
-            self._take(event)
-
-    def _take(self, event: LogEvent[Message]) -> None:
-        time_us = event.time_us
-        match event.message:
-            case Heartbeat() as beat:
-                if not self.boots:
-                    # The first sign of life of a whole site in its first life: all tokens are where the site file says.
-                    self.tokens.from_start = beat.boot == 1 and beat.state is MachineState.STARTING
-                self.boots[beat.sender] = beat.boot
-                self.heard_us[beat.sender] = time_us
-                self._on_state(beat)
-            case BusTime(bus_time_us=bus_us):
-                self._on_bus_time(bus_us, time_us)
-            case TokenGrant() | TokenHeld() | TokenAssigned() | Regeneration() as word:
-                self.tokens.feed(word, time_us)
-            case Progress() as progress if self._site is not None:
-                body = body_of(self._site, progress, time_us)
-                if body is not None:
-                    self.bodies[progress.sender] = body
-            case DriveState(sender=node, position_mm=position_mm):
-                self._sensed_mm[node] = position_mm
-            case ManualState() as state:
-                self._on_manual(state, time_us)
-            case Halted() as word if word.sender == word.machine and word.reason in RIGHTS_LOST:
-                self.announcing.add(word.sender)
-
-    def _on_bus_time(self, bus_us: int, time_us: int) -> None:
-        before_us, self.offset_us = self.offset_us, time_us - bus_us
-        if before_us is not None and abs(self.offset_us - before_us) > JUMP_US:
-            self.clock_settles_us = max(self.clock_settles_us, time_us + SETTLING_US)
-
-    def _on_state(self, beat: Heartbeat) -> None:
+    def _on_heartbeat(self, beat: Heartbeat, time_us: int) -> None:
+        if not self.boots:
+            # The first sign of life of a whole site in its first life: all tokens are where the site file says.
+            self.tokens.from_start = beat.boot == 1 and beat.state is MachineState.STARTING
+        self.boots[beat.sender] = beat.boot
+        self.heard_us[beat.sender] = time_us
         if beat.state is MachineState.STARTING:
             self.announcing.add(beat.sender)
         elif beat.state not in STILL:
             self.announcing.discard(beat.sender)
+
+    def _on_progress(self, progress: Progress, time_us: int) -> None:
+        body = self.body_told(progress, time_us)
+        if body is not None:
+            self.bodies[progress.sender] = body
+
+    def body_told(self, progress: Progress, time_us: int) -> ReportedPosition | None:
+        """The body that a message tells of, worked out once for all rules; None where the site has no such track."""
+        if self._site is None:
+            return None
+        told, told_us, body = self._told
+        if told is not progress or told_us != time_us:
+            body = body_of(self._site, progress, time_us)
+            self._told = progress, time_us, body
+        return body
+
+    def _on_drive(self, state: DriveState, _time_us: int) -> None:
+        self._sensed_mm[state.sender] = state.position_mm
+
+    def _on_halted(self, word: Halted, _time_us: int) -> None:
+        if word.sender == word.machine and word.reason in RIGHTS_LOST:
+            self.announcing.add(word.sender)
+
+    def _on_bus_time(self, said: BusTime, time_us: int) -> None:
+        before_us, self.offset_us = self.offset_us, time_us - said.bus_time_us
+        if before_us is not None and abs(self.offset_us - before_us) > JUMP_US:
+            self.clock_settles_us = max(self.clock_settles_us, time_us + SETTLING_US)
 
     def _on_manual(self, state: ManualState, time_us: int) -> None:
         if state.manual_mode is not ManualMode.AUTOMATIC:

@@ -5,7 +5,7 @@ from typing import Any
 
 from onboard.contract.codes import TokenKind
 from onboard.contract.messages import TokenGrant, TokenHeld
-from onboard.core.serial import is_newer, successor
+from onboard.core.serial import is_newer
 from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
@@ -20,7 +20,7 @@ class OneHolder(Rule):
 
     name = "one-holder"
     title = "one holder a token"
-    source = "design 5: erase, journal, then send; versions rise by one"
+    source = "design 5: erase, journal, then send; versions rise by one, in a run to one more than its highest"
 
     def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
@@ -54,7 +54,7 @@ class OneHolder(Rule):
         elif grant.sender != last.holder:
             what = f"gives {token} under version {version}, but {last.holder} holds it under {last.version}"
             self._tell(event, token, (grant.sender, last.holder), what)
-        elif version != successor(last.version, VERSION_BITS) and not self.picture.disturbed:
+        elif version > self.picture.tokens.following(token, last.version) and not self.picture.disturbed:
             self._tell(event, token, (grant.sender,), f"gives {token} under version {version}, after {last.version}")
 
     def _judge_first(self, event: LogEvent[TokenGrant], token: Token) -> None:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from onboard.contract.codes import KindCode, RegenerationPhase, TokenKind
 from onboard.contract.messages import Regeneration, TokenAssigned, TokenGrant, TokenHeld
+from onboard.contract.runs import MOST_SPREAD
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Site, Station
 
@@ -50,6 +51,10 @@ class TokensSeen:
         self.from_start = False
         self._site = site
         self._past: OrderedDict[Token, deque[Handover]] = OrderedDict()
+        #: Whose tokens of places are by the site file: asked of each body at each word of it.
+        self._first: dict[Token, int | None] = {}
+        #: The newest version of any segment, by track: those that go together get one that is newer than each.
+        self._newest: dict[int, int] = {}
         #: What an operator's tool has assigned, until it says that it counts.
         self._assigned: dict[Token, TokenAssigned] = {}
         self._step, self._step_us = RegenerationPhase.NONE, 0
@@ -58,6 +63,12 @@ class TokensSeen:
         """The newest handover heard of."""
         past = self._past.get(token)
         return past[-1] if past else None
+
+    def following(self, token: Token, version: int) -> int:
+        """The newest version that may follow ``version`` of a token: by one, or in a run of its track's segments."""
+        if token.kind is not TokenKind.SEGMENT:
+            return version + 1
+        return self._newest.get(token.number >> 8, version) + 1 if self.from_start else version + MOST_SPREAD
 
     def under(self, token: Token, version: int) -> Handover | None:
         """The handover that made this version, if it is remembered."""
@@ -76,13 +87,21 @@ class TokensSeen:
             return token.number >> 16
         if self._site is None:
             return None
-        for machine in self._site.machines.values():
+        if token not in self._first:
+            if len(self._first) >= MOST_TOKENS:
+                self._first.clear()
+            self._first[token] = self._first_by_site(token, self._site)
+        return self._first[token]
+
+    @staticmethod
+    def _first_by_site(token: Token, site: Site) -> int | None:
+        for machine in site.machines.values():
             if token.kind is TokenKind.SEGMENT:
                 if machine.kind is KindCode.ROBOT and machine.home.number == token.number:
                     return machine.node_id
             elif machine.station is not None and machine.station.number == token.number:
                 return machine.node_id
-        return self._site.stewards.get(token.number >> 8)
+        return site.stewards.get(token.number >> 8)
 
     def may_use(self, token: Token, node: int, now_us: int) -> bool:
         """Whether ``node`` holds it, held it a moment ago, or the log does not tell."""
@@ -140,3 +159,6 @@ class TokensSeen:
         else:
             self._past.move_to_end(token)
         past.append(handover)
+        if token.kind is TokenKind.SEGMENT:
+            track = token.number >> 8
+            self._newest[track] = max(handover.version, self._newest.get(track, 0))

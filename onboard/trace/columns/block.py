@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from onboard.core.frame import CAN_MAX_DLC
-from onboard.trace.raw import RawFrame
+from onboard.trace.raw import KEY_BYTES, KEY_IS_LONG, KEY_MARK, RawFrame
 from onboard.trace.readers.faults import LogFault, LogFaults
 
 #: What a column says of a log that does not tell who sent a frame.
@@ -54,15 +54,46 @@ class FrameBlock:
         """The eight bytes of each row as one little-endian number."""
         return self.data.view("<u8")[:, 0]
 
+    @property
+    def keys(self) -> list[bytes]:
+        """What each classic data frame says, all but time, channel and direction: equal where frames say the same."""
+        parts = np.empty((len(self), KEY_BYTES), np.uint8)
+        parts[:, :CAN_MAX_DLC] = self.data
+        parts[:, CAN_MAX_DLC:-1] = self.can_id.astype("<u4").view(np.uint8).reshape(-1, 4)
+        # Never 0, so nothing of a key is taken for the end of a text.
+        parts[:, -1] = self.length + KEY_MARK + KEY_IS_LONG * self.is_extended
+        keys: list[bytes] = parts.view(f"S{KEY_BYTES}")[:, 0].tolist()
+        return keys
+
+    @property
+    def names(self) -> list[str]:
+        """The channel of each row."""
+        return list(map(self.channels.__getitem__, self.channel.tolist()))
+
+    def only(self, rows: list[int]) -> "FrameBlock":
+        """These rows alone; none of them in ``others``."""
+        return FrameBlock(
+            self.where[rows],
+            self.time_us[rows],
+            self.channel[rows],
+            self.can_id[rows],
+            self.is_extended[rows],
+            self.length[rows],
+            self.data[rows],
+            self.sent[rows],
+            self.channels,
+            {},
+        )
+
     def frames(self) -> Iterator[RawFrame]:
         """One frame a row, in the order of the log, extended identifiers marked as such."""
         blob = self.data.tobytes()
-        names, marks = self.channels, {UNMARKED: None, 0: False, 1: True}
+        marks = {UNMARKED: None, 0: False, 1: True}
         rows: Iterator[RawFrame] = map(
             _raw_of,
             zip(
                 self.time_us.tolist(),
-                map(names.__getitem__, self.channel.tolist()),
+                self.names,
                 self.can_id.tolist(),
                 [blob[at : at + size] for at, size in zip(range(0, len(blob), 8), self.length.tolist(), strict=True)],
                 self.is_extended.tolist(),

@@ -5,6 +5,7 @@ import json
 import sys
 from pathlib import Path
 
+from onboard.bounded_file import read_bounded
 from onboard.core.site import Site
 from onboard.systems.contract import codecs_for
 from onboard.trace.check.checks import Checks, LogVerdict
@@ -19,7 +20,6 @@ from onboard.trace.commands.common import (
     write_text,
 )
 from onboard.trace.words import Words
-from onboard.wire.dbc_file import fleet_layouts, read_layouts
 
 HELP = """\
 exit status:
@@ -69,13 +69,12 @@ def _report(verdict: LogVerdict, site: Site | None) -> list[str]:
 
 def _check(args: argparse.Namespace, checks: Checks) -> LogVerdict:
     with open_log(args) as log:
-        feed = checks.feed
-        for frame in log:
-            classic = frame.classic()
-            if classic is None:
-                checks.verdict.unknown["CAN FD frame"] += 1
+        for portion in log.portions():
+            if portion.block is not None:
+                checks.feed_block(portion.block)
             else:
-                feed(frame.time_us, frame.channel, classic)
+                for frame in portion.ones:
+                    checks.feed_raw(frame)
         verdict = checks.finish()
     for fault, count in log.faults.counts.items():
         verdict.unknown[fault.value] += count
@@ -86,8 +85,10 @@ def _check(args: argparse.Namespace, checks: Checks) -> LogVerdict:
 
 def _check_contract(path: Path) -> None:
     """Refuse a DBC that is not the contract that this program speaks: it could not judge by it. ``TraceError``."""
+    from onboard.wire.dbc_file import fleet_layouts, read_layouts  # noqa: PLC0415  # takes a third of the start
+
     try:
-        said = {layout.name: layout for layout in read_layouts(path.read_text(encoding="utf-8-sig"))}
+        said = {layout.name: layout for layout in read_layouts(read_bounded(path).decode("utf-8-sig"))}
     except OSError as error:
         raise TraceError(f"{path}: cannot be read ({error.strerror}); name an existing DBC") from error
     except Exception as error:  # the DBC reader has a dozen errors of its own for a bad text

@@ -2,11 +2,12 @@
 
 import argparse
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
+from onboard.bounded_file import read_bounded
 from onboard.systems.contract import codecs_for
 from onboard.trace.commands.common import (
     Commands,
@@ -22,8 +23,10 @@ from onboard.trace.dump.decode import DbcLines, MessageLines
 from onboard.trace.dump.filters import FilterSet, parse_filters
 from onboard.trace.dump.formats import Look, Screen, TimeFormat, log_line, time_of_name
 from onboard.trace.raw import RawFrame
-from onboard.trace.readers.open_log import Log
-from onboard.wire.dbc_file import AnyDbc, AnyDbcError
+from onboard.trace.readers.open_log import Log, Portion
+
+if TYPE_CHECKING:
+    from onboard.wire.dbc_file import AnyDbc
 
 HELP = """\
 filters, as candump has them; hexadecimal, an identifier of 8 digits is a 29-bit one:
@@ -74,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
             _write_file(chosen)
         else:
             screen = Screen(_look(args), tuple(one.channel for one in sets if one.channel != "any"))
-            _print_all((map(screen.text, frames), are_there) for frames, are_there in chosen.portions())
+            _print_all((map(screen.text, part.frames), are_there) for part, are_there in chosen.portions())
             tell_faults(log)
     if chosen.errors_hidden:
         print(f"{log.name}: error frames not shown: {chosen.errors_hidden}; -e shows them", file=sys.stderr)
@@ -91,16 +94,22 @@ class _Chosen:
         self._left = count
 
     def __iter__(self) -> Iterator[RawFrame]:
-        return chain.from_iterable(frames for frames, _ in self.portions())
+        return chain.from_iterable(part.frames for part, _ in self.portions())
 
-    def portions(self) -> Iterator[tuple[Iterator[RawFrame], bool]]:
+    def portions(self) -> Iterator[tuple[Portion, bool]]:
         """Some at a time, and whether these are there already, as the log has them."""
         if self._left is not None:
             # Who asks for a number of frames gets an answer as soon as they are there.
-            yield self._passing(self.log.one_by_one()), False
+            yield Portion(None, self._passing(self.log.one_by_one())), False
             return
-        for frames, are_there in self.log.portions():
-            yield self._passing(frames) if self._sets != [FilterSet()] else self._data_frames(frames), are_there
+        for portion in self.log.portions():
+            are_there = portion.block is not None
+            if self._sets != [FilterSet()]:
+                yield Portion(None, self._passing(portion.frames)), are_there
+            elif portion.block is None or portion.block.others:
+                yield Portion(None, self._data_frames(portion.frames)), are_there
+            else:
+                yield portion, are_there
 
     def _data_frames(self, frames: Iterator[RawFrame]) -> Iterator[RawFrame]:
         """What passes where nobody asks for anything else."""
@@ -143,15 +152,17 @@ def _decode(args: argparse.Namespace, chosen: _Chosen) -> None:
     else:
         site = site_of(args)
         lines = MessageLines(site, codecs_for(site), screen)
-    _print_all((lines.all(frames), are_there) for frames, are_there in chosen.portions())
+    _print_all((lines.of(portion), are_there) for portion, are_there in chosen.portions())
     tell_faults(chosen.log)
     for line in lines.report():
         print(f"{chosen.log.name}: {line}", file=sys.stderr)
 
 
-def _read_dbc(path: Path) -> AnyDbc:
+def _read_dbc(path: Path) -> "AnyDbc":
+    from onboard.wire.dbc_file import AnyDbc, AnyDbcError  # noqa: PLC0415  # takes a third of the start
+
     try:
-        dbc = AnyDbc(path.read_bytes().decode("utf-8-sig", "replace"))
+        dbc = AnyDbc(read_bounded(path).decode("utf-8-sig", "replace"))
     except OSError as error:
         raise TraceError(f"{path}: cannot be read ({error.strerror}); name an existing DBC") from error
     except AnyDbcError as error:
@@ -178,7 +189,7 @@ def _write_file(chosen: _Chosen) -> None:
     tell_faults(chosen.log)
 
 
-def _print_all(portions: Iterator[tuple[Iterator[str], bool]]) -> None:
+def _print_all(portions: Iterator[tuple[Iterable[str], bool]]) -> None:
     """To standard output; at once where a person or a pipe waits for each line of a live bus."""
     out = sys.stdout
     for lines, are_there in portions:

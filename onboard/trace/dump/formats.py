@@ -1,13 +1,19 @@
 """Frames as candump prints them, byte for byte (can-utils 2020.11, ``candump.c`` and ``lib.c``)."""
 
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
+from operator import add
+from typing import TYPE_CHECKING
 
 from onboard.core.frame import CAN_MAX_DLC
 from onboard.trace.candump import ERROR_FLAG
 from onboard.trace.dump.error_frames import describe
 from onboard.trace.raw import CANFD_BRS, CANFD_ESI, RawFrame
+
+if TYPE_CHECKING:
+    from onboard.trace.columns.block import FrameBlock
 
 _MILLION = 1_000_000
 _RESET = "\x1b[0m"
@@ -87,20 +93,32 @@ class Screen:
             line += f"\n\t{describe(frame)}"
         return line
 
-    def prefix(self, frame: RawFrame) -> str:
+    def prefix(self, time_us: int, channel: str) -> str:
         """What stands before the words of a decoded message: time and channel."""
-        name = self._names.get(frame.channel)
-        if name is None:
-            if len(frame.channel) > self._width:
-                self._width = len(frame.channel)
-                self._names.clear()
-            name = self._names[frame.channel] = f" {frame.channel:<{self._width}}  "
+        name = self._names.get(channel) or self._padded(channel)
         if not self._is_absolute:
-            return f" {self._time(frame.time_us)}{name}"
-        second, microseconds = divmod(frame.time_us, _MILLION)
+            return f" {self._time(time_us)}{name}"
+        second, microseconds = divmod(time_us, _MILLION)
         if second != self._second:
             self._second, self._begins = second, f" ({second:010d}."
         return f"{self._begins}{microseconds:06d}) {name}"
+
+    def prefixes(self, block: "FrameBlock") -> Iterable[str]:
+        """The same for each frame of a block."""
+        from onboard.trace.columns.stamps import stamps  # noqa: PLC0415  # a board has no numpy, and no blocks
+
+        times = stamps(block.time_us) if self._is_absolute else None
+        if times is None or max(map(len, block.channels), default=0) > self._width:
+            return map(self.prefix, block.time_us.tolist(), block.names)
+        names = [self._padded(channel) for channel in block.channels]
+        return map(add, times, map(names.__getitem__, block.channel.tolist()))
+
+    def _padded(self, channel: str) -> str:
+        if len(channel) > self._width:
+            self._width = len(channel)
+            self._names.clear()
+        name = self._names[channel] = f" {channel:<{self._width}}  "
+        return name
 
     def _time(self, time_us: int) -> str:
         seconds, microseconds = divmod(time_us, _MILLION)

@@ -25,6 +25,8 @@ _BEGINNINGS: tuple[tuple[bytes, str], ...] = (
 _SCREEN = re.compile(rb"\s*(\(\d+\.\d+\)\s+)?\S+\s+[0-9A-Fa-f]{3,8}\s+\[\d+\]")
 _TOML = re.compile(rb"\s*(\[\[?[A-Za-z_.]+\]\]?|[A-Za-z_]+\s*=)")
 _LONGEST_SHOWN = 40
+#: So much of a first line is looked at, bytes.
+_MOST_HEAD = 4_096
 
 
 def guess(head: bytes) -> str:
@@ -32,6 +34,7 @@ def guess(head: bytes) -> str:
     for beginning, what in _BEGINNINGS:
         if head.startswith(beginning):
             return f"it looks like {what}"
+    head = head[:_MOST_HEAD]
     if _SCREEN.match(head):
         return "it looks like what candump shows on a screen; record with candump -L, or -l"
     if _TOML.match(head):

@@ -27,6 +27,9 @@ _BAR_PERIOD_S = 0.2
 _BAR_WIDTH = 30
 #: What is read at once, bytes, and what is worth reading by columns: a live bus brings less.
 _PIECE_BYTES, _LEAST_BYTES = 1 << 18, 1 << 14
+#: Longest line, bytes; one of CAN FD in ASC has some four hundred. A hole that a power cut left in a log is one line of
+#: zeros, however long: it is counted, and not kept.
+LONGEST_LINE = 1 << 16
 #: Frames of other formats that are handed on together.
 _STRETCH = 1 << 16
 #: A pipe has no length; what it holds so far is told instead.
@@ -68,29 +71,30 @@ class Log:
             self._file.close()
 
     def __iter__(self) -> Iterator[RawFrame]:
-        return chain.from_iterable(frames for frames, _ in self.portions())
+        return chain.from_iterable(portion.frames for portion in self.portions())
 
-    def portions(self) -> Iterator[tuple[Iterator[RawFrame], bool]]:
-        """The same frames some at a time, and whether these are there already: those of a live bus come one by one."""
+    def portions(self) -> "Iterator[Portion]":
+        """The same frames some at a time: by columns where many are there already; those of a live bus one by one."""
         with self._watched() as watched:
             placed = self._placed(watched)
             if placed is not None:
-                yield self.faults.watch(placed), False
+                yield Portion(None, self.faults.watch(placed))
+                self._check(watched.first_line)
                 return
             for text in self._texts(watched):
                 read_block = _block_reader() if text.is_whole and len(text.lines) >= _LEAST_BYTES else None
                 if read_block is not None:
-                    yield read_block(text.lines, text.first, self.faults).frames(), True
+                    yield Portion(read_block(text.lines, text.first, self.faults))
                 else:
-                    yield self.faults.watch(read_candump(io.BytesIO(text.lines), self.faults, text.first)), False
+                    ones = read_candump(io.BytesIO(text.lines), self.faults, text.first)
+                    yield Portion(None, self.faults.watch(ones))
 
     def one_by_one(self) -> Iterator[RawFrame]:
         """The same frames, but nothing of the log is looked at behind the one that is asked for."""
         with self._watched() as watched:
             placed = self._placed(watched)
             yield from self.faults.watch(placed if placed is not None else read_candump(watched, self.faults))
-            if placed is None:
-                self._check(watched.first_line)
+            self._check(watched.first_line)
 
     def stretches(self) -> "Iterator[LogText | list[tuple[int, RawFrame]]]":
         """The log in pieces for who reads it by columns: text of candump, or frames with their places."""
@@ -101,6 +105,7 @@ class Log:
                 return
             while stretch := list(islice(placed, _STRETCH)):
                 yield stretch
+            self._check(watched.first_line)
 
     def _watched(self) -> "_Watched":
         return _Watched(self._file, self._bar)
@@ -114,6 +119,8 @@ class Log:
             from onboard.trace.readers.python_can import BLF_MAGIC, read_blf, read_trc  # noqa: PLC0415  # for these only
 
             return (read_blf if head.startswith(BLF_MAGIC) else read_trc)(watched.read, self.faults)
+        if len(head) > LONGEST_LINE:
+            raise self._no_log(head)
         return read_asc(watched, self.faults) if _ASC.match(head) else None
 
     def _texts(self, watched: "_Watched") -> "Iterator[LogText]":
@@ -128,8 +135,11 @@ class Log:
         if not head:
             raise LogOpenError(f"{self.name}: is empty; name a log that something was written to")
         if self.faults.is_no_log:
-            known = "candump -L, Vector ASC and BLF, PEAK TRC, pcapng"
-            raise LogOpenError(f"{self.name}: no frame of a log that we read ({known}); {guess(head)}")
+            raise self._no_log(head)
+
+    def _no_log(self, head: bytes) -> LogOpenError:
+        known = "candump -L, Vector ASC and BLF, PEAK TRC, pcapng"
+        return LogOpenError(f"{self.name}: no frame of a log that we read ({known}); {guess(head)}")
 
 
 @cache
@@ -140,6 +150,18 @@ def _block_reader() -> "Callable[[bytes, int, LogFaults], FrameBlock] | None":
     except ImportError:
         return None
     return read_block
+
+
+class Portion(NamedTuple):
+    """Frames of a log, in its order: a stretch by columns, or else ``ones``, which may still be on their way."""
+
+    block: "FrameBlock | None"
+    ones: Iterator[RawFrame] = iter(())
+
+    @property
+    def frames(self) -> Iterator[RawFrame]:
+        """The frames one by one."""
+        return self.ones if self.block is None else self.block.frames()
 
 
 class LogText(NamedTuple):
@@ -166,7 +188,7 @@ class _Watched:
         #: The first line; it is read again afterwards. A binary log's first bytes hold a line's end.
         self.first_line = self._file.read(len(MAGIC))
         if self.first_line != MAGIC and not self.first_line.endswith(b"\n"):
-            self.first_line += self._file.readline()
+            self.first_line += self._file.readline(LONGEST_LINE)
         self._first = self.first_line
 
     def __enter__(self) -> Self:
@@ -184,11 +206,15 @@ class _Watched:
         first, self._first = self._first, b""
         self._done += len(first)
         yield from first.splitlines(keepends=True)
-        for line in self._file:
+        while line := self._file.readline(LONGEST_LINE):
             self._done += len(line)
             if self._bar is not None:
                 self._show()
             yield line
+            while len(line) == LONGEST_LINE and not line.endswith(b"\n"):
+                # The rest of it is no line of its own.
+                line = self._file.readline(LONGEST_LINE)
+                self._done += len(line)
 
     def read(self, size: int) -> bytes:
         """As a file's ``read``."""
@@ -202,21 +228,20 @@ class _Watched:
 
     def pieces(self) -> Iterator[bytes]:
         """Whole lines, as many as there are at once; at the end what has no end of a line."""
-        waiting, self._first = [self._first], b""
-        self._done += len(waiting[0])
+        waiting, self._first = self._first, b""
+        self._done += len(waiting)
         while piece := self._file.read1(_PIECE_BYTES):
             self._done += len(piece)
             if self._bar is not None:
                 self._show()
             end = piece.rfind(b"\n") + 1
             if not end:
-                waiting.append(piece)
+                waiting += piece if len(waiting) <= LONGEST_LINE else b""
                 continue
-            yield b"".join((*waiting, piece[:end]))
-            waiting = [piece[end:]]
-        text = b"".join(waiting)
-        end = text.rfind(b"\n") + 1
-        yield from (part for part in (text[:end], text[end:]) if part)
+            yield waiting + piece[:end]
+            waiting = piece[end:]
+        end = waiting.rfind(b"\n") + 1
+        yield from (part for part in (waiting[:end], waiting[end:]) if part)
 
     def _show(self) -> None:
         now_s = time.monotonic()

@@ -23,8 +23,8 @@ from onboard.trace.candump import format_frame
 from onboard.trace.frame_bits import INTERMISSION_BITS, frame_bits
 from onboard.trace.raw import RawFrame
 from onboard.wire.codec import Codec, Codecs
-from onboard.wire.dbc_file import CONTROLLER, device_layouts
 from onboard.wire.decoder import Decoder
+from onboard.wire.runs import in_runs
 
 #: What a durable write takes in the simulation, us; a board's own figure is an option.
 JOURNAL_US = 4_000
@@ -97,6 +97,8 @@ class _Raised:
 
 def record(frames: Iterable[RawFrame], machine: Machine, codecs: Codecs, fleet: str, system: str) -> Recording:
     """Sort a log out for a machine: ``fleet`` is the fleet bus's channel, its device bus is named after it."""
+    from onboard.wire.dbc_file import CONTROLLER, device_layouts  # noqa: PLC0415  # takes a third of the start
+
     found = Recording()
     orders = {layout.name for layout in device_layouts(system) if CONTROLLER in layout.senders}
     for raw in frames:
@@ -145,7 +147,7 @@ class ReplayDriver:
 
     def run(self, heard: Iterable[tuple[int, bool, Frame]], last_us: int) -> Iterator[Sent]:
         """What the machine says to what it hears, until ``last_us`` of the log."""
-        self._outbox.extend(self._holon.start(0))
+        self._outbox.extend(in_runs(self._holon.start(0)))
         yield from self._work_off()
         for time_us, is_fleet, frame in heard:
             local_us = time_us - self._origin_us
@@ -169,7 +171,7 @@ class ReplayDriver:
                 self._written_us = None
             else:
                 self._timer_us = None
-                self._outbox.extend(self._holon.wake(self._now_us))
+                self._outbox.extend(in_runs(self._holon.wake(self._now_us)))
             yield from self._work_off()
 
     def _work_off(self) -> Iterator[Sent]:
@@ -188,9 +190,9 @@ class ReplayDriver:
         if message is None:
             return
         if is_fleet:
-            self._outbox.extend(self._holon.receive(message, time_us))
+            self._outbox.extend(in_runs(self._holon.receive(message, time_us)))
         elif message.sender == self._holon.node_id:
-            self._outbox.extend(self._holon.sense(message, time_us))
+            self._outbox.extend(in_runs(self._holon.sense(message, time_us)))
 
     def _perform(self, effect: Effect) -> Iterator[Sent]:
         match effect:

@@ -1,5 +1,6 @@
 """The street before the compartments: queues of arriving cars, people at the desks, and what they had to wait."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -63,11 +64,20 @@ class Street:
         self._timers = timers
         self._seed = seed
         self._by_ticket: dict[Reference, Customer] = {}
+        self._watchers: list[Callable[[Customer], None]] = []
         #: Customers at each compartment in the order of their coming, with a car to park and with a ticket.
         self._waiting: dict[int, list[Customer]] = {node: [] for node in compartments}
         for node_id, compartment in compartments.items():
             compartment.watch(partial(self._look, node_id))
             compartment.watch_desk(partial(self._read, node_id))
+
+    def watch(self, watcher: Callable[[Customer], None]) -> None:
+        """Call ``watcher`` after each step of a customer, once it is clear who waits where."""
+        self._watchers.append(watcher)
+
+    def waiting(self, node_id: int) -> Sequence[Customer]:
+        """Who has to do with a compartment now, in the order of their coming."""
+        return self._waiting[node_id]
 
     def add(self, stay: Stay, origin_us: int = 0) -> Customer:
         """A customer for one stay; ``origin_us`` is the loop time of the stay's time zero."""
@@ -147,6 +157,8 @@ class Street:
         if customer.state not in (CustomerState.PARKED, CustomerState.GONE):
             self._waiting[node_id].append(customer)
             self._waiting[node_id].sort(key=_came_us)
+        for watcher in self._watchers:
+            watcher(customer)
         self._look(node_id)
 
     # --- what people see ---------------------------------------------------------------------------------------

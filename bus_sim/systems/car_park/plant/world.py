@@ -317,10 +317,14 @@ class CarParkWorld:
                 return node_id
         return None
 
+    def robot_before(self, station: Station) -> int | None:
+        """Node-ID of the robot whose carrier stands opposite a station."""
+        here = (node_id for node_id, robot in self.robots.items() if robot.track == station.track)
+        return next((node_id for node_id in here if self.standing_segment(node_id) == station.segment), None)
+
     def carrier_in_front(self, station: Station) -> bool:
         """Whether a carrier stands opposite a station."""
-        here = [node_id for node_id, robot in self.robots.items() if robot.track == station.track]
-        return any(self.standing_segment(node_id) == station.segment for node_id in here)
+        return self.robot_before(station) is not None
 
     # --- what changes ------------------------------------------------------------------------------------------
 

@@ -109,7 +109,7 @@ def _never_content(simulation: Simulation) -> None:
             def negotiated(event: Any, now_us: int) -> list[Effect]:
                 effects = old(event, now_us)
                 if isinstance(event, Closed) and event.result is CallResult.AWARDED and desk.job is not None:
-                    effects += desk._call_again(desk.job, now_us)
+                    effects += desk.calls.call_again(desk.job, now_us)
                 return effects
 
             return negotiated

@@ -8,6 +8,7 @@ from bus_sim.sites import SiteNotFoundError
 from bus_sim.systems.graph.certify.model import GraphModel, ModelMove, State
 from bus_sim.systems.graph.certify.on_the_bus import STILL_US, TimedTaskSet, play_scene
 from bus_sim.systems.graph.certify.search import Stuck
+from onboard.bounded_file import read_bounded
 from onboard.systems.graph.network import Graph, edge
 from onboard.systems.graph.rules import Rules
 
@@ -28,7 +29,7 @@ def write_counterexample(file: Path, graph: Graph, rules: Rules, capacity: int, 
 def read_counterexample(file: Path) -> TimedTaskSet:
     """What a file holds. Raises ``SiteNotFoundError`` with one line for a file that cannot be read."""
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = json.loads(read_bounded(file))
         graph = Graph({edge(one, other): length for one, other, length in content["edges"]})
         moves = tuple(ModelMove(int(robot), str(word), int(node)) for robot, word, node in content["moves"])
         scene = TimedTaskSet(
@@ -45,7 +46,7 @@ def read_counterexample(file: Path) -> TimedTaskSet:
             not 0 <= m.robot < len(scene.starts) for m in moves
         ):
             raise ValueError("a robot or node that there is not")
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise SiteNotFoundError(f"{file}: no counterexample ({error}); write one with --counterexample") from error
     return scene
 

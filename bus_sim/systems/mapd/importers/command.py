@@ -7,6 +7,7 @@ from pathlib import Path
 from bus_sim.systems.mapd.importers.draft import Draft, site_text
 from bus_sim.systems.mapd.importers.mapf import DrawnDemand, import_map
 from bus_sim.systems.mapd.importers.opentcs import import_opentcs
+from onboard.bounded_file import MOST_EXPORT
 from onboard.config.files import read_text
 from onboard.config.problems import ConfigError, Problems
 from onboard.config.site import parse_site
@@ -63,9 +64,9 @@ def import_files(files: list[Path], wanted: DrawnDemand) -> Draft:
         if first.suffix != ".map" or other.suffix != ".task" or len(others) > 1:
             Problems.add(problems, 0, "", other.name, "does not go with it", "give one file, or a .map and its .task")
     problems.raise_if_any()
-    text = read_text(first, "import")
+    text = read_text(first, "import", MOST_EXPORT)
     if first.suffix == ".map":
-        tasks = (others[0], read_text(others[0], "task")) if others else None
+        tasks = (others[0], read_text(others[0], "task", MOST_EXPORT)) if others else None
         return import_map(first, text, tasks, wanted)
     return _IMPORTERS[first.suffix](first, text, wanted)
 

@@ -9,6 +9,10 @@ from onboard.config.problems import Problems
 
 #: Deeper than any building.
 _MOST_DEPTH = 50
+#: Values and what is around them; an airport of several floors has a third of it.
+_MOST_EVENTS = 300_000
+#: The one in C takes a tenth of the time; PyYAML comes without it where it was built so.
+_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @dataclass(frozen=True)
@@ -39,18 +43,37 @@ class Value:
 def parse_yaml(text: str, problems: Problems) -> Value:
     """The document; a value of None, with a problem noted, where it is no YAML. Aliases are refused: they can grow."""
     try:
-        for event in yaml.parse(text, Loader=yaml.SafeLoader):
-            if isinstance(event, yaml.AliasEvent):
-                at = event.start_mark
-                problems.add(at.line + 1 if at else 0, "", None, "an alias (*)", "write the value itself")
-                return Value(None, 1)
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        wrong = _first_wrong(text)
+        if wrong is not None:
+            problems.add(*wrong)
+            return Value(None, 1)
+        node = yaml.compose(text, Loader=_LOADER)
         return _value(node, 0) if node is not None else Value(None, 1)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         what = getattr(error, "problem", None) or "nested too deeply, or not a value"
-        problems.add(mark.line + 1 if mark else 0, "", None, f"not usable YAML: {what}", "export the building again")
+        # The parser in C puts what is missing at the end on the line behind the last one.
+        line = min(mark.line, text.count("\n")) + 1 if mark else 0
+        problems.add(line, "", None, f"not usable YAML: {what}", "export the building again")
         return Value(None, 1)
+
+
+def _first_wrong(text: str) -> tuple[int, str, None, str, str] | None:
+    """The first thing that has no bound, or is beyond it, as ``Problems.add`` takes it; raises as the parser does.
+
+    One look at its events, which are made one by one: nothing is built of what is refused.
+    """
+    depth = 0
+    for count, event in enumerate(yaml.parse(text, Loader=_LOADER)):
+        at = event.start_mark.line + 1 if event.start_mark else 0
+        if isinstance(event, yaml.AliasEvent):
+            return at, "", None, "an alias (*)", "write the value itself"
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > _MOST_DEPTH:
+            return at, "", None, "not usable YAML: nested too deeply", "export the building again"
+        if count > _MOST_EVENTS:
+            return at, "", None, f"more than {_MOST_EVENTS} values", "export floor by floor"
+    return None
 
 
 def _value(node: yaml.Node, depth: int) -> Value:

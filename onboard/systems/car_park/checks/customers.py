@@ -12,11 +12,12 @@ from onboard.contract.messages import (
     CarAt,
     DeskEvent,
     DeskOrder,
+    OperatorOrder,
     Reference,
     TaskReport,
 )
 from onboard.core.site import Station
-from onboard.systems.car_park.bay_task import KEYS, class_in
+from onboard.systems.car_park.bay_task import DESK_INPUT, KEYS, class_in
 from onboard.systems.car_park.site import CarPark
 from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.picture import BusPicture
@@ -162,7 +163,13 @@ class FullMeansFull(Rule):
 
     def handlers(self) -> Handlers:
         """Cars, what bays sense, which key is pressed, and what desks say."""
-        return {CarAt: self._on_car, BayState: self._on_bay, DeskEvent: self._on_key, DeskOrder: self._on_word}
+        return {
+            CarAt: self._on_car,
+            BayState: self._on_bay,
+            DeskEvent: self._on_key,
+            OperatorOrder: self._on_order,
+            DeskOrder: self._on_word,
+        }
 
     def _on_car(self, event: LogEvent[CarAt]) -> None:
         said = event.message
@@ -177,6 +184,12 @@ class FullMeansFull(Rule):
     def _on_key(self, event: LogEvent[DeskEvent]) -> None:
         if event.message.event in KEYS:
             self._keys[event.message.sender] = event.message.event
+
+    def _on_order(self, event: LogEvent[OperatorOrder]) -> None:
+        """A key pressed from afar."""
+        pressed = DESK_INPUT[event.message.action]
+        if pressed in KEYS:
+            self._keys[event.message.compartment] = pressed
 
     def _on_word(self, event: LogEvent[DeskOrder]) -> None:
         said = event.message

@@ -14,7 +14,6 @@ from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.geometry import (
     GATE_INDEX,
     ReportedPosition,
-    body_of,
     floor_of,
     floors_of,
     lifts_under,
@@ -37,7 +36,7 @@ class _LiftRule(Rule):
 
     def _on_progress(self, event: LogEvent[Progress]) -> None:
         track = self._track(event.message.sender)
-        body = body_of(self.picture.site, event.message, event.time_us)
+        body = self.picture.body_told(event.message, event.time_us)
         if track is None or body is None:
             return
         before = self.picture.bodies.get(body.node)
@@ -138,7 +137,7 @@ class PlatformThere(Rule):
         return {Progress: self._on_progress, DriveOrder: self._on_order}
 
     def _on_progress(self, event: LogEvent[Progress]) -> None:
-        body = body_of(self.picture.site, event.message, event.time_us)
+        body = self.picture.body_told(event.message, event.time_us)
         if body is not None and self.picture.kind(body.node) is KindCode.ROBOT:
             self._judge(event, body, occupied(self.picture.site, body), "is over")
 

@@ -8,7 +8,6 @@ from onboard.contract.messages import Award, CallForProposals, CarAt, Message, P
 from onboard.core.site import Site
 from onboard.systems.car_park.site import car_park
 from onboard.trace.check.event import Finding, LogEvent
-from onboard.trace.check.geometry import body_of
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.ways.site import Axis
@@ -113,7 +112,7 @@ class SomethingHappens(_OpenTasks):
 
     def _on_progress(self, event: LogEvent[Progress]) -> None:
         before = self.picture.bodies.get(event.message.sender)
-        body = body_of(self.picture.site, event.message, event.time_us)
+        body = self.picture.body_told(event.message, event.time_us)
         if before is None or body is None or (body.place, body.speed_mm_s) != (before.place, before.speed_mm_s):
             self._happened(event)
 
@@ -216,7 +215,7 @@ class NobodyStarves(Rule):
 
     def _on_progress(self, event: LogEvent[Progress]) -> None:
         before = self.picture.bodies.get(event.message.sender)
-        body = body_of(self.picture.site, event.message, event.time_us)
+        body = self.picture.body_told(event.message, event.time_us)
         if before is None or body is None or body.place != before.place or body.speed_mm_s:
             self._ended(event.message.sender, event.time_us)
 

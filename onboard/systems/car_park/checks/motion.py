@@ -9,7 +9,6 @@ from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.geometry import (
     TOLERANCE_MM,
     ReportedPosition,
-    body_of,
     lifts_under,
     occupied,
     sent_through,
@@ -47,7 +46,7 @@ class InsideAuthority(Rule):
         return {Progress: self._on_progress, DriveOrder: self._on_order}
 
     def _on_progress(self, event: LogEvent[Progress]) -> None:
-        body = body_of(self.picture.site, event.message, event.time_us)
+        body = self.picture.body_told(event.message, event.time_us)
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
         deceleration = way_site(self.picture.site).carrier.acceleration_mm_s2
@@ -58,9 +57,10 @@ class InsideAuthority(Rule):
             return
         braking_mm = body.speed_mm_s * abs(body.speed_mm_s) / (2 * deceleration)
         here = occupied(self.picture.site, body)
-        ahead = [slot for slot in swept(self.picture.site, body, body.position_mm + braking_mm) if slot not in here]
         self._judge(event, body, here, "is in")
-        self._judge(event, body, ahead, "cannot stop before")
+        if braking_mm:
+            ahead = swept(self.picture.site, body, body.position_mm + braking_mm)
+            self._judge(event, body, [slot for slot in ahead if slot not in here], "cannot stop before")
 
     def _was_pushed(self, body: ReportedPosition) -> bool:
         before = self.picture.bodies.get(body.node)
@@ -112,13 +112,19 @@ class OneBody(Rule):
     source = "issue 4, point 1; row P36"
     needs_site = True
 
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        tracks = way_site(picture.site).tracks.values()
+        #: Of each track that has linked ends, their mouths.
+        self._mouths = {track.number: [mouth for _, mouth in track.ends] for track in tracks if track.ends}
+
     def handlers(self) -> Handlers:
         """Reads where bodies say that they are."""
         return {Progress: self._on_progress}
 
     def _on_progress(self, event: LogEvent[Progress]) -> None:
         site = self.picture.site
-        body = body_of(site, event.message, event.time_us)
+        body = self.picture.body_told(event.message, event.time_us)
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
         lifts = lifts_under(site, body)
@@ -131,10 +137,10 @@ class OneBody(Rule):
             is_near = abs(apart_mm) < way_site(site).carrier_length_mm - TOLERANCE_MM
             if other.track == body.track and is_near and not is_gone:
                 self.find(event, (body.node, other.node), f"{abs(apart_mm)} mm apart on track {body.track}")
-            for lift in sorted(lifts & lifts_under(site, other)):
+            for lift in sorted(lifts & lifts_under(site, other)) if lifts else ():
                 self.find(event, (body.node, other.node), f"both on the platform of lift {lift}")
             for one, two in ((body, other), (other, body)):
-                if self._is_in_mouth_of(one, two):
+                if two.track in self._mouths and self._is_in_mouth_of(one, two):
                     self.find(event, (body.node, other.node), f"{one.node} in the mouth of {self._name(two.track)}")
 
     def _name(self, track: int) -> str:
@@ -145,7 +151,7 @@ class OneBody(Rule):
         """Whether a body is where another turns into a track, or comes out of it."""
         ways = way_site(self.picture.site)
         here = occupied(ways, two)
-        for _, mouth in ways.tracks[two.track].ends:
+        for mouth in self._mouths[two.track]:
             if mouth not in here:
                 continue
             apart_mm = abs(one.position_mm - ways.position_mm(mouth))

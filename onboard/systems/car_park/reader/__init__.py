@@ -1,8 +1,10 @@
 """The site file of a car park, of floors, alleys, lifts and compartments; docs/site-file.md describes every key."""
 
+import re
 from dataclasses import replace
 
 from onboard.config.fleet import FleetReader
+from onboard.config.problems import Problems
 from onboard.config.reader import Common, TomlTable
 from onboard.config.timing import read_timing
 from onboard.contract.codes import KindCode
@@ -14,12 +16,19 @@ from onboard.systems.car_park.reader.layout import Layout
 from onboard.systems.car_park.reader.machines import read_fleet, read_stewards
 from onboard.systems.car_park.reader.positions import BASE
 from onboard.systems.car_park.room import check_room
-from onboard.systems.car_park.site import CarPark, RideCalls
+from onboard.systems.car_park.site import CallAt, CarPark, RideCalls
 from onboard.ways.site import BayUse, charted
+
+#: Keys from which ways and machines follow, and one from which only the place of a robot does.
+_OF_WAYS = re.compile(r"(floors|alleys|lifts|spurs|compartments|robots)\b|$")
+_HOME = re.compile(r"robots\[\d+\]\.home")
 
 
 def read(root: TomlTable, common: Common) -> CarPark:
-    """A car park; every mistake is noted in ``root.problems``, and raised as ``ConfigError`` before room is counted."""
+    """A car park; every mistake is noted in ``root.problems``, and raised as ``ConfigError``.
+
+    What is proved of the whole is told with them where ways and machines could be read.
+    """
     problems, lift, bitrate = root.problems, root.table("lift"), common.bitrate
     floor_height_mm = lift.integer("floor_height_mm", 1000, 10_000, 2_500)
     layout = read_layout(root, floor_height_mm)
@@ -32,11 +41,13 @@ def read(root: TomlTable, common: Common) -> CarPark:
     timing = read_timing(root.table("timing"), robots, len(fleet.by_node), bitrate)
     negotiation = root.table("negotiation")
     rides = RideCalls(negotiation.choice("rides", [one.value for one in RideCalls], "planned"))
+    call_at = CallAt(negotiation.choice("call_at", [one.value for one in CallAt], "key"))
     tells_offers = negotiation.choice("offers", ["kept", "told"], "kept") == "told"
     timing = replace(timing, sub_call_percent=negotiation.integer("sub_call_percent", 20, 80, 50))
-    _check_whole(root, layout, fleet, uses)
     root.check_unknown()
-    problems.raise_if_any()
+    _check_whole(root, layout, fleet, uses)
+    if not _ways_are_read(problems):
+        problems.raise_if_any()
     site = CarPark(
         name=common.name,
         digest=0,
@@ -56,6 +67,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
         cars=constants.cars,
         timing=timing,
         rides=rides,
+        call_at=call_at,
         tells_offers=tells_offers,
         bay_uses=uses,
         classes=classes,
@@ -63,11 +75,15 @@ def read(root: TomlTable, common: Common) -> CarPark:
         alley_names={number: name for (_, name), number in layout.named.items() if name != BASE},
     )
     site = check_built(root, site, layout)
-    problems.raise_if_any()
-    if not common.crowded:
+    if not common.crowded and _ways_are_read(problems):
         check_room(root, site, fleet)
-        problems.raise_if_any()
+    problems.raise_if_any()
     return site
+
+
+def _ways_are_read(problems: Problems) -> bool:
+    """Whether no mistake was found in what the ways follow from; a robot whose home is mistaken has a stand-in."""
+    return not any(_OF_WAYS.match(one.key) and not _HOME.fullmatch(one.key) for one in problems.found)
 
 
 def _check_whole(root: TomlTable, layout: Layout, fleet: FleetReader, uses: dict[int, BayUse]) -> None:
@@ -75,7 +91,7 @@ def _check_whole(root: TomlTable, layout: Layout, fleet: FleetReader, uses: dict
     for kind, table in ((KindCode.COMPARTMENT, "compartments"), (KindCode.ROBOT, "robots")):
         if not root.values.get(table):
             root.bad(table, None, f"no {kind.name.lower()}", f"add at least one [[{table}]] table")
-    if root.problems.found:
+    if not _ways_are_read(root.problems):
         return
     bays = [uses.get(node, BayUse.BOTH) for node, one in fleet.by_node.items() if one.kind is KindCode.COMPARTMENT]
     for use, other in ((BayUse.ENTRY, BayUse.EXIT), (BayUse.EXIT, BayUse.ENTRY)):
@@ -103,7 +119,8 @@ def _check_joined(root: TomlTable, layout: Layout, fleet: FleetReader) -> None:
                 continue
             told.add(name)
             what = f"no {' and no '.join(missing)} can be reached from {here}"
-            root.bad("lifts", None, what, f"join {here} to the others by a lift")
+            key = "lifts" if "lifts" in root.values else "alleys" if "alleys" in root.values else "floors"
+            root.bad(key, None, what, f"join {here} to the others by a lift")
     if len(groups) > 1 and "lifts" not in root.wrong:
         what = f"no way from {layout.words(min(groups[0]))} to {layout.words(min(groups[1]))}"
         root.bad("lifts", None, what, "join them by a lift, or write a site file for each")

@@ -101,7 +101,7 @@ def _read_alley(layout: Layout, table: TomlTable) -> list[Joined]:
     side = table.choice("side", list(SIDES), "far")
     ends = {end: table.parsed(end, _beside, "a position", _JOINED) if table.has(end) else None for end in ENDS}
     if table.wrong & {"name", "floors", "positions"} or not layout.known:
-        layout.known = False
+        layout.unsure.add("" if name and "name" in table.wrong and ALLEY_NAME.fullmatch(name) is None else name)
         return []
     found = []
     for floor in floors or ():
@@ -130,7 +130,7 @@ def _read_without(layout: Layout, floors: TomlTable) -> None:
         if written is None:
             form = 'write places such as "p(1,3)N" (near side), "p(1,3)" (both sides) or "p(*,3)" (all floors)'
             floors.bad("without", text, "not a place", form, item=number)
-        elif layout.known:
+        elif layout.can_judge(written):
             gone = layout.stations(written)
             if not gone:
                 floors.bad("without", text, "no such place", layout.extent(), item=number)
@@ -166,7 +166,7 @@ def _mouths(layout: Layout, table: TomlTable, side: str) -> list[Station | None]
         return [None]
     if written.is_one:
         return [layout.take(table, layout.judged(table, "at", written), side)]
-    found = layout.meant(written) if layout.known else []
-    if layout.known and not found:
+    found = layout.meant(written) if layout.can_judge(written) else []
+    if layout.can_judge(written) and not found:
         table.bad("at", table.values["at"], "no such segment", layout.extent())
     return [layout.take(table, segment, side) if "at" not in table.wrong else None for segment in found]

@@ -4,21 +4,19 @@ Its alleys meet where they should, nothing lies on a way, and every place can be
 exit.
 """
 
-import re
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
 
 from onboard.config.reader import TomlTable
-from onboard.core.site import Station
+from onboard.core.site import Segment, Station
 from onboard.systems.car_park.outlines import Box, Outlines
-from onboard.systems.car_park.reader.layout import Layout
+from onboard.systems.car_park.reader.layout import FIRST_LIFT, Layout
 from onboard.systems.car_park.site import CarPark
+from onboard.ways.floor_plan import Mismatch
 from onboard.ways.room import reachable
 from onboard.ways.site import Track, TrackKind
 
-#: A track in the words of the floor plan.
-_TRACK = re.compile(r"track (\d+)")
 #: Places that one line names.
 _NAMED = 3
 
@@ -26,35 +24,65 @@ _NAMED = 3
 def check_built(root: TomlTable, site: CarPark, layout: Layout) -> CarPark:
     """Note what cannot be built or reached; the site without the places that would lie on a way or on each other.
 
-    Of two such places that of the alley stays which was read first. A floor with one alley needs no such proof.
+    Of two such places that of the alley stays which was read first. Where each floor is one alley nothing lies on
+    anything, and everything can be reached unless an alley is one way.
     """
-    is_more = any(_is_more(track) for track in site.tracks.values())
-    if not is_more and len(layout.alleys()) == layout.floors:
-        return site
     outlines = Outlines(site)
-    _tell_mismatches(root, layout, outlines)
-    if root.problems.found:
+    if _tell_mismatches(root, layout, outlines):
         return site
-    _check_ways(root, layout, outlines)
-    site = replace(site, places=tuple(_apart(outlines)))
-    numbers = {place.number for place in site.places}
-    site = replace(site, place_class={at: one for at, one in site.place_class.items() if at in numbers})
-    _check_reached(root, site)
+    if any(_is_more(track) for track in site.tracks.values()) or len(layout.alleys()) > layout.floors:
+        _check_ways(root, layout, outlines)
+        site = replace(site, places=tuple(_apart(outlines)))
+        numbers = {place.number for place in site.places}
+        site = replace(site, place_class={at: one for at, one in site.place_class.items() if at in numbers})
+        _check_reached(root, site)
+    elif any(track.one_way for track in site.tracks.values()):
+        _check_reached(root, site)
     return site
 
 
-def _tell_mismatches(root: TomlTable, layout: Layout, outlines: Outlines) -> None:
-    """Each alley that does not end where it is written to, on the first floor where it does not."""
+def _tell_mismatches(root: TomlTable, layout: Layout, outlines: Outlines) -> bool:
+    """Each alley and shaft that does not end where it is written to, on the first floor where it does not."""
     told = set()
-    for words in outlines.plan.mismatches:
-        numbers = [int(number) for number in _TRACK.findall(words)]
-        names = tuple(layout.alley_name(number) for number in numbers)
+    for one in outlines.plan.mismatches:
+        lift = _lift_of(layout, one.track)
+        names = (lift,) if lift else (layout.alley_name(one.track), layout.alley_name(one.beside.track))
         if names not in told:
             told.add(names)
-            table = layout.tables.get(numbers[0], root) if numbers else root
-            what = _TRACK.sub(lambda found: layout.words(int(found[1])), words)
-            remedy = "change positions, pitch_mm, or where it begins or ends"
-            table.bad("to" if "to" in table.values else "alleys", table.values.get("to"), what, remedy)
+            if lift:
+                _tell_shaft(layout, layout.lifts[lift - FIRST_LIFT], one)
+            else:
+                _tell_end(root, layout, one)
+    return bool(told)
+
+
+def _lift_of(layout: Layout, track: int) -> int:
+    """The lift that a track is, or before whose door it is the lobby; 0 for an alley."""
+    tracks = {track} if track in layout.named.values() else {track, *_shafts_behind(layout, track)}
+    return next((one for one in sorted(tracks) if layout.tracks[one].kind is TrackKind.LIFT), 0)
+
+
+def _shafts_behind(layout: Layout, lobby: int) -> list[int]:
+    return [
+        one.number for one in layout.tracks.values() if one.kind is TrackKind.LIFT and Segment(lobby, 1) in one.joins
+    ]
+
+
+def _tell_end(root: TomlTable, layout: Layout, one: Mismatch) -> None:
+    table = layout.tables.get(one.track, root)
+    what = f"the end of {layout.words(one.track)} is at {one.here}, and {one.beside} at {one.there}"
+    remedy = "change positions, pitch_mm, or where it begins or ends"
+    table.bad("to" if "to" in table.values else "alleys", table.values.get("to"), what, remedy)
+
+
+def _tell_shaft(layout: Layout, table: TomlTable, one: Mismatch) -> None:
+    """A shaft is vertical: all its doors are at one place."""
+    key = "doors" if "doors" in table.values else "end"
+    floor = layout.level[one.beside.track]
+    along_mm, across_mm = abs(one.here.x_mm - one.there.x_mm), abs(one.here.y_mm - one.there.y_mm)
+    what = f"not one above the other: that of floor {floor} is off by {along_mm} mm along and {across_mm} mm across"
+    remedy = "change doors, the lengths of alleys, or lobby_mm, or leave the floor out"
+    table.bad(key, table.values.get(key), what, remedy)
 
 
 def _is_more(track: Track) -> bool:

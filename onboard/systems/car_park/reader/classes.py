@@ -1,6 +1,7 @@
 """Classes of places: how long, high, heavy and wide a car may be that is put there, and where one can charge."""
 
 from onboard.config.reader import TomlTable
+from onboard.core.site import Station
 from onboard.systems.car_park.reader.constants import Constants, check_width
 from onboard.systems.car_park.reader.layout import Layout
 from onboard.systems.car_park.reader.positions import read_written
@@ -46,23 +47,34 @@ def _read_places(
 ) -> None:
     """Give the places of one class its number; each place has one at most."""
     there = set(layout.places())
-    found = 0
+    found, all_sure = 0, layout.known
     for item, text in enumerate(table.items("places", 'a list of places such as ["p(*,1-4)F"]') or ()):
         written = read_written(text)
         if written is None:
             table.bad("places", text, "not a place", 'write places such as "p(1,3)N" or "p(*,1-4)"', item=item)
             continue
-        meant = layout.stations(written) & there if layout.known else set()
-        if layout.known and not meant:
-            table.bad("places", text, "no such place", layout.extent(), item=item)
+        is_sure = layout.can_judge(written)
+        named = layout.stations(written) if is_sure else set()
+        meant = named & there
+        all_sure = all_sure and is_sure
+        if is_sure and not meant:
+            what, remedy = ("no such place", layout.extent()) if not named else _gone(layout, min(named))
+            table.bad("places", text, what, remedy, item=item)
         for station in sorted(meant):
             other = of_place.setdefault(station.number, number)
             if other != number:
                 table.bad("places", text, f"{station} is of class {classes[other - 1].name}", "name it once", item=item)
                 break
         found += len(meant)
-    if not found and layout.known and "places" not in table.wrong:
+    if not found and all_sure and "places" not in table.wrong:
         table.bad("places", table.values.get("places"), "no place of this class", 'write places such as "p(*,1-4)F"')
+
+
+def _gone(layout: Layout, station: Station) -> tuple[str, str]:
+    """Why there is no place where there could be one, and what to do."""
+    there = layout.taken.get(station)
+    what = f"{there} is there" if there is not None else "left out by floors.without"
+    return what, "name other places, or take it out of the list"
 
 
 def check_heights(layout: Layout, cars: CarLimits, classes: tuple[SizeClass, ...], place_class: dict[int, int]) -> None:

@@ -49,8 +49,12 @@ class Joints:
         for one in self.joined:
             for end in ENDS:
                 mouth = self.mouths[one.number, end]
-                if mouth is not None and end not in one.table.wrong:
+                # How an alley lies follows from its first mouth: of one that is mistaken the other is not judged.
+                if mouth is not None and not one.table.wrong & {*ENDS} and self._is_sure(one):
                     self._take_mouth(one, end, mouth)
+
+    def _is_sure(self, one: Joined) -> bool:
+        return all(written is None or self.layout.can_judge(written) for written in one.ends.values())
 
     def _find_mouth(self, one: Joined, end: str) -> Segment | None:
         mouth = self.mouths[one.number, end] = self._judged(one, end)

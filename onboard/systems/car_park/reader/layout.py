@@ -31,7 +31,8 @@ def one_position(text: str) -> Written | None:
 class Layout:
     """What has been read so far.
 
-    ``known`` is False where number or length of the alleys is mistaken: what refers to them is then not judged.
+    ``known`` is False where number or length of floors' own alleys is mistaken, ``unsure`` has the names of other
+    alleys that are (empty for one without a name): what refers to them is then not judged.
     ``named`` are the alleys by floor and name, ``level`` the floor of each track, ``lifts`` the tables of the lifts in
     the order of their tracks. ``taken`` says what stands at a station that is no place, ``kept`` why nobody may stand
     for long at a segment, ``floor_mm`` how high each floor lies above the lowest; ``low`` are the tables of floors that
@@ -53,6 +54,7 @@ class Layout:
     tables: dict[int, TomlTable] = field(default_factory=dict)
     pitch_mm: int = 2_400
     known: bool = True
+    unsure: set[str] = field(default_factory=set)
 
     @property
     def floors(self) -> int:
@@ -85,11 +87,12 @@ class Layout:
         self, table: TomlTable, name: str, written: Written, *, item: int | None = None, spurs: bool = False
     ) -> Segment | None:
         """The one segment that is meant at a key, or at one ``item`` of the list there; else None, and a problem."""
-        if not self.known:
-            return None
         value = table.values[name] if item is None else table.values[name][item]
         number, index = self._number(written), written.indices.first
         track = self.tracks.get(number) if number is not None else None
+        if not self.can_judge(written) or (self.unsure and number is not None and number > self.floors):
+            # Numbers behind those of floors are not known either.
+            return None
         if track is None or track.kind is TrackKind.LIFT or (track.kind is TrackKind.SPUR and not spurs):
             table.bad(name, value, "no such segment", self._known_alleys(written), item=item)
             return None
@@ -98,6 +101,15 @@ class Layout:
             table.bad(name, value, "no such segment", remedy, item=item)
             return None
         return Segment(track.number, index)
+
+    def can_judge(self, written: Written) -> bool:
+        """Whether what is meant is known: not by the name of an alley that is mistaken."""
+        is_named = written.alley in (BASE, ANY) or any(name == written.alley for _, name in self.named)
+        return (
+            self.known
+            and (written.alley in (BASE, ANY) or written.alley not in self.unsure)
+            and (is_named or "" not in self.unsure)
+        )
 
     def _number(self, written: Written) -> int | None:
         """A floor's own alley by the floor's number; spurs and lobbies by their track's."""

@@ -9,6 +9,8 @@ from onboard.systems.car_park.reader.layout import FIRST_LIFT, SIDES, Layout
 from onboard.ways.site import BayUse, Track
 
 _NOWHERE = Segment(0, 0)
+#: Where a robot is whose home is mistaken: somewhere on the site, so that all else can be judged.
+STAND_IN = Segment(1, 1)
 
 
 def read_fleet(root: TomlTable, layout: Layout) -> tuple[FleetReader, dict[int, BayUse]]:
@@ -37,11 +39,12 @@ def _read_home(table: TomlTable, layout: Layout, fleet: FleetReader) -> Segment:
     """Where a robot stands at first, as it may stand there for ever: on no sill, front or mouth, and by itself."""
     home = layout.find(table, "home", spurs=True)
     if home is None:
-        return _NOWHERE
+        return STAND_IN
     if home in layout.kept:
         remedy = "choose a segment where a robot may stand for ever"
         table.bad("home", table.values["home"], f"{layout.kept[home]} there", remedy)
-    elif home in fleet.homes:
+        return STAND_IN
+    if home in fleet.homes:
         what = f"home of {fleet.homes[home]} already"
         table.bad("home", table.values["home"], what, "give each robot a segment of its own")
     fleet.homes.setdefault(home, path_text(table.path))
@@ -55,7 +58,7 @@ def read_stewards(table: TomlTable, layout: Layout, fleet: FleetReader) -> dict[
     """
     fixed = fleet.fixed()
     stewards = {}
-    if not layout.known:
+    if not layout.known or layout.unsure:
         table.pass_over(str.isdecimal)
     for number, track in layout.tracks.items():
         if not table.has(str(number)):

@@ -74,7 +74,10 @@ def _read_doors(layout: Layout, table: TomlTable) -> list[Segment]:
             table.bad("doors", text, "not a door", f"write {_DOOR}", item=item)
         else:
             doors.append(_Door(item, written))
-    if not layout.known or floors is None:
+    if any(door.written.side for door in doors):
+        # Judged also where no lobby can be made, because of another mistake.
+        _read_lobby_mm(layout, table)
+    if floors is None or not all(layout.can_judge(door.written) for door in doors):
         return []
     sills: list[Segment] = []
     for floor in floors:
@@ -83,6 +86,10 @@ def _read_doors(layout: Layout, table: TomlTable) -> list[Segment]:
     if not table.wrong:
         _check_stops(layout, table, sills)
     return sills if not table.wrong else []
+
+
+def _read_lobby_mm(layout: Layout, table: TomlTable) -> int:
+    return table.integer("lobby_mm", 1000, 10_000, layout.pitch_mm)
 
 
 def _sills_on(layout: Layout, table: TomlTable, doors: list[_Door], floor: int) -> list[Segment]:
@@ -154,7 +161,7 @@ def _lobby(layout: Layout, table: TomlTable, mouth: Segment, side: str) -> Segme
     if number >= FIRST_LIFT:
         table.bad("doors", table.values["doors"], f"alley or lobby {number}", f"a site has at most {FIRST_LIFT - 1}")
         return None
-    floor, lobby_mm = layout.level[mouth.track], table.integer("lobby_mm", 1000, 10_000, layout.pitch_mm)
+    floor, lobby_mm = layout.level[mouth.track], _read_lobby_mm(layout, table)
     layout.tracks[number] = Track(number, TrackKind.ALLEY, 1, lobby_mm, (mouth,), side=SIDES[side], level=floor)
     layout.level[number] = floor
     layout.sides[number] = frozenset()

@@ -3,7 +3,7 @@
 import zlib
 from collections.abc import Iterable
 
-from onboard.contract.messages import TokenAssigned
+from onboard.contract.rights import TokenAssigned
 
 
 def assignment_digest(assigned: Iterable[TokenAssigned]) -> int:

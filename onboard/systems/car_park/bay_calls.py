@@ -1,0 +1,224 @@
+"""What a compartment has called for: the task that has its bay, and the next one while the bay still works.
+
+The next one is a car that is to be fetched. It is called for with the time from which the bay can take the car, so that
+its robot is on its way, or there, when the bay is empty; what it is and who won it is journalled like the other.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from onboard.contract.codes import CallResult, KindCode, LegAction, Operation, Reason, TaskPhase
+from onboard.contract.constants import NOBODY, TASK_VERSION_BITS
+from onboard.contract.messages import Award, CallForProposals, Reference, TaskReport, TokenRefusal, TokenRequest
+from onboard.core.authority import TokenKey
+from onboard.core.effects import Effect, Report, Send
+from onboard.core.negotiation import EVENT_TYPES
+from onboard.core.serial import from_bus_ms, successor
+from onboard.core.site import Station
+from onboard.systems.car_park import bay_task, custody
+from onboard.systems.car_park.bay_memory import BayMemory, ahead_over_record, ahead_record, job_record
+from onboard.systems.car_park.bay_task import REMINDERS, RETRY_US, SETTLING_US, BayTask
+from onboard.systems.car_park.site import open_end
+from onboard.systems.car_park.stewardship import Stewardship
+from onboard.ways.mirror import WayFleet
+from onboard.ways.tokens import car_token
+
+
+@dataclass
+class BayCalls:
+    """``job`` has the bay, ``ahead`` gets it next. ``on_won`` is told of each task that was won."""
+
+    fleet: WayFleet
+    station: Station
+    stewardship: Stewardship
+    memory: BayMemory
+    floor: Callable[[CallForProposals, int], int]
+    on_won: Callable[[BayTask], None]
+    job: BayTask | None = None
+    ahead: BayTask | None = None
+
+    def in_hand(self) -> list[BayTask]:
+        """Both, as far as there are any."""
+        return [task for task in (self.job, self.ahead) if task is not None]
+
+    def named(self, reference: Reference) -> BayTask | None:
+        """The task of this name, where it is in hand."""
+        return next((task for task in self.in_hand() if task.task == reference), None)
+
+    def of_car(self, car: Reference) -> BayTask | None:
+        """The task that is about a car."""
+        return next((task for task in self.in_hand() if task.car == car), None)
+
+    def take_up(self) -> None:
+        """After a restart: the next task as the journal knows it; whoever has won it says so when asked."""
+        if self.memory.ahead is not None:
+            task, car, wheelbase_mm = self.memory.ahead
+            winner, version = self.stewardship.winner_of(car, task)
+            self.ahead = BayTask(task, Operation.RETRIEVE, car, wheelbase_mm, winner, version)
+
+    # --- what is heard -----------------------------------------------------------------------------------------
+
+    def remind(self, request: TokenRequest) -> list[Effect]:
+        """Who asks for the car of a task hears whose that is, where it may not know."""
+        wanted = TokenKey(request.token_kind, request.token)
+        found = (task for task in self.in_hand() if wanted == car_token(*task.car))
+        return [effect for task in found for effect in task.remind(self.fleet.node_id, request.sender)]
+
+    def refused_to_winner(self, refusal: TokenRefusal, now_us: int) -> list[Effect] | None:
+        """The car's custodian knows of no winner; None where the word is about nothing of mine."""
+        found = next((one for one in self.in_hand() if one.is_unknown_to(refusal, self.fleet.mirror)), None)
+        if found is None:
+            return None
+        found.reminders += 1
+        # Whoever has not heard the call does not know by the award which car it is about.
+        return (
+            [Send(found.award(self.fleet.node_id))] if found.reminders < REMINDERS else self.call_again(found, now_us)
+        )
+
+    def on_report(self, report: TaskReport, now_us: int, *, is_starting: bool) -> list[Effect]:
+        """What its winner, or who has won it once, says of a task of mine; or the custodian of its car.
+
+        ``is_starting``: doors and bay are not known yet, and of the task in hand only the journal tells.
+        """
+        task, machine = self.named(report.task), self.fleet.site.machines.get(report.sender)
+        if task is not None and report.phase is TaskPhase.FORFEITED:
+            return self._on_forfeit(task, report.sender, now_us)
+        is_robot = machine is not None and machine.kind is KindCode.ROBOT
+        if is_starting and task is None:
+            return self.stewardship.claimed(report, self.memory) if is_robot else []
+        if not is_robot:
+            return []
+        if task is None:
+            return bay_task.withdrawal(self.fleet.node_id, report)
+        if report.phase is TaskPhase.DONE and task.operation is Operation.RETRIEVE and report.sender == task.winner:
+            return self._fetch_anew(task, now_us) if report.station != self.station.number else []
+        if report.phase is TaskPhase.AWARDED and not task.winner and task.retry_at_us is not None and not task.call:
+            return self.won_by(task, report.sender, task.call)
+        return task.remind(self.fleet.node_id, report.sender)
+
+    def _fetch_anew(self, task: BayTask, now_us: int) -> list[Effect]:
+        """The winner could not wait before the bay, and left the car at a place: that task is done, here is another."""
+        name, number = self.memory.next_reference(self.fleet)
+        anew = BayTask(name, Operation.RETRIEVE, task.car, task.wheelbase_mm, ready_us=self.taken_at_us(now_us) or 0)
+        over: list[Effect] = [number]
+        if task is self.job:
+            self.job = anew
+            over.append(job_record(name, Operation.RETRIEVE, task.car, task.wheelbase_mm))
+        else:
+            self.ahead = anew
+            over += [ahead_over_record(task.task), ahead_record(name, task.car, task.wheelbase_mm)]
+        return over + self.call_for(anew, now_us)
+
+    def _on_forfeit(self, task: BayTask, sender: int, now_us: int) -> list[Effect]:
+        """The winner gives the task back, or the custodian of the car has taken the right to it back."""
+        record = self.fleet.mirror.cars.get(task.car)
+        if task.winner and sender == task.winner:
+            return self.call_again(task, now_us)
+        if record is None or sender != record.custodian:
+            return []
+        if not task.winner:
+            return self.call_again(task, now_us) if self._is_unheard(task, now_us) else []
+        heard = task.winner not in self.fleet.mirror.obstacles.machines
+        if heard and task.version != 1 and task.reminders < REMINDERS:
+            # It has not heard of the newest award yet.
+            task.reminders += 1
+            return [Send(task.award(self.fleet.node_id))]
+        return self.call_again(task, now_us)
+
+    def _is_unheard(self, task: BayTask, now_us: int) -> bool:
+        silent = self.fleet.negotiation.silent_winner(task.task, now_us)
+        return custody.is_mine(self.fleet, task.car) and silent != NOBODY
+
+    # --- calls -------------------------------------------------------------------------------------------------
+
+    def won_by(self, task: BayTask, winner: int, call: int) -> list[Effect]:
+        """``winner`` has won a task of mine in ``call``, 0 where that is not known."""
+        task.winner, task.call, task.retry_at_us, task.reminders, task.refusals = winner, call, None, 0, 0
+        self.on_won(task)
+        return self._note(task)
+
+    def _note(self, task: BayTask) -> list[Effect]:
+        """Who may fetch its car, in the journal; of a car that is not there yet it has nothing."""
+        if task.is_coming:
+            return []
+        by_word = bool(task.winner) and not task.call
+        return self.stewardship.won(task.car, task.winner, task.task, task.version, by_word=by_word)
+
+    def call_again(self, task: BayTask, now_us: int) -> list[Effect]:
+        """Its winner gave the task back, or is lost: it is called anew under a raised version, noted before said."""
+        task.winner, task.version = 0, successor(task.version, TASK_VERSION_BITS)
+        effects = self._note(task)
+        outcome = self.fleet.negotiation.abandon(task.task, Reason.NODE_SILENT, now_us)
+        effects += [item for item in outcome if not isinstance(item, EVENT_TYPES)]
+        return effects + self.call_for(task, now_us)
+
+    def call_for(self, task: BayTask, now_us: int) -> list[Effect]:
+        """Call for a task; a car that stands at no place is asked for again later."""
+        source, sink = self.station.number, open_end(task.car_class)
+        if task.operation is Operation.RETRIEVE:
+            where = custody.place_of(self.fleet, task.car)
+            if where is None:
+                task.retry_at_us = now_us + RETRY_US
+                return [Report(f"car {task.car.number} is nowhere to be fetched from")]
+            source, sink = where.number, source
+        task.retry_at_us = None
+        return list(self.fleet.negotiation.open(task.terms(source, sink, self.floor), now_us))
+
+    def call_for_who_comes(self, car: Reference, ready_us: int, now_us: int) -> list[Effect]:
+        """A robot for a car that drives in; its bay is locked at ``ready_us``, bus time."""
+        self.job = BayTask(car, Operation.PARK, car, 0, ready_us=ready_us, is_coming=True)
+        return self.call_for(self.job, now_us)
+
+    def has_come(self, wheelbase_mm: int) -> list[Effect]:
+        """It stands in the bay, and has a ticket: what was won before is noted."""
+        assert self.job is not None
+        self.job.is_coming, self.job.wheelbase_mm = False, wheelbase_mm
+        return self._note(self.job) if self.job.winner else []
+
+    def not_come(self, now_us: int) -> list[Effect]:
+        """Nobody brings a car, or another than was thought: the task is over before it began."""
+        job, self.job = self.job, None
+        assert job is not None
+        outcome = self.fleet.negotiation.abandon(job.task, Reason.CANCELLED, now_us)
+        over = Award(self.fleet.node_id, 0, 0, job.task, 0, CallResult.WITHDRAWN, Reason.CANCELLED)
+        return [*(item for item in outcome if not isinstance(item, EVENT_TYPES)), Send(over)]
+
+    def review(self, now_us: int) -> list[Effect]:
+        """As custodian: winners that are lost; for my own tasks I call anew at once."""
+        effects = self.stewardship.review(now_us)
+        taken_back = bool(effects)
+        for task in self.in_hand():
+            # Nobody has a right by an award that was not heard: its car is mine, and goes to the winner only.
+            is_lost = (
+                taken_back and self.stewardship.is_given_back(task.car)
+                if task.winner
+                else self._is_unheard(task, now_us)
+            )
+            if is_lost:
+                effects += self.call_again(task, now_us)
+        ahead = self.ahead
+        if ahead is not None and not (ahead.winner or ahead.call or ahead.retry_at_us or self._is_open(ahead)):
+            # Taken up from the journal: whoever has it says so first.
+            ahead.retry_at_us = now_us + SETTLING_US
+        if ahead is not None and ahead.retry_at_us is not None and ahead.retry_at_us <= now_us:
+            effects += self.call_for(ahead, now_us)
+        return effects
+
+    def _is_open(self, task: BayTask) -> bool:
+        return any(one.terms.task == task.task for one in self.fleet.negotiation.initiators)
+
+    def next_wake(self, *, is_job_asked: bool) -> int | None:
+        """When a call is made again, or a winner counts as lost; the job's call only where its phase waits for it."""
+        tasks = [self.ahead, self.job if is_job_asked else None]
+        times = [task.retry_at_us for task in tasks if task is not None]
+        return min([one for one in (*times, self.stewardship.next_wake()) if one is not None], default=None)
+
+    def taken_at_us(self, now_us: int) -> int | None:
+        """When the winner of the job will have been at the bay, by its plan, bus us; None where it has told of none."""
+        job = self.job
+        plan = None if job is None else self.fleet.mirror.itineraries.get(job.winner)
+        here = self.station
+        for leg in () if plan is None else plan.legs:
+            if leg.action is LegAction.WORK and (leg.track, leg.to_index, leg.side) == tuple(here):
+                return from_bus_ms(leg.end_ms, now_us)
+        return None

@@ -1,0 +1,70 @@
+"""A robot that stands loaded before a bay in which another car is: it must not stand in the way of whoever takes that.
+
+A bay is promised to the next car while it still works, and what was planned may not come true: a driver takes his time,
+or the robot for the car in the bay is lost, and who stands outside is the only one left. Then it leaves its car at a
+free place, and the compartment calls for that anew.
+"""
+
+from dataclasses import dataclass
+
+from onboard.contract.codes import LegAction
+from onboard.contract.messages import Itinerary
+from onboard.core.site import Station
+from onboard.systems.car_park import custody
+from onboard.systems.car_park.handling import ShuttleWork
+from onboard.systems.car_park.program import CarHandling, HandlingPhase, Program, StationWork
+from onboard.ways.mirror import WayFleet
+
+#: So long it stands where another robot is to take the car away, us, and so long where a driver is to go with it.
+ROBOT_PATIENCE_US = 10_000_000
+DRIVER_PATIENCE_US = 60_000_000
+
+
+@dataclass
+class KeptOut:
+    """One robot's look at the bay where it is to leave its car."""
+
+    fleet: WayFleet
+    shuttle: ShuttleWork
+    _since_us: int | None = None
+    _due_us: int | None = None
+
+    def _is_kept_out(self, work: StationWork) -> bool:
+        """Whether it cannot be done for now: another car stands in the bay where one is to be left."""
+        if work.handling is not CarHandling.LEAVE or work.station not in self.fleet.site.compartments.values():
+            return False
+        return bool(custody.others_in(self.fleet.mirror, work.station, work.car))
+
+    def next_wake(self) -> int | None:
+        """When to look again, bus us."""
+        return self._due_us
+
+    def look(self, program: Program, now_us: int) -> StationWork | None:
+        """The work before whose bay this robot has stood for long enough; it is looked at anew after that."""
+        step = program.step
+        work = None if step is None else step.work
+        stands = work is not None and self.shuttle.work == work and self.shuttle.phase is HandlingPhase.ACQUIRE
+        if work is None or not stands or not self._is_kept_out(work):
+            self._since_us = self._due_us = None
+            return None
+        self._since_us = now_us if self._since_us is None else self._since_us
+        patience_us = ROBOT_PATIENCE_US if self._is_wanted(work.station) else DRIVER_PATIENCE_US
+        self._due_us = self._since_us + patience_us
+        if now_us < self._due_us:
+            return None
+        self._since_us, self._due_us = now_us, now_us + patience_us
+        return work
+
+    def _is_wanted(self, bay: Station) -> bool:
+        """Whether another robot plans to take the car out of the bay."""
+        plans = self.fleet.mirror.itineraries.values()
+        return any(works_at(plan, bay) for plan in plans if plan.sender != self.fleet.node_id)
+
+
+def works_at(itinerary: Itinerary, station: Station) -> bool:
+    """Whether a plan has work at a station."""
+    return any(
+        leg.action is LegAction.WORK
+        and (leg.track, leg.to_index, leg.side) == (station.track, station.index, station.side)
+        for leg in itinerary.legs
+    )

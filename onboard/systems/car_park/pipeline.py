@@ -1,0 +1,112 @@
+"""What a compartment does before its bay is free for it: who comes in next, who goes out, and what is called for.
+
+With drivers one behind the other outside, cars go in and out by turns: the robot that brings one finds the bay locked
+and empty behind the robot that took the other. Without a queue the next car is called for while a driver still gets
+into his own. ``call_at = "key"`` in the site file leaves all this out (row P50's order).
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+from onboard.contract.codes import Operation
+from onboard.contract.messages import Reference
+from onboard.core.effects import Effect
+from onboard.systems.car_park import bay_task, custody
+from onboard.systems.car_park.bay_calls import BayCalls
+from onboard.systems.car_park.bay_generation import DRIVER_US
+from onboard.systems.car_park.bay_memory import BayMemory, ahead_record
+from onboard.systems.car_park.bay_task import BayPhase, BayTask
+from onboard.systems.car_park.site import ANY_CLASS, CallAt, CarPark
+from onboard.ways.mirror import WayFleet
+
+#: A driver who waits outside drives in within this once he is invited, us: a second to see it, and one to begin.
+QUEUED_US = 2_500_000
+#: From driving in until the input door begins to lock, us: a drive of 10 to 30 s and a walk of 4 to 8 s on average.
+ENTERED_US = 26_000_000
+#: Who drives in has pressed the key within this, us: the longest drive, and a person's patience once.
+ENTERING_US = 45_000_000
+
+
+@dataclass
+class Pipeline:
+    """One compartment's look ahead; it calls, and the compartment moves doors. Times are bus us."""
+
+    fleet: WayFleet
+    park: CarPark
+    calls: BayCalls
+    memory: BayMemory
+    tickets: deque[Reference]
+    #: Since when drivers are invited, and whether the last one came at once: then there is a queue outside.
+    free_from_us: int | None = None
+    is_queued: bool = False
+    #: Who comes in has until then to press the key; 0 while the bay is empty.
+    entering_until_us: int = 0
+
+    @property
+    def is_on(self) -> bool:
+        """Whether this site calls before the key, and before the bay is locked."""
+        return self.park.call_at is CallAt.ARRIVAL
+
+    def next_wake(self, phase: BayPhase) -> int | None:
+        """When whoever comes in has not pressed the key, or a driver who was invited has not come."""
+        if phase is BayPhase.ENTERING:
+            return self.entering_until_us
+        waits = self.is_queued and self.free_from_us is not None and self.tickets
+        return self.free_from_us + QUEUED_US if waits and self.free_from_us is not None else None
+
+    # --- a driver comes in -------------------------------------------------------------------------------------
+
+    def enters(self, now_us: int) -> list[Effect]:
+        """Somebody is in the free bay: call for a robot before the car is measured, where any place will do."""
+        if not self.is_on:
+            return []
+        if self.free_from_us is not None:
+            self.is_queued, self.free_from_us = now_us - self.free_from_us <= QUEUED_US, None
+        is_told_by_size = bool(self.park.classes) or self.park.measures_width
+        if self.entering_until_us or is_told_by_size or not bay_task.has_room(ANY_CLASS, self.park, self.fleet.mirror):
+            return []
+        self.entering_until_us = now_us + ENTERING_US
+        car, number = self.memory.next_reference(self.fleet)
+        ready_us = now_us + ENTERED_US + self.park.timing.door_us
+        return [number, *self.calls.call_for_who_comes(car, ready_us, now_us)]
+
+    # --- a car goes out ----------------------------------------------------------------------------------------
+
+    def is_out_next(self, now_us: int) -> tuple[bool, list[Effect]]:
+        """The bay is empty: whether it is locked for a car that is to come out, and what is said to have it fetched."""
+        bay_task.forget_tickets(self.tickets, self.fleet.mirror)
+        if not self.is_on:
+            return bool(self.tickets) and custody.place_of(self.fleet, self.tickets[0]) is not None, []
+        self.entering_until_us = 0
+        self.free_from_us = now_us if self.free_from_us is None else self.free_from_us
+        if self.is_queued and now_us - self.free_from_us < QUEUED_US:
+            # Drivers come one after the other, and it is their turn.
+            return False, []
+        self.is_queued = False
+        if self.calls.ahead is not None:
+            return True, []
+        called = self.call(now_us, now_us)
+        return bool(called), called
+
+    def look_ahead(self, phase: BayPhase, now_us: int) -> list[Effect]:
+        """Call for the next car while the bay still works, once it is known when it can take it."""
+        job = self.calls.job
+        if job is None or self.calls.ahead is not None or not self.tickets or not self.is_on:
+            return []
+        door_us = self.park.timing.door_us
+        if job.operation is Operation.PARK:
+            taken_us = self.calls.taken_at_us(now_us) if job.winner and not job.is_given_back else None
+            return [] if taken_us is None else self.call(max(taken_us, now_us) + door_us, now_us)
+        is_over_soon = phase is BayPhase.HANDOVER and not self.is_queued
+        return self.call(now_us + DRIVER_US + door_us, now_us) if is_over_soon else []
+
+    def call(self, ready_us: int, now_us: int) -> list[Effect]:
+        """Call for the first car that is asked for; the bay can take it from ``ready_us`` on."""
+        bay_task.forget_tickets(self.tickets, self.fleet.mirror)
+        if not self.tickets or custody.place_of(self.fleet, self.tickets[0]) is None:
+            return []
+        car = self.tickets.popleft()
+        task, number = self.memory.next_reference(self.fleet)
+        wheelbase_mm = self.fleet.mirror.cars[car].wheelbase_mm
+        ahead = self.calls.ahead = BayTask(task, Operation.RETRIEVE, car, wheelbase_mm, ready_us=ready_us)
+        return [number, ahead_record(task, car, wheelbase_mm), *self.calls.call_for(ahead, now_us)]

@@ -1,0 +1,73 @@
+"""Files that would do harm end in one line each, in five seconds and in 200 MB, through the commands that read them."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from onboard import bounded_file
+from onboard.bounded_file import read_bounded
+from tests.hostile.files import hostile, made
+from tests.hostile.play import Outcome, Play
+from tests.tools import DEADLINE_S
+
+ROOT = Path(__file__).parents[2]
+MOST_CPU_S, MOST_MEMORY, MOST_SHOWN = 5.0, 200_000_000, 1_000
+TABLE = list(hostile())
+
+
+@pytest.fixture(scope="module")
+def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Outcome]:
+    folder = tmp_path_factory.mktemp("hostile")
+    (folder / "log").write_bytes(b"(1795219200.000000) fleet 18FF0201#08C3\n")
+    (folder / "sessions.csv").write_text("arrival,departure\n", encoding="ascii")
+    plays = []
+    for number, one in enumerate(TABLE):
+        path = made(one, folder, number)
+        plays.append(Play(words=one.command.format(path).split(), endless=[str(path)] if one.content is None else []))
+    ran = subprocess.run(
+        [sys.executable, "-m", "tests.hostile.play"],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join((str(ROOT), str(ROOT / "tests" / "plugin")))},
+        input=json.dumps(plays),
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=20 * DEADLINE_S,
+    )
+    return {one.name: Outcome(*told) for one, told in zip(TABLE, json.loads(ran.stdout), strict=True)}
+
+
+def test_there_are_forty_and_each_has_a_name() -> None:
+    assert len({one.name for one in TABLE}) == len(TABLE) >= 40
+
+
+@pytest.mark.parametrize("name", [one.name for one in TABLE])
+def test_a_hostile_file_is_one_line_and_costs_little(outcomes: dict[str, Outcome], name: str) -> None:
+    found = outcomes[name]
+    assert found.status == 2, found.said[-1_000:]
+    assert found.said.count("\n") == 1 and 0 < len(found.said) <= MOST_SHOWN, found.said[:1_000]
+    assert found.cpu_s < MOST_CPU_S and found.memory < MOST_MEMORY, found
+
+
+def test_a_pipe_that_ends_in_time_is_read_whole(tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    os.write(writer, b"x" * 10_000)
+    os.close(writer)
+    assert read_bounded(Path(f"/dev/fd/{reader}")) == b"x" * 10_000
+    os.close(reader)
+    whole = tmp_path / "whole"
+    whole.write_bytes(bytes(100))
+    assert read_bounded(whole, 100) == bytes(100)
+    with pytest.raises(OSError, match="is longer than"):
+        read_bounded(whole, 99)
+
+
+def test_a_pipe_into_which_nobody_writes_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bounded_file, "PATIENCE_S", 0.0)
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(TimeoutError, match="does not come to its end within 0 s"):
+        read_bounded(tmp_path / "pipe")
