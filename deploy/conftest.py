@@ -1,11 +1,12 @@
 """``pytest deploy``: what takes minutes and root, and is not part of ``make test``."""
 
-import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from deploy.fleet import write_fleet
+from deploy.image.disk import copy_disk
 from deploy.image.emulate import personalise
 from deploy.image.image import Image, build_image
 from deploy.image.release import Release
@@ -55,9 +56,12 @@ def image(release: Release, tmp_path_factory: pytest.TempPathFactory) -> Image:
 
 
 @pytest.fixture
-def disk(image: Image, tmp_path: Path) -> Path:
+def disk(image: Image, tmp_path: Path) -> Iterator[Path]:
     """A card as it comes from flashing, without a machine's files."""
-    return Path(shutil.copyfile(image.disk, tmp_path / "disk.img"))
+    copy = copy_disk(image.disk, tmp_path / "disk.img")
+    yield copy
+    # What a board writes fills holes: the cards of all tests together would fill a small disk.
+    copy.unlink()
 
 
 @pytest.fixture

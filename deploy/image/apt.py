@@ -76,6 +76,7 @@ def run_tool(words: Sequence[str], folder: Path | None = None, source: Path | No
         package = {**PACKAGES, **BASE_PACKAGES}.get(words[0], words[0])
         raise DeployError(f"{words[0]} is not installed (apt-get install {package})") from None
     if done.returncode:
-        last = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
-        raise DeployError(f"{words[0]}: {last}")
+        # The last line is often a summary; the reason stands before it.
+        last = done.stderr.strip().splitlines()[-2:] or ["it said nothing"]
+        raise DeployError(f"{words[0]}: {'; '.join(last)}")
     return done.stdout

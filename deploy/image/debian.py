@@ -94,6 +94,7 @@ def _fetch_packages(apt: Apt, to: Debian) -> None:
     for name, (folder, parts) in wanted.items():
         shutil.rmtree(folder, ignore_errors=True)
         unpack(debs[name], folder, parts)
+        debs[name].unlink()
     # The links in it are relative to the folder's own root.
     run_tool(["depmod", "-b", str(to.kernel), to.release])
 

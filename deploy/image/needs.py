@@ -31,6 +31,8 @@ BASE_PACKAGES = {
     "qemu-aarch64-static": "qemu-user-static",
     "update-binfmts": "binfmt-support",
 }
+#: Measured while an image is built: root file system as folder, archive, squashfs and read back, then the disk.
+ROOM_MB = 1_500
 _PATH = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
 
 
@@ -45,6 +47,18 @@ def check_needs(base: Path, *, is_root: bool) -> None:
         remedies.append("run this as root, with sudo: mmdebstrap makes the root file system")
     if remedies:
         raise DeployError(f"this computer cannot build an image yet: {'; '.join(remedies)}")
+
+
+def check_room(folder: Path, free_mb: int | None = None) -> None:
+    """Raise ``DeployError`` where a folder's disk has no room for what a build writes.
+
+    A tool that meets the end of the disk names neither the disk nor the remedy. ``free_mb`` is what is free, instead
+    of asking the system.
+    """
+    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    free_mb = shutil.disk_usage(there).free >> 20 if free_mb is None else free_mb
+    if free_mb < ROOM_MB:
+        raise DeployError(f"{folder}: {free_mb} MB are free, a build takes up to {ROOM_MB} MB; free some, or use --out")
 
 
 def missing_of(wanted: dict[str, str], there: Collection[str] | None = None) -> list[str]:

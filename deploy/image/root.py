@@ -12,6 +12,7 @@ from typing import IO
 
 from deploy.image.debian import EPOCH_S, STORE, Debian, fetch_debian
 from deploy.image.layer import build_layer
+from deploy.image.needs import check_room
 from deploy.image.release import Release
 from deploy.image.squash import make_squashfs
 from deploy.update.board import SIGNATURE
@@ -83,15 +84,16 @@ class Root:
 def build_root(to: Path, release: Release, store: Path = STORE) -> Root:
     """Write ``vmlinuz``, ``initrd`` and ``root.squashfs`` into a folder. Raises ``DeployError``, ``OSError``."""
     debian = fetch_debian(store)
+    check_room(to)
     to.mkdir(parents=True, exist_ok=True)
     layer = build_layer(debian, release, to / "layer")
     merged, squashfs = to / "root.tar", to / "root.squashfs"
     with tarfile.open(merged, "w", format=tarfile.GNU_FORMAT) as archive:
         for entry, content in _merged(debian.base, layer):
             archive.addfile(entry, content)
+    shutil.rmtree(layer)
     make_squashfs(merged, squashfs)
     merged.unlink()
-    shutil.rmtree(layer)
     kernel = _kernel(debian)
     shutil.copyfile(kernel.image, to / "vmlinuz")
     (to / "initrd").write_bytes(_initrd(debian, kernel))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.image.disk import FAT32_LBA, LINUX, DiskPartition, boot_record, starts, write_disk
+from deploy.image.disk import FAT32_LBA, LINUX, DiskPartition, boot_record, copy_disk, starts, write_disk
 from deploy.update.board import SIGNATURE
 from deploy.wheels import DeployError
 
@@ -48,3 +48,12 @@ def test_what_does_not_fit_into_its_partition_is_told(tmp_path: Path) -> None:
     (tmp_path / "root.squashfs").write_bytes(bytes((1 << 20) + 1))
     with pytest.raises(DeployError, match=r"root\.squashfs has 1048577 bytes; its partition takes 1 MiB"):
         write_disk([DiskPartition(LINUX, 1, tmp_path / "root.squashfs")], tmp_path / "disk")
+
+
+def test_a_copy_is_the_same_and_its_holes_take_no_room(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(b"a" * (1 << 20))
+    disk = tmp_path / "disk"
+    write_disk([DiskPartition(FAT32_LBA, 1, tmp_path / "a"), DiskPartition(LINUX, 64)], disk)
+    copy = copy_disk(disk, tmp_path / "copy")
+    assert copy.read_bytes() == disk.read_bytes()
+    assert copy.stat().st_blocks * 512 < 4 << 20

@@ -6,7 +6,8 @@ import pytest
 
 from deploy.cli import build_parser, main
 from deploy.image import needs
-from deploy.image.needs import BASE_PACKAGES, PACKAGES, check_needs, missing_of
+from deploy.image.apt import run_tool
+from deploy.image.needs import BASE_PACKAGES, PACKAGES, ROOM_MB, check_needs, check_room, missing_of
 from deploy.update.manifest import UpdateError
 from deploy.update.signature import make_keys
 from deploy.wheels import DeployError
@@ -31,6 +32,18 @@ def test_everything_that_is_missing_is_one_line(tmp_path: Path, monkeypatch: pyt
 def test_nothing_is_missing_where_all_is_there() -> None:
     assert missing_of(PACKAGES, there=PACKAGES.keys()) == []
     assert missing_of(PACKAGES, there=PACKAGES.keys() - {"mksquashfs", "unsquashfs"}) == ["squashfs-tools"]
+
+
+def test_a_full_disk_is_told_before_anything_is_built(tmp_path: Path) -> None:
+    check_room(tmp_path / "dist" / "root", ROOM_MB)
+    with pytest.raises(DeployError, match=r"dist/root: 287 MB are free, a build takes up to \d+ MB; free some, or use"):
+        check_room(tmp_path / "dist" / "root", 287)
+
+
+def test_a_tool_that_fails_is_quoted_with_its_reason() -> None:
+    fails = r"printf 'begun\nNo space left on device\nFATAL ERROR: Failed to write\n' >&2; exit 1"
+    with pytest.raises(DeployError, match=r"^sh: No space left on device; FATAL ERROR: Failed to write$"):
+        run_tool(["sh", "-c", fails])
 
 
 def test_a_secret_key_is_written_into_no_checkout(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
