@@ -32,7 +32,7 @@ BASE_PACKAGES = {
     "update-binfmts": "binfmt-support",
 }
 #: Measured while an image is built: root file system as folder, archive, squashfs and read back, then the disk.
-ROOM_MB = 1_500
+ROOM_MB = 1_000
 _PATH = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
 
 

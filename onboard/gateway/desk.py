@@ -25,7 +25,8 @@ from onboard.history.loads import LoadTold
 from onboard.history.tasks import TaskTold
 from onboard.ports.broker import Publication
 
-#: Publications that wait to be judged; of more the newest is counted and stays with the broker until the next session.
+#: Orders that wait to be judged, and as many instant actions, which go before them: a pause waits behind no flood. Of
+#: more the newest is counted and stays with the broker until the next session.
 MOST_WAITING = 64
 #: Errors of refused orders that a machine's state tells, the newest so many.
 MOST_ERRORS = 4
@@ -63,27 +64,29 @@ class GatewayDesk:
         #: Actions that take a robot's order back, until it says so.
         self._cancelling: dict[int, list[Json]] = {}
         self._waiting: deque[tuple[Publication, Callable[[], None]]] = deque()
+        self._waiting_actions: deque[tuple[Publication, Callable[[], None]]] = deque()
         self._actions = {machine.name: InstantActions() for machine in site.machines.values()}
         self._errors: dict[int, deque[Json]] = {}
 
     def on_publication(self, publication: Publication, taken: Callable[[], None]) -> None:
         """One publication on a topic subscribed to; ``taken`` is called once what comes of it is on disk."""
-        if len(self._waiting) >= MOST_WAITING:
+        waiting = self._waiting_actions if self.inbox.is_action(publication.topic) else self._waiting
+        if len(waiting) >= MOST_WAITING:
             self.overflows += 1
             return
-        self._waiting.append((publication, taken))
+        waiting.append((publication, taken))
 
     def next_wake(self) -> int | None:
         """When something is due, us; None for never. What waits is due at once."""
-        if self._waiting:
+        if self._waiting or self._waiting_actions:
             return 0
         times = (self.orders.next_wake(), *self.pauses.due())
         return min((time for time in times if time is not None), default=None)
 
     async def work(self, now_us: int) -> None:
         """Judge what waits and say what is due."""
-        while self._waiting:
-            publication, taken = self._waiting.popleft()
+        while waiting := self._waiting_actions or self._waiting:
+            publication, taken = waiting.popleft()
             await self._judge(publication, now_us)
             # Only now: had the power failed before, the broker would bring it again.
             taken()

@@ -7,14 +7,13 @@ between which everything else on the loop has its turn; each link sends in a tas
 import asyncio
 from collections import deque
 from collections.abc import Callable, Iterable
-from functools import partial
 
-from onboard.contract.messages import Message
 from onboard.contract.runs import singles
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.gateway.desk import GatewayDesk
 from onboard.gateway.link import Link, LinkWords
+from onboard.gateway.own_words import OwnWords
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import GatewaySettings, level
@@ -66,9 +65,10 @@ class Gateway:
         self._to_keep: deque[tuple[str, Publication]] = deque()
         self._set_clock()
         self.desk: GatewayDesk | None = None
+        self.words: OwnWords | None = None
         if send is not None and reports is not None and settings.node_id is not None:
-            transmit = partial(_transmit, codec, send)
-            self.desk = GatewayDesk(site, self.publisher, reports, transmit, self._post, self._now_us())
+            self.words = OwnWords(codec, settings.node_id, send)
+            self.desk = GatewayDesk(site, self.publisher, reports, self.words.say, self._post, self._now_us())
         self.links = {name: self._link(broker, client, name) for name in self.publisher.links}
 
     # --- in ------------------------------------------------------------------------------------------------------
@@ -99,6 +99,8 @@ class Gateway:
         parts.append(next((link.trouble for link in links if link.trouble), ""))
         parts.append(f"{lost} telemetry dropped" if lost else "")
         parts.append(f"{waiting} reports wait" if waiting else "")
+        kept_back = self.words.kept_back if self.words is not None else 0
+        parts.append(f"{kept_back} messages not its own kept off the bus" if kept_back else "")
         return "; ".join(part for part in parts if part)
 
     def stop(self) -> None:
@@ -205,8 +207,3 @@ class Gateway:
 
     def _now_us(self) -> int:
         return round(self._loop.time() * 1_000_000)
-
-
-def _transmit(codec: Codec, send: Callable[[Frame], bool], message: Message) -> None:
-    for frame in codec.encode(message):
-        send(frame)

@@ -11,7 +11,8 @@ from onboard.gateway.schema import TRANSPORT, schema
 from onboard.ports.broker import Publication
 
 #: Orders taken up at once, and how fast the allowance grows again, us an order: a burst of 20, then one a second: more
-#: than people press, less than a fleet bus feels.
+#: than people press, less than a fleet bus feels. Instant actions of each machine have as many of their own: whoever
+#: floods one topic takes nobody else's pause away.
 BURST, RATE_US = 20, 1_000_000
 
 
@@ -30,6 +31,24 @@ class Incoming:
     why: str = ""
 
 
+@dataclass(slots=True)
+class _Allowance:
+    """``left`` of ``BURST`` may come at once; since ``filled_us`` none has grown again."""
+
+    filled_us: int
+    left: int = BURST
+
+    def take(self, now_us: int) -> bool:
+        """Whether one more may come."""
+        gained = (now_us - self.filled_us) // RATE_US
+        self.left = min(BURST, self.left + gained)
+        self.filled_us += gained * RATE_US
+        if not self.left:
+            return False
+        self.left -= 1
+        return True
+
+
 class Inbox:
     """Judges publications one after another. ``refused`` counts by reason."""
 
@@ -39,13 +58,17 @@ class Inbox:
         self._dialect = dialect
         self._transport = f"{root}/orders"
         self._machines = f"{dialect.topic_root}/{manufacturer}/"
-        self._allowance = BURST
-        self._filled_us: int | None = None
+        #: By the machine whose instant actions they are; those of all orders are under no name.
+        self._allowances: dict[str, _Allowance] = {}
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """What is to be subscribed to."""
         return (self._transport, f"{self._machines}+/order", f"{self._machines}+/instantActions")
+
+    def is_action(self, topic: str) -> bool:
+        """Whether a topic is that of instant actions."""
+        return self._kind(topic)[0] == "instantActions"
 
     def judge(self, publication: Publication, now_us: int) -> Incoming | None:
         """One publication; None for a topic that is not of orders."""
@@ -85,7 +108,8 @@ class Inbox:
         if publication.retain:
             # Kept by the broker from who knows when: an order is not to be carried out at every start.
             return Incoming(kind, serial, named, "RETAINED", "$", "an order must not be retained")
-        if not self._allowed(now_us):
+        whose = serial if kind == "instantActions" else ""
+        if not self._allowances.setdefault(whose, _Allowance(now_us)).take(now_us):
             return Incoming(kind, serial, named, "TOO_FAST", "$", f"{BURST} at once and one a second are taken")
         return Incoming(kind, serial, named)
 
@@ -95,17 +119,6 @@ class Inbox:
         serial, _, name = topic.removeprefix(self._machines).partition("/")
         is_order = topic.startswith(self._machines) and name in ("order", "instantActions")
         return (name, serial) if is_order else ("", "")
-
-    def _allowed(self, now_us: int) -> bool:
-        if self._filled_us is None:
-            self._filled_us = now_us
-        gained = (now_us - self._filled_us) // RATE_US
-        self._allowance = min(BURST, self._allowance + gained)
-        self._filled_us += gained * RATE_US
-        if not self._allowance:
-            return False
-        self._allowance -= 1
-        return True
 
 
 def _too_long(body: dict[str, Any]) -> tuple[str, str] | None:

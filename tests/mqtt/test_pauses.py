@@ -184,3 +184,19 @@ def test_a_machine_that_works_is_not_told_as_paused_though_its_word_was_lost(sta
     assert machines.bodies[node].is_paused
     history.feed(replace(beat, state=state), 2)
     assert not machines.bodies[node].is_paused
+
+
+def test_a_pause_waits_behind_no_flood_of_orders() -> None:
+    """As a client of the broker that may give orders, and gives hundreds, would have it."""
+    flood = [(21.0, "onboard/test/orders", {"id": f"n{number}", "from": "IOC1"}) for number in range(200)]
+    pause = (21.0, topic("instantActions", serial="MR1"), act("startPause", "p", "MR1"))
+    _, ordered = park_and_order(one_floor(), 0, [*flood, pause], extra_s=60.0)
+    assert actions(ordered, "MR1") == [("p", ["RUNNING", "FINISHED"])]
+    assert any(state["paused"] for state in ordered.states("MR1"))
+
+
+def test_whoever_floods_one_machine_with_actions_takes_no_other_machines_pause_away() -> None:
+    flood = [(21.0, topic("instantActions", serial="R2"), act("stopPause", f"n{number}", "R2")) for number in range(40)]
+    pause = (21.0, topic("instantActions"), act("startPause", "p"))
+    _, ordered = on(SITE, graph_plant, [*flood, pause], stop_s=60.0)
+    assert actions(ordered, "R1") == [("p", ["RUNNING", "FINISHED"])]

@@ -28,6 +28,7 @@ LOOK = {
     # What it is about decides when a word may go, and which one makes another needless.
     "onboard/controller/outgoing.py": "the words of its own machine on their way out",
     # Who asked something on the bus waits for the answer, and remembers nothing of it.
+    "onboard/gateway/own_words.py": "what a gateway may say",
     "onboard/gateway/pauses.py": "a conversation",
     "onboard/operate/blocks.py": "a conversation",
     "onboard/operate/holds.py": "a conversation",
