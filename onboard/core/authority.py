@@ -102,6 +102,7 @@ class TokenBook:
     behind_since_us: dict[TokenKey, int] = field(default_factory=dict)
     #: Whether what the journal says is mine may be used: not before all that live have answered after a start.
     is_synced: bool = True
+    contradicted: tuple[int, str] | None = None  # Who has what of this node that its journal never gave: it is old.
     #: Nodes asked for all that they vouch for that have not ended their answer: what they say they hold is believed.
     asked: set[int] = field(default_factory=set)
     #: Words that came to nothing, by reason: the holon's own count; and who claimed a right of mine how often.

@@ -1,7 +1,6 @@
 """When what waits for an answer is said again: soon at first, then ever later up to a bound (rule 10 of the protocol).
 
-Whoever waits does not hurry anybody by speaking: the holder of a token remembers the request, and a grant's receiver
-that was away asks when it is back. So the bound is for one machine, and a return that is heard begins anew.
+Speaking hurries nobody: a holder remembers the request, and a grant's receiver that was away asks when it is back.
 """
 
 from collections.abc import Hashable

@@ -233,6 +233,10 @@ class Witness:
         """The rights are mine once all that live have answered; without a past, all there are, or all as new as I."""
         if self.is_over or self.doubt is not None or self._since_us is None:
             return
+        if self.tokens.contradicted is not None:
+            self._doubt(Reason.JOURNAL_SHORT, *self.tokens.contradicted)
+            self.tokens.contradicted = None
+            return
         if not self._has_just_begun(now_us) and not self._missing(now_us):
             self.tokens.trust()
 

@@ -159,3 +159,17 @@ def test_an_old_journal_is_forgotten_before_its_rights_are_made_anew(
     assert_safe(scene)
     assert scene.first(Halted, lambda one: one.sender == one.machine)[1].reason is Reason.JOURNAL_SHORT
     assert served(scene) == 3 and f"{name} is in epoch 1" in told(scene)
+
+
+def test_a_journal_that_never_gave_a_task_that_a_robot_has_is_old() -> None:
+    """Point 1,131 of `level1 --exhaustive journal`: no token was newer elsewhere, and its customer waited for ever."""
+
+    def plant(simulation: Simulation) -> None:
+        crash = "crash:target=IOC1,at_s=0,restart_s=5,write=40,journal=rolled_back,entries=10"
+        arm(simulation, [parse_injection(crash)])
+
+    scene = play(find_site("level1"), stays((0, 120)), plant=plant, limit_s=240)
+    assert_safe(scene)
+    at_us, word = scene.first(Halted, lambda one: one.sender == one.machine)
+    assert (word.reason, word.needs_person) == (Reason.JOURNAL_SHORT, True) and at_us > 140_000_000
+    assert any("has task 2 of this node, which it never gave" in line for _, _, line in scene.simulation.log.lines)

@@ -81,6 +81,9 @@ class BayCalls:
         ``is_starting``: doors and bay are not known yet, and of the task in hand only the journal tells.
         """
         task, machine = self.named(report.task), self.fleet.site.machines.get(report.sender)
+        tokens, name = self.fleet.tokens, report.task
+        if not (tokens.is_synced or self.fleet.has_no_rights) and self.memory.never_gave(name, self.fleet.node_id):
+            tokens.contradicted = report.sender, f"has task {name.number} of this node, which it never gave"
         if task is not None and report.phase is TaskPhase.FORFEITED:
             return self._on_forfeit(task, report.sender, now_us)
         is_robot = machine is not None and machine.kind is KindCode.ROBOT

@@ -15,7 +15,7 @@ from onboard.core.authority import TokenKey
 from onboard.core.effects import Record
 from onboard.core.journal_records import Entry, JournalRecord, records_in
 from onboard.core.records import RetiredRecord, TokenGivenRecord
-from onboard.core.serial import successor
+from onboard.core.serial import is_newer, successor
 from onboard.systems.car_park.bay_task import queue_ticket
 from onboard.systems.car_park.records import (
     AheadOverRecord,
@@ -175,6 +175,13 @@ class BayMemory:
         name = _next_reference(self.number, fleet)
         self.number = name.number
         return name, Record(NumberRecord(name.number))
+
+    def never_gave(self, task: Reference, node: int) -> bool:
+        """Whether a machine has a task of this node that this journal knows nothing of, though it knows earlier ones.
+
+        A number is on the disk before it is said: such a journal is an old copy.
+        """
+        return task.origin == node and self.number != 0 and is_newer(task.number, self.number, 16)
 
     def _forget(self, car: Reference) -> None:
         """It left long ago."""

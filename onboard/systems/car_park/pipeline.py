@@ -76,7 +76,9 @@ class Pipeline:
         """The bay is empty: whether it is locked for a car that is to come out, and what is said to have it fetched."""
         bay_task.forget_tickets(self.tickets, self.fleet.mirror)
         if not self.is_on:
-            return bool(self.tickets) and custody.place_of(self.fleet, self.tickets[0]) is not None, []
+            # After a restart the journal may know of a task whose bay was not noted yet.
+            has_task = self.calls.ahead is not None
+            return has_task or (bool(self.tickets) and custody.place_of(self.fleet, self.tickets[0]) is not None), []
         self.entering_until_us = 0
         self.free_from_us = now_us if self.free_from_us is None else self.free_from_us
         if self.is_queued and now_us - self.free_from_us < QUEUED_US:
