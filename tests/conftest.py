@@ -8,6 +8,7 @@ import gc
 import hypothesis
 import pytest
 
+from tests import once
 from tests.dispositions import give_children_the_default
 from tests.skips import pytest_make_collect_report, pytest_runtest_makereport
 
@@ -27,6 +28,11 @@ hypothesis.settings.load_profile("repeatable")
 give_children_the_default()
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """A folder for what is made once."""
+    once.begin(config)
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_collection_finish() -> None:
     """Look for cycles seldom, and never among what is there for the whole session: that took 3 % of all time."""
@@ -35,6 +41,7 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(50_000, 20, 20)
 
 
-def pytest_unconfigure() -> None:
+def pytest_unconfigure(config: pytest.Config) -> None:
     """Libraries that count what is left of theirs at the end would complain of what was put aside."""
     gc.unfreeze()
+    once.end(config)

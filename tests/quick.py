@@ -32,6 +32,7 @@ QUICK = (
 #: Tests there that take longer than half a second, or may on another machine: `make test` runs them.
 SLOW = (
     "tests/demand/test_sizes.py::test_each_car_stands_only_where_it_fits",
+    "tests/demand/test_sizes.py::test_who_charges_gets_a_place_for_it_and_others_get_one_only_at_last",
     "tests/can/test_arbitration.py::test_what_is_pending_together_goes_by_priority",
     "tests/can/test_node.py::test_a_sender_of_very_many_identifiers_is_counted_right",
     "tests/config/test_garbage.py",

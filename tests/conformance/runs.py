@@ -2,18 +2,12 @@
 
 from functools import cache
 from pathlib import Path
-from tempfile import mkdtemp
 
 from bus_sim.cli import main
 from bus_sim.sites import find_site
 from onboard.core.site import Site
 from tests.conformance.cases import CASES
-
-
-@cache
-def folder_of(system: str) -> Path:
-    """Where what is made of a system lies."""
-    return Path(mkdtemp(prefix=f"every-{system}-"))
+from tests.once import once
 
 
 @cache
@@ -22,9 +16,8 @@ def site_file(system: str) -> str:
     text = CASES[system].site
     if "\n" not in text:
         return text
-    path = folder_of(system) / "site.toml"
-    path.write_text(text, encoding="utf-8")
-    return str(path)
+    made = once(f"case-{system}", lambda folder: (folder / "site.toml").write_text(text, encoding="utf-8"))
+    return str(made / "site.toml")
 
 
 def site_of(system: str) -> Site:
@@ -41,9 +34,11 @@ def one_of_each_kind(system: str) -> list[str]:
 @cache
 def log_of(system: str) -> Path:
     """The log of a run in which nothing goes wrong, device buses included; its figures lie beside it as run.json."""
-    log = folder_of(system) / "run.log"
     words = [*CASES[system].options, "--seed", "1", "--speed", "max", "--no-web", "--devices"]
-    # 1: somebody still waits when the run ends by the clock.
-    status = main(["run", site_file(system), *words, "--trace", str(log), "--json", str(log.with_suffix(".json"))])
-    assert status in (0, 1)
-    return log
+
+    def play(folder: Path) -> None:
+        # 1: somebody still waits when the run ends by the clock.
+        files = ["--trace", str(folder / "run.log"), "--json", str(folder / "run.json")]
+        assert main(["run", site_file(system), *words, *files]) in (0, 1)
+
+    return once(f"run-{system}", play) / "run.log"

@@ -178,8 +178,11 @@ def _blf_head(size: int, plain: int) -> bytes:
 
 
 def _blf_bomb() -> bytes:
+    # What a megabyte of zeros adds is the same for the second and for all after it; packing each anew takes seconds.
     packer = zlib.compressobj(9)
-    packed = b"".join(packer.compress(bytes(1_000_000)) for _ in range(1_000)) + packer.flush()
+    first, again = (packer.compress(bytes(1_000_000)) + packer.flush(zlib.Z_FULL_FLUSH) for _ in range(2))
+    # The end is a last block and the sum of all (RFC 1950, Adler-32), which for n zeros is n mod 65521 and 1.
+    packed = first + 999 * again + packer.flush()[:-4] + struct.pack(">HH", 1_000_000_000 % 65_521, 1)
     inner = struct.pack("<H6xI4x", 2, 1_000_000_000) + packed
     head = struct.pack("<4sHHII", b"LOBJ", 16, 1, 16 + len(inner), 10)
     whole = head + inner + bytes(len(inner) % 4)

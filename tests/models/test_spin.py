@@ -56,7 +56,7 @@ def verify_rules(*rules: str) -> Verdict:
     [
         (("GHOST", "BELIEFS", "VERSIONS=4"), ("GULLIBLE",)),
         (("GHOST", "BELIEFS", "VERSIONS=4"), ("MEEK",)),
-        (("OLD_COPY", "VERSIONS=4"), ("NO_WITNESS",)),
+        (("OLD_COPY", f"VERSIONS={4 if is_long() else 3}"), ("NO_WITNESS",)),
         (("REGENERATE", "VERSIONS=4"), ("NO_FREEZE",)),
         (("REGENERATE", "VERSIONS=4"), ("NOT_ABOVE",)),
         (("REGENERATE", "VERSIONS=4"), ("ONE_ABOVE",)),

@@ -17,6 +17,7 @@ from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.systems.car_park.checks import RULES
+from onboard.trace.check import holds
 from onboard.trace.check.checks import Checks, LogVerdict
 from tests.sites import one_floor
 from tests.system.scene import ORIGIN_US, stays
@@ -32,6 +33,15 @@ ON_ONE_ALLEY = {
     "drives-through",
     "segments-kept",
 }
+
+
+#: A held machine is forgotten after so long here, us: the rule's own hour is in ``tests/conformance/test_rules.py``.
+FORGOTTEN_US = 300_000_000
+
+
+@pytest.fixture(autouse=True)
+def _soon_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(holds, "FORGOTTEN_US", FORGOTTEN_US)
 
 
 @cache

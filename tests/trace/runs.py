@@ -2,7 +2,6 @@
 
 from functools import cache
 from pathlib import Path
-from tempfile import mkdtemp
 
 from bus_sim.cli import main
 from bus_sim.sites import find_site
@@ -10,6 +9,7 @@ from onboard.contract.messages import Message
 from onboard.trace.listener import Listener, LoggedMessage
 from onboard.trace.readers.open_log import Log
 from onboard.wire.codec import codecs
+from tests.once import once
 
 SITE_FILE = Path(__file__).parents[2] / "bus_sim" / "sites" / "small.toml"
 SITE = find_site("small")
@@ -18,10 +18,12 @@ SITE = find_site("small")
 @cache
 def run_log(*words: str, stay_s: int = 60) -> Path:
     """The log, device buses included, of one car that comes to the small site and is fetched, if faults let it."""
-    path = Path(mkdtemp(prefix="trace-")) / "run.log"
-    command = ["run", "small", "--one-car", str(stay_s), "--speed", "max", "--trace", str(path), "--devices", *words]
-    assert main(command) in (0, 1)
-    return path
+    options = ["--one-car", str(stay_s), "--speed", "max", "--devices", *words]
+
+    def play(folder: Path) -> None:
+        assert main(["run", "small", *options, "--trace", str(folder / "run.log")]) in (0, 1)
+
+    return once("-".join(["small", *options]), play) / "run.log"
 
 
 def fleet_of(path: Path) -> list[LoggedMessage]:

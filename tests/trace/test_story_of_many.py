@@ -4,7 +4,6 @@ from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from random import Random
-from tempfile import mkdtemp
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,6 +14,7 @@ from onboard.contract.messages import CallForProposals, TaskReport
 from onboard.history.calls import is_task
 from onboard.trace.listener import LoggedMessage
 from onboard.trace.story.why import TaskStory, WaitingStory
+from tests.once import once
 from tests.trace.runs import SITE, fleet_of
 
 #: More cars than two robots keep up with, a robot and a lift that lose their power, and frames that are missed.
@@ -25,10 +25,12 @@ FAULTS = ("crash:target=MR1,at_s=130", "crash:target=ER2,at_s=300", "omission:re
 @cache
 def busy() -> list[LoggedMessage]:
     """All messages of the fleet bus of that run."""
-    path = Path(mkdtemp(prefix="stories-")) / "run.log"
     faults = [word for fault in FAULTS for word in ("--fault", fault)]
-    assert bus_sim([*BUSY, *faults, "--trace", str(path)]) in (0, 1)
-    return fleet_of(path)
+
+    def play(folder: Path) -> None:
+        assert bus_sim([*BUSY, *faults, "--trace", str(folder / "run.log")]) in (0, 1)
+
+    return fleet_of(once("stories", play) / "run.log")
 
 
 def told(said: list[LoggedMessage]) -> dict[str, TaskStory]:

@@ -5,7 +5,6 @@ import subprocess
 import sys
 from functools import cache
 from pathlib import Path
-from tempfile import mkdtemp
 
 from bus_sim.sites import find_site
 from onboard.contract.messages import Message
@@ -17,6 +16,7 @@ from onboard.trace.readers.open_log import Log
 from onboard.web.film import Film
 from onboard.wire.codec import Codecs
 from tests.mapd.sites import drawn, site_text
+from tests.once import once
 
 ROOT = Path(__file__).parents[2]
 SITE_FILES = ROOT / "bus_sim" / "sites"
@@ -35,20 +35,25 @@ def file_of(name: str) -> Path:
     """The site file of a shipped site, or of one that is made."""
     if name not in _MADE:
         return SITE_FILES / f"{name}.toml"
-    path = Path(mkdtemp(prefix="film-")) / f"{name}.toml"
-    path.write_text(_MADE[name](), encoding="utf-8")
-    return path
+
+    def write(folder: Path) -> None:
+        (folder / f"{name}.toml").write_text(_MADE[name](), encoding="utf-8")
+
+    return once(f"shown-{name}", write) / f"{name}.toml"
 
 
 @cache
 def log_of(name: str) -> Path:
     """The log of a run of a shipped site, device buses included."""
-    path = Path(mkdtemp(prefix="film-")) / "run.log"
-    words = ["run", str(file_of(name)), *_WORDS.get(name, []), "--trace", str(path), "--devices"]
+    words = ["run", str(file_of(name)), *_WORDS.get(name, []), "--trace", "run.log", "--devices"]
     # In a process of its own: a browser's loop may run in this one.
     words = [sys.executable, "-m", "bus_sim.cli", *words]
-    assert subprocess.run(words, env=environment(), capture_output=True, check=False).returncode in (0, 1)
-    return path
+
+    def play(folder: Path) -> None:
+        played = subprocess.run(words, cwd=folder, env=environment(), capture_output=True, check=False)
+        assert played.returncode in (0, 1), played.stderr
+
+    return once(f"film-{name}", play) / "run.log"
 
 
 def environment() -> dict[str, str]:
