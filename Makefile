@@ -11,8 +11,6 @@ USABLE := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 
 ARGS ?=
 PYTEST_ARGS ?=
-# A file's tests stay together: what they share is made by one worker only.
-WHOLE := --dist loadfile
 export REQUIRE
 # Each program that a test starts, and each start in the guest, would otherwise compile all that it loads.
 unexport PYTHONDONTWRITEBYTECODE
@@ -28,16 +26,16 @@ run: $(VENV)/.run ## set up, then show an hour of a real day on the standard sit
 
 check: lint ## set up, lint and types (of the tests too), then the quick tests: under a minute on two quiet processors, no test above a second
 	@quick=$$($(BIN)/python -m tests.quick) && \
-		$(BIN)/python -m pytest --numprocesses 2 $(WHOLE) -p tests.quick $(PYTEST_ARGS) $$quick
+		$(BIN)/python -m pytest --numprocesses 2 -p tests.quick $(PYTEST_ARGS) $$quick
 
 test: lint ## set up, lint, then all tests on all processors; REQUIRE=all makes a skipped test a failure
-	$(BIN)/python -m pytest --numprocesses auto $(WHOLE) $(PYTEST_ARGS)
+	$(BIN)/python -m pytest --numprocesses auto $(PYTEST_ARGS)
 
 test-long: lint ## the same with every case of the long rows (tests/thinned.py): all moments, seeds and sizes
-	LONG=yes $(BIN)/python -m pytest --numprocesses auto $(WHOLE) $(PYTEST_ARGS)
+	LONG=yes $(BIN)/python -m pytest --numprocesses auto $(PYTEST_ARGS)
 
 coverage: $(VENV)/.test ## all tests once more, with the lines that they ran; takes twice as long
-	$(BIN)/python -m pytest --numprocesses auto $(WHOLE) --cov --cov-report=term $(PYTEST_ARGS)
+	$(BIN)/python -m pytest --numprocesses auto --cov --cov-report=term $(PYTEST_ARGS)
 
 lint: $(VENV)/.test ## set up, then ruff (rules and format) and mypy --strict
 	$(BIN)/ruff check .
