@@ -18,10 +18,10 @@ from onboard.ways.cars import CarFleet, CarMirror
 from onboard.ways.lift_uses import standing_after
 from onboard.ways.lifts import lift_tracks
 from onboard.ways.obstacles import Obstacles
-from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses, turned_in
+from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses, standing_segments, turned_in
 from onboard.ways.passing import BegunItinerary, next_plan, reread_us
 from onboard.ways.passing_order import PassingOrder
-from onboard.ways.reservations import Reservations
+from onboard.ways.reservations import FOREVER, Reservations, SlotWindow
 from onboard.ways.site import WaySite
 from onboard.ways.standing import Standing
 from onboard.ways.tokens import tokens_of
@@ -180,6 +180,21 @@ class WayMirror(CarMirror):
                 here = machine.home if seen is None else Segment(seen.track, seen.index)
                 found += [here, turned_in(self.site, here)]
         return [position for position in found if position is not None]
+
+    def reservations_at(self, here: Segment, from_us: int, *, may_stay: bool) -> Reservations:
+        """What others plan, for a way that this machine begins ``here`` at ``from_us``.
+
+        Whose next run leads through here before that cannot make it: it stands where it is until this machine has gone.
+        Not for who ``may_stay``, and need not go at all: it makes room.
+        """
+        found = self.reservations
+        for node in sorted(self.plans) if not may_stay else ():
+            place, comes_us = self.order.place(node), self.order.comes_us(node, here)
+            if node != self.node_id and place is not None and comes_us is not None and comes_us < from_us:
+                found = found.copy() if found is self.reservations else found
+                found.release(node)
+                found.reserve(node, [SlotWindow(slot, 0, FOREVER) for slot in standing_segments(self.site, place)])
+        return found
 
     def lift_floors(self, now_us: int, at_us: int, planned: Reservations | None = None) -> dict[int, int]:
         """Where each lift (by its track) stands at ``at_us``, by its own word and the rides ``planned`` until then.

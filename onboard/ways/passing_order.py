@@ -22,6 +22,7 @@ from onboard.core.serial import is_newer, ranks_before
 from onboard.core.site import Segment
 from onboard.ways.occupancy import body_mm, leg_windows
 from onboard.ways.passing import TOLERANCE_US, BegunItinerary
+from onboard.ways.reservations import FOREVER
 from onboard.ways.retreats import has_work, is_aged, moves, retreat_moves
 from onboard.ways.site import WaySite
 
@@ -63,6 +64,12 @@ class _Way:
     body: int | None = None
     left: set[Segment] = field(default_factory=set)
 
+    @property
+    def place(self) -> Segment:
+        """Where its body is, by its own word."""
+        leg = self.itinerary.legs[self.leg]
+        return Segment(leg.track, leg.from_index if self.body is None else self.body)
+
     def open_turns(self, segment: Segment, turns: Turns | None = None) -> Iterator[Turn]:
         """Turns on a segment that are not over, in order; with other times where ``turns`` are given."""
         for turn in (self.turns if turns is None else turns).get(segment, ()):
@@ -79,6 +86,20 @@ class _Way:
         leg = next((leg for leg in legs if self.to_come(leg) == in_hand), None)
         if leg is not None:
             self.in_hand, self.leg, self.body, self.left = in_hand, leg, known.body, known.left
+
+    def line(self, segment: Segment, step: int) -> Iterator[int]:
+        """``to_come`` of the legs by which it passes a segment, as far as it goes on in one direction from here."""
+        for number in range(self.leg, len(self.itinerary.legs)):
+            leg = self.itinerary.legs[number]
+            if leg.action is LegAction.TRAVEL and leg.track == segment.track:
+                if (leg.to_index - leg.from_index) * step <= 0:
+                    return
+                if segment.index in range(leg.from_index, leg.to_index + step, step):
+                    yield self.to_come(number)
+            elif leg.action not in (LegAction.STAND, LegAction.WORK):
+                return
+            elif leg.from_index == segment.index:
+                yield self.to_come(number)
 
     def to_come(self, leg: int) -> int:
         """How many moving legs come behind leg number ``leg``."""
@@ -200,6 +221,28 @@ class PassingOrder:
             for segment, one, two in sorted(_meet(mine, theirs), key=lambda met: met[0])
         ]
 
+    def place(self, node: int) -> Segment | None:
+        """Where the body of a machine that counts is, by its own word."""
+        way = self._ways.get(node)
+        return way.place if way is not None and way.itinerary.legs else None
+
+    def comes_us(self, node: int, there: Segment) -> int | None:
+        """From when the next run of ``node`` is ``there`` by its plan, bus us; None where that run does not lead there.
+
+        It cannot be made while a body is in it.
+        """
+        number, way = self._run_through(node, there), self._ways.get(node)
+        if number is None or way is None:
+            return None
+        return next((turn.from_us for turn in way.open_turns(there) if turn.to_come == way.to_come(number)), None)
+
+    def in_front(self, node: int, other: int, meeting: Meeting) -> int:
+        """Who of two that meet passes first by where it is; NOBODY where that does not tell."""
+        if self._is_in_front(node, other, meeting.segment, meeting.mine, meeting.theirs):
+            return other
+        is_mine = self._is_in_front(other, node, meeting.segment, meeting.theirs, meeting.mine)
+        return node if is_mine else NOBODY
+
     # --- plans made at the same time ---------------------------------------------------------------------------
 
     def who_yields(self, node: int, other: int, meetings: Sequence[Meeting]) -> int:
@@ -268,6 +311,36 @@ class PassingOrder:
         way.in_hand = way.to_come(0) if itinerary.legs else 0
         return way
 
+    def _run_through(self, node: int, there: Segment | None) -> int | None:
+        """Number of the leg of the next run of ``node``, where that leads through ``there``; else None."""
+        way = self._ways.get(node)
+        if way is None or there is None:
+            return None
+        legs = way.itinerary.legs
+        number = next((number for number in range(way.leg, len(legs)) if moves(legs[number])), None)
+        if number is None or legs[number].action is not LegAction.TRAVEL or legs[number].track != there.track:
+            return None
+        run, step = legs[number], _step(legs[number])
+        here = way.body if way.body is not None and number == way.leg else run.from_index
+        return number if there.index in range(here + step, run.to_index + step, step) else None
+
+    def _is_in_front(self, node: int, other: int, segment: Segment, mine: Turn, theirs: Turn) -> bool:
+        """Whether ``other`` passes before ``node`` by where it is: in my next run, from where it goes on or leaves.
+
+        Whatever was agreed, no plan leads through a body. Who stands there for ever gives way.
+        """
+        there = self.place(other)
+        number = self._run_through(node, there)
+        if there is None or number is None or theirs.to_us >= FOREVER or segment.track != there.track:
+            return False
+        way, run = self._ways[node], self._ways[node].itinerary.legs[number]
+        step = _step(run)
+        if mine.to_come != way.to_come(number) or segment.index not in range(there.index, run.to_index + step, step):
+            return False
+        if self._run_through(other, self.place(node)) is not None:
+            return False
+        return theirs.to_come in self._ways[other].line(segment, step)
+
     def _agreed_first(self, node: int, other: int, segment: Segment, one: Turn, two: Turn) -> int | None:
         """Who of two machines comes first in these turns by the times under which they last agreed."""
         agreed = self._agreed.get((min(node, other), max(node, other)))
@@ -278,7 +351,7 @@ class PassingOrder:
         theirs = next((turn for turn in second.get(segment, ()) if turn.to_come == two.to_come), None)
         if mine is None or theirs is None or _overlap_us(mine, theirs) > TOLERANCE_US:
             return None
-        return node if (mine.from_us, node) < (theirs.from_us, other) else other
+        return node if self._is_first(node, other, segment, mine, theirs) else other
 
     def _first(self, node: int, segment: Segment) -> Turn | None:
         way = self._ways.get(node)
@@ -289,8 +362,15 @@ class PassingOrder:
         for other in self._ways:
             if other != node:
                 pair = self._pair(node, other, segment)
-                if pair is not None and (pair[1].from_us, other) < (pair[0].from_us, node):
+                if pair is not None and self._is_first(other, node, segment, pair[1], pair[0]):
                     yield other, pair
+
+    def _is_first(self, node: int, other: int, segment: Segment, mine: Turn, theirs: Turn) -> bool:
+        """Whether ``node`` passes first: who is in front of the other, else whose turn begins first."""
+        if self._is_in_front(node, other, segment, mine, theirs):
+            return False
+        is_before = (mine.from_us, node) < (theirs.from_us, other)
+        return is_before or self._is_in_front(other, node, segment, theirs, mine)
 
     def _pair(self, node: int, other: int, segment: Segment) -> tuple[Turn, Turn] | None:
         """The next turns of two machines, with the times under which they agreed last."""
@@ -376,6 +456,10 @@ def _meet(one: _Way, two: _Way) -> Iterator[tuple[Segment, Turn, Turn]]:
             for theirs in two.open_turns(segment):
                 if _overlap_us(mine, theirs) > TOLERANCE_US:
                     yield segment, mine, theirs
+
+
+def _step(leg: Leg) -> int:
+    return 1 if leg.to_index > leg.from_index else -1
 
 
 def _overlap_us(one: Turn, two: Turn) -> int:

@@ -184,6 +184,17 @@ def test_the_platform_goes_to_the_robot_of_the_next_ride_where_that_begins_and_o
         assert one.phase is (LIFT_TABLE[phase, LiftFinding.GRANTED][0] if is_given else phase)
 
 
+def test_after_a_ride_the_gate_goes_to_who_has_the_platform_still() -> None:
+    """Behind the platform it would keep the ride from ending: who is off may want the next one, and wait for that."""
+    for words in words_for(LiftPhase.LEAVING):
+        if words.is_gate_out:
+            continue
+        one = lift(LiftPhase.LEAVING, words)
+        is_given = one.may_grant(segment_token(gate(SHAFT)), ROBOT, NOW_US) is Reason.NONE
+        rides_on = words.plan == (LEAVE, BOARD)
+        assert is_given is (words.is_platform_out and stands(words, LEAVE) and not rides_on), words
+
+
 def test_a_line_of_the_table_is_for_what_can_be() -> None:
     met = {(phase, meant(phase, words)) for phase in LiftPhase for words in words_for(phase)}
     assert met | {(LiftPhase.FREE, LiftFinding.GRANTED)} == set(LIFT_TABLE)

@@ -105,8 +105,16 @@ def test_of_two_that_meet_without_an_order_exactly_one_turns(
     assert sorted(answer.name for answer in answers) == ["ANEW", "NOTHING"]
 
 
-def test_of_two_moves_without_work_the_lower_stamp_keeps_its_windows() -> None:
+def test_of_two_moves_without_work_the_one_in_front_goes_first_whatever_its_stamp() -> None:
     one, two = done(), mover()
+    assert two.hears(one.told()) is YieldDecision.NOTHING
+    assert one.hears(two.told()) is YieldDecision.ANEW
+
+
+def test_of_two_moves_without_work_the_lower_stamp_keeps_its_windows() -> None:
+    # Neither stands in the other's run: it leaves 2 for 6 while the other comes to 3.
+    one = done()
+    two = robot(LINE, SECOND, [stand(2, 0, 205), travel(2, 6, 205, 255)], award_ms=90)
     assert two.hears(one.told()) is YieldDecision.ANEW
     assert one.hears(two.told()) is YieldDecision.NOTHING
 

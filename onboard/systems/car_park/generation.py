@@ -390,9 +390,9 @@ class CarParkGeneration:
         Without work the way to another refuge: so a machine that only stands gives way.
         """
         visits = tuple(self._work_visit(work, now_us) for work in works)
-        route = self.effort.whole(self._plan(self.mirror.reservations, origin, start_us, visits, now_us))
-        # A few steps may be kept before these.
-        return None if route is None or len(route.legs) + 3 > MAX_STEPS else steps_of(route, works)
+        others = self.mirror.reservations_at(origin, start_us, may_stay=not works and start_us <= now_us)
+        route = self.effort.whole(self._plan(others, origin, start_us, visits, now_us))
+        return None if route is None or len(route.legs) + 3 > MAX_STEPS else steps_of(route, works)  # a few are kept
 
     def _work_visit(self, work: StationWork, now_us: int) -> Visit:
         if work.handling is CarHandling.TAKE and work.station in self.site.compartments.values():

@@ -93,6 +93,10 @@ class GivingWay:
     def _has_to_turn(self, meeting: Meeting, sender: int, yields: int) -> bool:
         if yields == NOBODY and _stands(meeting.mine) != _stands(meeting.theirs):
             return _stands(meeting.mine)
+        in_front = self.fleet.mirror.order.in_front(self.fleet.node_id, sender, meeting)
+        if in_front != NOBODY:
+            # Whatever rights there are: no plan leads through a body.
+            return in_front == sender
         holder = self.fleet.tokens.holder_of(segment_token(meeting.segment))
         if holder in (self.fleet.node_id, sender):
             # A right in hand outranks stamps: whoever has it is about to be there.

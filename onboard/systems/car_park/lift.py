@@ -243,8 +243,10 @@ class Lift:
             # Again where nobody came in by it: it may have come back from the ride before only now.
             self._gate_was_out = True
             return Reason.NONE
-        if self.phase is LiftPhase.LEAVING and self._stands_at(ride.leave) and self._onward(now_us) is None:
-            # As often as it is asked for: who waits aboard gives the gate back. The ride ends with the platform.
+        is_aboard = not self._holds_platform()
+        if self.phase is LiftPhase.LEAVING and is_aboard and self._stands_at(ride.leave) and not self._onward(now_us):
+            # As often as it is asked for: who waits aboard gives the gate back. The ride ends with the platform: a gate
+            # that went out behind that would keep it from ending.
             return Reason.NONE
         return Reason.DOOR_NOT_READY
 

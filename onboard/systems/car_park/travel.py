@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from itertools import takewhile
 
 from onboard.contract.codes import DriveMode, Reason, TokenKind
+from onboard.contract.constants import NOBODY
 from onboard.contract.messages import DriveOrder, DriveState, Progress, Waiting
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.effects import Effect, Send
@@ -268,7 +269,8 @@ class Carriage:
         if self.whole.slots and not self.whole.is_complete:
             reach, reason = None, Reason.NOT_AUTHORISED
         if reach is None:
-            return effects + self._hold(ahead, reason) + self._return_left(now_us)
+            effects += self._hold(ahead, reason)
+            return effects + (self._return_left(now_us) if self._open(ahead) == ahead else self._give_back(now_us))
         if reach != self.target:
             self.target = reach
             self.sequence = successor(self.sequence, 8)
@@ -300,7 +302,7 @@ class Carriage:
         if self.whole.slots:
             return self.whole.advance(self.occupied(), now_us)
         effects, tokens, soon = list[Effect](), self.fleet.tokens, self._lookahead_segments()
-        line = self.axis.rights(ahead)[: soon + MORE_AHEAD]
+        line = self.axis.rights(self._open(ahead))[: soon + MORE_AHEAD]
         if all(self._is_asked(slot) for slots in line[:soon] for slot in slots):
             return effects
         more = takewhile(self.left.fronts.isdisjoint, line[soon:])
@@ -359,6 +361,15 @@ class Carriage:
         there = self.goal.index if self.goal.track == self.track else self.placing.way_out(self.track, self.goal)
         step = 1 if there >= here else -1
         return list(range(here, there + step, step))
+
+    def _open(self, ahead: list[int]) -> list[int]:
+        """``ahead`` as far as the slot that I wait for, where its holder stands in it: it goes first beyond that."""
+        slot = self.blocked
+        holder = NOBODY if slot is None else self.fleet.tokens.holder_of(segment_token(slot))
+        seen = self.fleet.mirror.progress.get(holder)
+        if slot is None or holder == self.fleet.node_id or seen is None or (seen.track, seen.index) != slot:
+            return ahead
+        return ahead[: ahead.index(slot.index) + 1] if slot.track == self.track and slot.index in ahead else ahead
 
     def _lookahead_segments(self) -> int:
         axis = self.fleet.site.carrier
@@ -444,7 +455,7 @@ class Carriage:
         gates = [gate(slot.track) for slot in here if tracks[slot.track].kind is TrackKind.LIFT]
         needed = {*here, *gates, *self.whole.slots, *self._may_come_to()}
         if self.goal is not None and not self.arrived:
-            needed.update(slot for slots in self.axis.rights(self._ahead()) for slot in slots)
+            needed.update(slot for slots in self.axis.rights(self._open(self._ahead())) for slot in slots)
         tokens = self.fleet.tokens
         for key in [key for key in tokens.wanted if key.kind is TokenKind.SEGMENT]:
             if slot_of(key) not in needed:
