@@ -1,6 +1,7 @@
 """A person's mistakes in a file: all of them at once, one clear line each."""
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -68,13 +69,18 @@ class ConfigError(Exception):
         return "\n".join(str(problem) for problem in self.problems)
 
 
-def nearest(name: str, known: Sequence[str]) -> str:
-    """A remedy for an unknown name: the nearest known one, or all of them."""
+def closest(name: str, known: Sequence[str], alike: float = 0.6) -> str | None:
+    """The known name that an unknown one is likely to mean, or None; ``alike``: 0 for any name, 1 for the same one."""
     from difflib import get_close_matches  # noqa: PLC0415  # a machine without a mistake must not carry it
 
-    close = get_close_matches(name, known, n=1)
-    if close:
-        return f'did you mean "{close[0]}"?'
+    return next(iter(get_close_matches(name, known, n=1, cutoff=alike)), None)
+
+
+def nearest(name: str, known: Sequence[str]) -> str:
+    """A remedy for an unknown name: the nearest known one, or all of them."""
+    close = closest(name, known)
+    if close is not None:
+        return f'did you mean "{close}"?'
     return "known here: " + ", ".join(sorted(known)) if known else "remove it"
 
 
@@ -88,6 +94,19 @@ class Problems:
     def add(self, line: int, key: str, value: object, what: str, remedy: str) -> None:
         """Note one mistake in ``line`` (from 1); ``what`` is wrong with the value, ``remedy`` mends it."""
         self.found.append(Problem(self.file, line, key, value, what, remedy))
+
+    def none_in(self, tables: str, harmless: str = "") -> bool:
+        """Whether no mistake is in any of those tables (``"lifts|spurs"``), other than at a key that is harmless there.
+
+        ``harmless`` is the last part of such keys, likewise.
+        """
+        of_them = re.compile(rf"({tables})\b")
+        passed_over = re.compile(rf".*\.({harmless})(\[\d+\])?")
+        return not any(of_them.match(one.key) and not passed_over.fullmatch(one.key) for one in self.found)
+
+    def forget(self, key: str) -> None:
+        """Take back what was noted of a key, as it follows from another mistake."""
+        self.found = [one for one in self.found if one.key != key]
 
     def in_order(self) -> list[Problem]:
         """All mistakes in the order of the file's lines."""

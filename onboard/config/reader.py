@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
-from onboard.config.problems import Problems, nearest
+from onboard.config.problems import Problems, closest, nearest
 from onboard.config.toml_lines import Document, KeyPath, path_text
 
 _T = TypeVar("_T")
@@ -125,32 +125,60 @@ class TomlTable:
     def table(self, name: str, *, required: bool = False) -> "TomlTable":
         """A table within; an empty one where it is missing. Ask once for each."""
         self.asked.add(name)
+        key = self._meant(name, dict) if required else name
         value = self.values.get(name)
         if value is None and required:
             self.bad(name, None, "missing", f"add a table [{path_text((*self.path, name))}]")
         if value is not None and not isinstance(value, dict):
             self.bad(name, value, f"is {type_name(value)}", f"write a table [{path_text((*self.path, name))}]")
             value = None
-        return self._below((*self.path, name), value or {})
+        return self._below((*self.path, key), value or {})
 
     def tables(self, name: str) -> "list[TomlTable]":
         """An array of tables, ``[[name]]``; empty where it is missing. Ask once for each."""
         self.asked.add(name)
+        key = self._meant(name, list)
         values = self.values.get(name, [])
         if not isinstance(values, list) or not all(isinstance(value, dict) for value in values):
             self.bad(name, values, "not an array of tables", f"write [[{path_text((*self.path, name))}]]")
             return []
-        return [self._below((*self.path, name, number), value) for number, value in enumerate(values)]
+        return [self._below((*self.path, key, number), value) for number, value in enumerate(values)]
+
+    def _meant(self, name: str, kind: type) -> str:
+        """The key of a table, or of an array of tables, that is likely to be meant by this name: its own, or misspelt.
+
+        What is misspelt is noted, and found at the name from then on.
+        """
+        others = [(key, value) for key, value in self.values.items() if key not in self.asked]
+        tables = [
+            key
+            for key, value in others
+            if type(value) is kind and (not isinstance(value, list) or all(isinstance(one, dict) for one in value))
+        ]
+        # Other tables may still be asked for by names that are a little alike: missions, stations.
+        key = closest(name, tables, alike=0.8) if tables and name not in self.values else None
+        if key is None:
+            return name
+        self.bad(key, None, "unknown key", f'did you mean "{name}"?')
+        self.values[name] = self.values.pop(key)
+        return key
 
     def pass_over(self, is_such: Callable[[str], bool]) -> None:
         """Call no such key unknown: which are known follows from something that is mistaken."""
         self.asked.update(name for name in self.values if is_such(name))
 
     def check_unknown(self) -> None:
-        """Note every key here and below that nobody asked for, with the nearest known name."""
+        """Note every key here and below that nobody asked for, with the nearest known name.
+
+        Where that one is missing, it is not told as well.
+        """
         for name in self.values:
             if name not in self.asked:
-                self.bad(name, None, "unknown key", nearest(name, sorted(self.asked)))
+                known = sorted(self.asked)
+                meant = closest(name, known)
+                if meant is not None and meant not in self.values:
+                    self.problems.forget(path_text((*self.path, meant)))
+                self.bad(name, None, "unknown key", nearest(name, known))
         for table in self.below:
             table.check_unknown()
 

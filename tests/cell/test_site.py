@@ -60,7 +60,7 @@ def test_a_cell_is_read() -> None:
         ("= 60", "= 65", "cell.toml:17: goals[0].within_s = 65: not in steps of 10 s"),
         ("node = 9", "node = 1", "node-ID of"),
         ('name = "MT1"', 'name = "MT1"\ncolour = "red"', "obstacles[0].colour: unknown key"),
-        ("[[desks]]", "[[desk]]", "desks: no goal manager"),
+        ("[[desks]]", "[[managers]]", "desks: no goal manager"),
     ],
 )
 def test_a_mistake_is_one_line(old: str, new: str, line: str) -> None:

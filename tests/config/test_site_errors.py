@@ -86,7 +86,7 @@ ONE_MISTAKE = {
     ),
     "number of floors with decimals, and a floor of its own": (
         "count = 2",
-        "count = 2.0\n2.positions = 9",
+        "count = 2.0\n2.positions = 8",
         "s.toml:5: floors.count = 2.0: is a decimal number; write a whole number from 1 to 127",
     ),
     "no place": (

@@ -236,6 +236,8 @@ def test_bad_rows_end_a_command_with_status_2(tmp_path: Path, capsys: pytest.Cap
         (["--delimiter", "::"], "--delimiter ::: must be one character, or one of comma, semicolon, tab, bar"),
         (["--zone", "Europe/Paradise"], "--zone Europe/Paradise: no such zone; write its IANA name"),
         (["--date-format", "%d"], "table.csv:2: arrival '2019-07-24T05:00' is not written as %d; correct it, or add"),
+        (["--date-format", "%d.%m.%Q"], "--date-format %d.%m.%Q: 'Q' is a bad directive; such as '%d.%m.%Y %H:%M'"),
+        (["--columns", "arrival=a,arrival=b"], "--columns arrival=b: arrival is named twice; leave one out, or join"),
         ([], "table.csv:2: arrival '2019-07-24T05:00' has no UTC offset; write it as"),
         (["--inside", "some"], "--inside some: must be a number of cars from 0 to"),
         (["--inside", "recorded"], "--inside recorded: who came before the day; add --day D"),
@@ -246,6 +248,33 @@ def test_bad_rows_end_a_command_with_status_2(tmp_path: Path, capsys: pytest.Cap
 def test_a_mistake_in_the_options_is_one_line(options: list[str], line: str, tmp_path: Path) -> None:
     (told,) = refused(tmp_path, "arrival,departure\n2019-07-24T05:00,2019-07-24T06:00\n", *options)
     assert told.startswith(line)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "line"),
+    [
+        (
+            "45426,45427",
+            ["--zone", "UTC"],
+            "'45426' is a spreadsheet's number of a day; give its column a format of dates",
+        ),
+        ("45426.3125,45426.5", ["--date-format", "epoch"], "'45426.3125' is a spreadsheet's number of a day"),
+        ("07:00,09:00", ["--date-format", "%H:%M", "--zone", "UTC"], "'07:00' has no year; join the column of the day"),
+    ],
+)
+def test_what_is_no_point_in_time_is_said_so(text: str, options: list[str], line: str, tmp_path: Path) -> None:
+    (told,) = refused(tmp_path, f"arrival,departure\n{text}\n", *options)
+    assert told.startswith(f"table.csv:2: arrival {line}")
+
+
+def test_a_first_line_for_excel_alone_is_to_be_taken_out(tmp_path: Path) -> None:
+    (told,) = refused(tmp_path, "sep=;\narrival;departure\n", "--delimiter", "semicolon")
+    assert told == "table.csv:1: no column arrival, departure; take that line out: the first line must name the columns"
+
+
+def test_a_day_of_the_year_is_no_number_of_a_spreadsheet(tmp_path: Path) -> None:
+    demand = asked(tmp_path, "arrival,departure\n24135,24136\n", "--date-format", "%y%j", "--zone", "UTC")
+    assert demand.zero == datetime.fromisoformat("2024-05-14T00:00:00+00:00")
 
 
 def test_options_about_a_table_need_one() -> None:

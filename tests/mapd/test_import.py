@@ -209,7 +209,7 @@ SITE_MISTAKES = {
     ('"0,2", "2,2"]', '"0,2", "0,2"]'): "named twice",
     ("node = 11", "node = 1"): "node-ID of Desk already",
     ("[[robots]]", '[[desks]]\nname = "D2"\nnode = 2\n\n[[robots]]'): "more than one desk",
-    ("[map]", "[nap]"): "neither or both of [map] and [network]",
+    ("[map]", "[hall]"): "neither or both of [map] and [network]",
 }
 
 

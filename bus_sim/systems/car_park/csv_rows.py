@@ -164,6 +164,8 @@ class CsvTable:
             for word, mark in DELIMITERS.items():
                 if mark != self.form.delimiter and mark in head[0]:
                     return f"its columns are divided by another character; add --delimiter {word}"
+        if head and head[0].startswith("sep="):
+            return "take that line out: the first line must name the columns"
         if not head:
             return f"the first line must name {', '.join(needed)}"
         named = ",".join(f"{column}=NAME" for column in needed)

@@ -8,7 +8,7 @@ from bus_sim.demand import DemandError
 from bus_sim.demand_options import TABLE_OPTIONS
 from bus_sim.systems.car_park import counts, sessions
 from bus_sim.systems.car_park.csv_rows import DELIMITERS, CsvForm
-from bus_sim.systems.car_park.moments import MomentForm, zone_named
+from bus_sim.systems.car_park.moments import MomentForm, checked_format, zone_named
 from onboard.config.files import read_text, root_table
 from onboard.config.problems import Problems
 from onboard.config.reader import TomlTable
@@ -34,7 +34,9 @@ def table_form(args: Namespace) -> CsvForm:
         columns,
         _delimiter(words.get("delimiter", "comma")),
         words.get("encoding"),
-        MomentForm(tuple(words.get("date_format", ())), zone_named(zone) if zone is not None else None),
+        MomentForm(
+            tuple(map(checked_format, words.get("date_format", ()))), zone_named(zone) if zone is not None else None
+        ),
         bool(words.get("skip_bad", False)),
     )
 
@@ -50,6 +52,8 @@ def _of_text(text: str) -> dict[str, tuple[str, ...]]:
             )
         if column not in COLUMNS:
             raise DemandError(f"--columns {part}: no such column; those that can be named: {', '.join(COLUMNS)}")
+        if column in columns:
+            raise DemandError(f"--columns {part}: {column} is named twice; leave one out, or join both: {column}=A+B")
         columns[column] = _names(name)
     return columns
 

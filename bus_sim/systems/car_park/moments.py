@@ -11,12 +11,29 @@ EPOCH, EPOCH_MS = "epoch", "epoch_ms"
 _PER_SECOND = {EPOCH: 1.0, EPOCH_MS: 1000.0}
 #: Years of demand: what is outside is a mistake in the format, such as milliseconds read as seconds.
 YEARS = range(1970, 2200)
+#: Spreadsheets count days from 1900 (1904 on some): as seconds or milliseconds they would be a minute to a day of 1970.
+_DAY_NUMBERS = range(15_000, 100_000)
+#: The year of a format that says none.
+_NO_YEAR = 1900
 #: The longest text of ISO 8601 that is a day without a time.
 _DAY_LENGTH = len("2019-07-24")
 
 
 class CellError(ValueError):
     """What is wrong with one value, and its remedy, in words that follow the value."""
+
+
+def checked_format(text: str) -> str:
+    """A format as it is, or one of our words. Raises ``DemandError`` for one that ``strptime`` does not have."""
+    if text not in _PER_SECOND:
+        try:
+            datetime.strptime(datetime(2000, 2, 2, tzinfo=UTC).strftime(text), text)  # noqa: DTZ007  # a trial
+        except ValueError as error:
+            what = str(error).partition(" in format")[0]
+            raise DemandError(
+                f"--date-format {text}: {what}; such as '%d.%m.%Y %H:%M', {EPOCH} or {EPOCH_MS}"
+            ) from error
+    return text
 
 
 def zone_named(name: str) -> ZoneInfo:
@@ -45,6 +62,8 @@ class MomentForm:
         none, a time without offset where there is no zone, and one that the clock left out.
         """
         moment = self._parsed(text)
+        if moment.year == _NO_YEAR and moment.tzinfo is None:
+            raise CellError("has no year; join the column of the day to that of the time: --columns NAME=DAY+TIME")
         if moment.year not in YEARS:
             raise CellError(f"is in the year {moment.year}; write one from {YEARS[0]} to {YEARS[-1]}")
         if moment.tzinfo is not None:
@@ -63,6 +82,8 @@ class MomentForm:
         moment = next(found, None)
         if moment is not None:
             return moment
+        if _is_day_number(text):
+            raise CellError("is a spreadsheet's number of a day; give its column a format of dates there and save anew")
         if self.formats:
             raise CellError(f"is not written as {' or '.join(self.formats)}; correct it, or add its --date-format")
         if text.isdecimal():
@@ -72,10 +93,18 @@ class MomentForm:
         raise CellError(f"is no date and time; {remedy}")
 
 
+def _is_day_number(text: str) -> bool:
+    """Whether it is a whole or decimal number, with point or comma, of some day of the years from 1941 to 2173."""
+    whole = text.replace(",", ".").partition(".")[0]
+    return whole.isdecimal() and len(whole) == 5 and int(whole) in _DAY_NUMBERS and text[5:6] in ("", ".", ",")
+
+
 def _by_format(text: str, form: str) -> datetime | None:
-    """None where the text is not of this format."""
+    """None where the text is not of this format; a number of a day is none of seconds."""
     try:
         if form in _PER_SECOND:
+            if _is_day_number(text):
+                return None
             return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=float(text) / _PER_SECOND[form])
         return datetime.strptime(text, form)  # noqa: DTZ007  # a format may have an offset or none: the caller looks
     except (ValueError, OverflowError):

@@ -10,6 +10,7 @@ from itertools import groupby
 
 from onboard.config.fleet import FleetReader
 from onboard.config.reader import TomlTable
+from onboard.config.toml_lines import path_text
 from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.ways.reach import passages
@@ -52,7 +53,7 @@ def check_room(root: TomlTable, site: WaySite, fleet: FleetReader) -> None:
         why = _why_not(site, home, tracks, taken)
         if why:
             table.bad("home", table.values["home"], why, f"choose one of: {tracks_text(site, sorted(free))}")
-        taken.setdefault(home.track, table.values["name"])
+        taken.setdefault(home.track, path_text(table.path) if "name" in table.wrong else table.values["name"])
 
 
 def _why_not(site: WaySite, home: Segment, tracks: list[int], taken: dict[int, str]) -> str:

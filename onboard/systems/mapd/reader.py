@@ -36,7 +36,7 @@ def read(root: TomlTable, common: Common) -> Mapd:
     step_ms = root.table("steps").integer("step_ms", 100, 60_000, 1_000)
     rows, (points, lines, zones) = _read_floor(root)
     floor: Floor | None = None
-    if not root.problems.found:
+    if root.problems.none_in("map|network"):
         floor = grid_floor(rows) if rows else network_floor(points, lines, zones)
         if floor.size > MAX_CELLS:
             root.bad("map" if rows else "network", floor.size, "too many cells", f"have at most {MAX_CELLS}")
@@ -50,8 +50,8 @@ def read(root: TomlTable, common: Common) -> Mapd:
     demand = root.table("demand")
     endpoints = _read_endpoints(demand, cells if floor is not None else None)
     tasks = _read_tasks(demand, cells if floor is not None else None, endpoints)
-    if floor is not None and not root.problems.found:
-        _check_ways(root, floor, homes, endpoints)
+    if floor is not None and homes and endpoints and root.problems.none_in("map|network"):
+        _check_ways(root, demand, floor, homes, endpoints)
     timing = read_timing(root.table("timing"), max(1, len(homes)), max(1, len(fleet.by_node)), common.bitrate)
     return Mapd(
         name=common.name,
@@ -168,12 +168,11 @@ def _read_machines(
         cell = _cell(table, "home", name, cells)
         if cell is not None and cell in homes.values():
             table.bad("home", name, "another robot's home", "give each robot a home of its own")
-        before = len(fleet.by_node)
         # The right to its first cell is the robot's own from the beginning.
         own = None if cell is None or floor is None else cell_station(floor.resources[cell])
-        fleet.add(table, KindCode.VEHICLE, _NOWHERE, own)
-        if len(fleet.by_node) > before and cell is not None:
-            homes[table.values["node"]] = cell
+        robot = fleet.add(table, KindCode.VEHICLE, _NOWHERE, own)
+        if cell is not None:
+            homes[robot.node_id] = cell
     for key, words in (("robots", "robot"), ("desks", "order desk")):
         if not root.values.get(key):
             root.bad(key, None, f"no {words}", f"add at least one [[{key}]] table")
@@ -210,36 +209,42 @@ def _read_tasks(
 ) -> tuple[TransportTask, ...]:
     form = f'write [release step from 0 to {MAX_RELEASE}, "from", "to"], both endpoints'
     tasks = []
-    known = set(endpoints)
+    # Where one of them is mistaken, any cell may be meant to be one.
+    known = {*endpoints, *(cells or {}).values()} if "endpoints" in demand.wrong else set(endpoints)
     for number, value in enumerate(_items(demand, "tasks")):
         good = isinstance(value, list) and len(value) == 3 and type(value[0]) is int and 0 <= value[0] <= MAX_RELEASE
         if not good:
             demand.bad("tasks", value, "not a task", form, item=number)
         elif cells is not None:
             start, end = (cells.get(name) if isinstance(name, str) else None for name in value[1:])
-            if start is None or end is None or not {start, end} <= known:
-                demand.bad("tasks", value, "not between endpoints", form, item=number)
-            else:
+            if start is not None and end is not None and {start, end} <= known:
                 tasks.append(TransportTask(number, value[0], start, end))
+            elif not all(name in _items(demand, "endpoints") for name in value[1:]):
+                # An endpoint that is mistaken is told there.
+                demand.bad("tasks", value, "not between endpoints", form, item=number)
     return tuple(tasks)
 
 
-def _check_ways(root: TomlTable, floor: Floor, homes: dict[int, int], endpoints: tuple[int, ...]) -> None:
+def _check_ways(
+    root: TomlTable, demand: TomlTable, floor: Floor, homes: dict[int, int], endpoints: tuple[int, ...]
+) -> None:
     """That all robots but one may stay at home for ever and the last one still gets everywhere."""
     first = next(iter(homes.values()))
     ground = floor.network.ground((first,))
     what = f"no way from and to {floor.names[first]}"
-    for number, cell in enumerate(endpoints):
-        if cell not in ground:
-            root.table("demand").bad("endpoints", floor.names[cell], what, "join them", item=number)
-    for number, cell in enumerate(homes.values()):
-        if cell not in ground:
-            root.bad("robots", floor.names[cell], what, "join them", item=number)
-    if root.problems.found:
+    cut_off = {floor.names[cell] for cell in (*endpoints, *homes.values()) if cell not in ground}
+    for number, name in enumerate(demand.values["endpoints"]):
+        if name in cut_off:
+            demand.bad("endpoints", name, what, "join them", item=number)
+    written = [robot.get("home") for robot in root.values["robots"]]
+    for number, name in enumerate(written):
+        if name in cut_off:
+            root.bad("robots", name, what, "join them", item=number)
+    if cut_off or not root.problems.none_in("robots|demand", "name|node|tasks"):
         return
     rests = lasting_rests(floor.network, list(homes.values()), endpoints)
-    for number, (node, cell) in enumerate(homes.items()):
+    for node, cell in homes.items():
         if cell not in rests:
             what = f"node {node} at home would shut others in"
             remedy = "let it live where nobody must pass, or have fewer robots"
-            root.bad("robots", floor.names[cell], what, remedy, item=number)
+            root.bad("robots", floor.names[cell], what, remedy, item=written.index(floor.names[cell]))

@@ -3,10 +3,10 @@
 import re
 from typing import Protocol
 
+from onboard.config.fleet import FleetReader
 from onboard.config.problems import nearest
 from onboard.config.reader import TomlTable
 from onboard.contract.codes import KindCode
-from onboard.core.site import Machine
 from onboard.systems.terminal.site import Blockage, EntityKind, Mission, Press
 
 _CLOCK = re.compile(r"(\d{1,2}):([0-5]\d) ?(am|pm)?", re.IGNORECASE)
@@ -28,7 +28,7 @@ def read_missions(
     root: TomlTable,
     network: EntityNames,
     boxes: dict[str, int],
-    machines: dict[str, Machine | None],
+    fleet: FleetReader,
     desk: int,
     begins_s: int,
 ) -> tuple[Mission, ...]:
@@ -50,7 +50,7 @@ def read_missions(
         found.append(
             Mission(
                 at_s * 1_000_000,
-                _desk(table, machines, desk),
+                _desk(table, fleet, desk),
                 target,
                 count,
                 kind,
@@ -74,12 +74,15 @@ def _boxes(table: TomlTable, boxes: dict[str, int]) -> tuple[int, ...]:
     return tuple(named)
 
 
-def _desk(table: TomlTable, machines: dict[str, Machine | None], desk: int) -> int:
+def _desk(table: TomlTable, fleet: FleetReader, desk: int) -> int:
     if not table.has("desk"):
         return desk
-    machine = machines.get(table.text("desk"))
+    name = table.text("desk")
+    machine = fleet.by_name.get(name)
+    if machine is None and ("desk" in table.wrong or fleet.is_odd(name)):
+        return desk
     if machine is None or machine.kind is not KindCode.DESK:
-        known = [name for name, one in machines.items() if one is not None and one.kind is KindCode.DESK]
+        known = [one.name for one in fleet.by_node.values() if one.kind is KindCode.DESK]
         table.bad("desk", table.values["desk"], "no desk of this name", nearest(str(table.values["desk"]), known))
         return desk
     return machine.node_id
@@ -117,16 +120,16 @@ def read_blockages(root: TomlTable, network: EntityNames) -> tuple[Blockage, ...
     return tuple(found)
 
 
-def read_presses(root: TomlTable, machines: dict[str, Machine | None]) -> tuple[Press, ...]:
+def read_presses(root: TomlTable, fleet: FleetReader) -> tuple[Press, ...]:
     """What a person does to vehicles by hand (row M38)."""
     found = []
-    vehicles = {name: one for name, one in machines.items() if one is not None and one.kind is KindCode.VEHICLE}
+    vehicles = {one.name: one for one in fleet.by_node.values() if one.kind is KindCode.VEHICLE}
     for table in root.tables("manual"):
         at_s, name = table.integer("at_s", 0, _DAY_S), table.text("vehicle")
         what = table.text("do")
         if "do" not in table.wrong and what not in PRESSES:
             table.bad("do", what, "nothing that one can do by hand", f"write {', '.join(PRESSES)}")
-        if "vehicle" in table.wrong:
+        if "vehicle" in table.wrong or (name not in vehicles and fleet.is_odd(name)):
             continue
         if name not in vehicles:
             table.bad("vehicle", name, "no vehicle of this name", nearest(name, list(vehicles)))

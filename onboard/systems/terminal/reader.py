@@ -94,12 +94,12 @@ def read(root: TomlTable, common: Common) -> Terminal:
     by_box = {box.name: number for number, box in enumerate(boxes, start=1)}
     site = replace(
         site,
-        missions=read_missions(root, network, by_box, fleet.by_name, steward, begins_s),
+        missions=read_missions(root, network, by_box, fleet, steward, begins_s),
         blockages=read_blockages(root, network),
-        presses=read_presses(root, fleet.by_name),
+        presses=read_presses(root, fleet),
         stewards=_read_stewards(root.table("stewards"), network, fleet, steward),
     )
-    if not root.problems.found:
+    if root.problems.none_in("areas|lanes|stations|crossings|turns|vehicles", "name|node"):
         _check_ways(root, site, homes)
     return site
 
@@ -223,7 +223,7 @@ def _read_stewards(table: TomlTable, network: NamedEntities, fleet: FleetReader,
             desk = fleet.by_name.get(table.text(name))
             if desk is not None and desk.kind is KindCode.DESK:
                 stewards[network.numbers[name]] = desk.node_id
-            else:
+            elif desk is not None or not fleet.is_odd(table.text(name)):
                 known = [one.name for one in fleet.by_node.values() if one.kind is KindCode.DESK]
                 table.bad(name, table.values[name], "no desk of this name", nearest(str(table.values[name]), known))
     return stewards

@@ -4,7 +4,7 @@ Its alleys meet where they should, nothing lies on a way, and every place can be
 exit.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations
 
@@ -21,31 +21,79 @@ from onboard.ways.site import Track, TrackKind
 _NAMED = 3
 
 
-def check_built(root: TomlTable, site: CarPark, layout: Layout) -> CarPark:
-    """Note what cannot be built or reached; the site without the places that would lie on a way or on each other.
+def check_plan(root: TomlTable, site: CarPark, layout: Layout) -> CarPark:
+    """Note what cannot be built; the site without the places that would lie on a way or on each other.
 
     Of two such places that of the alley stays which was read first. Where each floor is one alley nothing lies on
-    anything, and everything can be reached unless an alley is one way.
+    anything. What hangs together by an end that is not where it is written to be is not judged further.
     """
-    outlines = Outlines(site)
-    if _tell_mismatches(root, layout, outlines):
+    if not any(track.kind is TrackKind.ALLEY for track in site.tracks.values()):
         return site
-    if any(_is_more(track) for track in site.tracks.values()) or len(layout.alleys()) > layout.floors:
-        _check_ways(root, layout, outlines)
-        site = replace(site, places=tuple(_apart(outlines)))
-        numbers = {place.number for place in site.places}
-        site = replace(site, place_class={at: one for at, one in site.place_class.items() if at in numbers})
-        _check_reached(root, site)
-    elif any(track.one_way for track in site.tracks.values()):
-        _check_reached(root, site)
-    return site
+    outlines = _outlines(site, layout)
+    mistaken = _tell_mismatches(root, layout, outlines)
+    if not _is_plan(site, layout):
+        return site
+    sound = _hung_tracks(site.tracks, site.tracks.keys() - mistaken, layout.floors)
+    _check_ways(root, layout, outlines if sound == site.tracks.keys() else _outlines(only_tracks(site, sound), layout))
+    site = replace(site, places=tuple(_apart(outlines)))
+    numbers = {place.number for place in site.places}
+    return replace(site, place_class={at: one for at, one in site.place_class.items() if at in numbers})
 
 
-def _tell_mismatches(root: TomlTable, layout: Layout, outlines: Outlines) -> bool:
-    """Each alley and shaft that does not end where it is written to, on the first floor where it does not."""
-    told = set()
+def _is_plan(site: CarPark, layout: Layout) -> bool:
+    """Whether something could lie on something: more than one alley a floor, or spurs of several segments."""
+    return any(_is_more(track) for track in site.tracks.values()) or len(layout.alleys()) > layout.floors
+
+
+def _outlines(site: CarPark, layout: Layout) -> Outlines:
+    """The boxes of a part of the building, as wide as in the whole."""
+    outlines = Outlines(site)
+    outlines.slot_mm = min(track.pitch_mm for track in layout.tracks.values() if track.kind is TrackKind.ALLEY)
+    return outlines
+
+
+def only_tracks(site: CarPark, tracks: Collection[int]) -> CarPark:
+    """A site of these tracks, and of what stands beside them."""
+    return replace(
+        site,
+        tracks={number: track for number, track in site.tracks.items() if number in tracks},
+        places=tuple(place for place in site.places if place.track in tracks),
+        machines={node: one for node, one in site.machines.items() if one.home.track in tracks or one.station is None},
+    )
+
+
+def beside(track: Track) -> set[int]:
+    """The tracks to which a track is joined."""
+    return {mouth.track for mouth in (*track.joins, track.high) if mouth is not None}
+
+
+def joined_tracks(tracks: Mapping[int, Track], sound: Collection[int]) -> set[int]:
+    """Those of the sound tracks that are joined to sound ones alone, and so on."""
+    left = set(sound)
+    while loose := {number for number in left if not beside(tracks[number]) <= left}:
+        left -= loose
+    return left
+
+
+def _hung_tracks(tracks: Mapping[int, Track], sound: Collection[int], floors: int) -> set[int]:
+    """Those of them that hang together with the own alley of one of the floors, so that it is known where they lie."""
+    left = joined_tracks(tracks, sound)
+    hung = {number for number in left if number <= floors}
+    while more := {
+        number
+        for number in left - hung
+        if beside(tracks[number]) & hung or any(number in beside(tracks[one]) for one in hung)
+    }:
+        hung |= more
+    return hung
+
+
+def _tell_mismatches(root: TomlTable, layout: Layout, outlines: Outlines) -> set[int]:
+    """Tell each alley and shaft that does not end where it is written to, on the first floor where it does not."""
+    told, mistaken = set(), set()
     for one in outlines.plan.mismatches:
         lift = _lift_of(layout, one.track)
+        mistaken |= {one.track, lift or one.track}
         names = (lift,) if lift else (layout.alley_name(one.track), layout.alley_name(one.beside.track))
         if names not in told:
             told.add(names)
@@ -53,7 +101,7 @@ def _tell_mismatches(root: TomlTable, layout: Layout, outlines: Outlines) -> boo
                 _tell_shaft(layout, layout.lifts[lift - FIRST_LIFT], one)
             else:
                 _tell_end(root, layout, one)
-    return bool(told)
+    return mistaken
 
 
 def _lift_of(layout: Layout, track: int) -> int:
@@ -131,14 +179,20 @@ def _apart(outlines: Outlines) -> Iterator[Station]:
             yield place
 
 
-def _check_reached(root: TomlTable, site: CarPark) -> None:
-    """Every place from an entry, and from every place to an exit."""
+def check_reached(root: TomlTable, site: CarPark, layout: Layout) -> bool:
+    """Note places that cannot be reached from an entry, or left to an exit; whether there are none.
+
+    Where each floor is one alley that is driven both ways, everything is reached that hangs together.
+    """
+    if not _is_plan(site, layout) and not any(track.one_way for track in site.tracks.values()):
+        return True
     reach = reachable(site)
     remedy = "join its alley by a lift or another end, or turn one_way"
     if reach.lost_places:
         root.bad("floors", None, f"no way from an entry to {_some(reach.lost_places)}", remedy)
     if reach.no_way_out:
         root.bad("floors", None, f"no way to an exit from {_some(reach.no_way_out)}", remedy)
+    return not (reach.lost_places or reach.no_way_out)
 
 
 def _some(places: tuple[Station, ...]) -> str:

@@ -28,7 +28,7 @@ class Joints:
     """All named alleys of a site file, and their ``mouths`` by track and end.
 
     ``heading`` is in quarters of a turn from that of floors' own alleys; ``alone`` are the alleys that hang together
-    with none of these by their ends, but by a lift.
+    with none of these by their ends, but by a lift, and ``adrift`` those that hang together by a mistaken one.
     """
 
     layout: Layout
@@ -36,6 +36,7 @@ class Joints:
     mouths: dict[tuple[int, str], Segment | None] = field(default_factory=dict)
     heading: dict[int, int] = field(default_factory=dict)
     alone: set[int] = field(default_factory=set)
+    adrift: set[int] = field(default_factory=set)
 
     def join(self) -> None:
         """Tell the tracks their mouths, the layout what is no place for them; a mistake once, not on each floor."""
@@ -50,11 +51,9 @@ class Joints:
             for end in ENDS:
                 mouth = self.mouths[one.number, end]
                 # How an alley lies follows from its first mouth: of one that is mistaken the other is not judged.
-                if mouth is not None and not one.table.wrong & {*ENDS} and self._is_sure(one):
+                is_sure = end == "from" or self.adrift.isdisjoint((one.number, *(mouth or ())[:1]))
+                if mouth is not None and is_sure and end not in one.table.wrong:
                     self._take_mouth(one, end, mouth)
-
-    def _is_sure(self, one: Joined) -> bool:
-        return all(written is None or self.layout.can_judge(written) for written in one.ends.values())
 
     def _find_mouth(self, one: Joined, end: str) -> Segment | None:
         mouth = self.mouths[one.number, end] = self._judged(one, end)
@@ -66,7 +65,8 @@ class Joints:
             return None
         floor, value = self.layout.level[one.number], one.table.values[end]
         if floor not in written.floors:
-            one.table.bad(end, value, f"not on floor {floor}", 'write "p(*,...)" for the same floor')
+            if self.layout.known:
+                one.table.bad(end, value, f"not on floor {floor}", 'write "p(*,...)" for the same floor')
             return None
         mouth = self.layout.judged(one.table, end, written.on(floor))
         if mouth is not None and mouth.track == one.number:
@@ -80,24 +80,31 @@ class Joints:
         while waiting:
             later = [one for one in waiting if not self._turn(one)]
             if len(later) == len(waiting):
-                # Joined to others by a lift only: a direction of its own.
-                first = later.pop(0).number
-                self.heading[first] = 0
-                self.alone.add(first)
+                # Joined to others by a lift only, or by a mistaken end: a direction of its own.
+                first = next((one for one in later if not any(self._mouths_of(one))), later[0])
+                later.remove(first)
+                self.heading[first.number] = 0
+                self.alone.add(first.number)
             waiting = later
-        told = {number: quarters for number, quarters in self.heading.items() if number not in self.alone}
+        told = {number: quarters for number, quarters in self.heading.items() if number not in self.alone | self.adrift}
         self.layout.heading = told
 
     def _turn(self, one: Joined) -> bool:
         """Whether the heading of an alley follows from those known: it goes off from its first mouth to its side."""
-        low, high = (self.mouths[one.number, end] for end in ENDS)
+        low, high = self._mouths_of(one)
         mouth = low or high
+        end = "from" if one.ends["from"] is not None else "to"
+        if (one.ends[end] is not None and not self.mouths[one.number, end]) or (mouth and mouth.track in self.adrift):
+            self.adrift.add(one.number)
         if mouth is not None and mouth.track in self.heading:
             away = self.heading[mouth.track] + (1 if SIDES[one.side] is Side.FAR else -1)
             self.heading[one.number] = (away if low is not None else away + 2) % 4
             if mouth.track in self.alone:
                 self.alone.add(one.number)
         return one.number in self.heading
+
+    def _mouths_of(self, one: Joined) -> tuple[Segment | None, Segment | None]:
+        return self.mouths[one.number, "from"], self.mouths[one.number, "to"]
 
     def _take_mouth(self, one: Joined, end: str, mouth: Segment) -> None:
         """The end of an alley takes the stead of a place beside its mouth."""

@@ -11,7 +11,7 @@ from onboard.config.reader import TomlTable, type_name
 from onboard.config.toml_lines import path_text
 from onboard.contract.codes import Side
 from onboard.core.site import Segment, Station
-from onboard.systems.car_park.reader.positions import ANY, BASE, Written, read_written
+from onboard.systems.car_park.reader.positions import ALLEY_NAME, ANY, BASE, Written, read_written
 from onboard.ways.site import Track, TrackKind
 
 SIDES = {"near": Side.NEAR, "far": Side.FAR}
@@ -31,13 +31,16 @@ def one_position(text: str) -> Written | None:
 class Layout:
     """What has been read so far.
 
-    ``known`` is False where number or length of floors' own alleys is mistaken, ``unsure`` has the names of other
-    alleys that are (empty for one without a name): what refers to them is then not judged.
+    What is mistaken has a stand-in, as large as it can be, and what follows from it is not judged: ``known`` is False
+    where the number of floors is, ``vague`` are the tracks whose length is, ``unsure`` the names that are (empty for an
+    alley without a usable one), ``partly`` the names of alleys that are on other floors too, and ``shifted``
+    the kinds of tracks behind floors' own whose numbers follow from something mistaken.
     ``named`` are the alleys by floor and name, ``level`` the floor of each track, ``lifts`` the tables of the lifts in
     the order of their tracks. ``taken`` says what stands at a station that is no place, ``kept`` why nobody may stand
     for long at a segment, ``floor_mm`` how high each floor lies above the lowest; ``low`` are the tables of floors that
     tell their own height. ``heading`` is in quarters of a turn from floors' own alleys, where links tell it. ``tables``
-    are those of named alleys by track.
+    are those of all tracks but floors' own alleys; of these, where a floor differs, ``floor_tables``, at 0
+    what holds for all.
     """
 
     tracks: dict[int, Track] = field(default_factory=dict)
@@ -53,8 +56,12 @@ class Layout:
     heading: dict[int, int] = field(default_factory=dict)
     tables: dict[int, TomlTable] = field(default_factory=dict)
     pitch_mm: int = 2_400
+    floor_tables: dict[int, TomlTable] = field(default_factory=dict)
     known: bool = True
+    vague: set[int] = field(default_factory=set)
     unsure: set[str] = field(default_factory=set)
+    partly: set[str] = field(default_factory=set)
+    shifted: set[TrackKind] = field(default_factory=set)
 
     @property
     def floors(self) -> int:
@@ -90,26 +97,33 @@ class Layout:
         value = table.values[name] if item is None else table.values[name][item]
         number, index = self._number(written), written.indices.first
         track = self.tracks.get(number) if number is not None else None
-        if not self.can_judge(written) or (self.unsure and number is not None and number > self.floors):
-            # Numbers behind those of floors are not known either.
+        if not self.can_judge(written) or (written.alley == BASE and self._is_shifted(written.floors.first)):
             return None
         if track is None or track.kind is TrackKind.LIFT or (track.kind is TrackKind.SPUR and not spurs):
             table.bad(name, value, "no such segment", self._known_alleys(written), item=item)
             return None
         if not 1 <= index <= track.length:
-            remedy = f"{self.words(track.number)} has 1 to {track.length}"
-            table.bad(name, value, "no such segment", remedy, item=item)
+            if track.number not in self.vague:
+                remedy = f"{self.words(track.number)} has 1 to {track.length}"
+                table.bad(name, value, "no such segment", remedy, item=item)
             return None
         return Segment(track.number, index)
 
     def can_judge(self, written: Written) -> bool:
-        """Whether what is meant is known: not by the name of an alley that is mistaken."""
-        is_named = written.alley in (BASE, ANY) or any(name == written.alley for _, name in self.named)
+        """Whether what is meant is known: by no name of an alley, and on no floor, that is mistaken."""
+        here = [name for floor, name in self.named if floor in written.floors]
+        if written.alley in (BASE, ANY):
+            return self.known or bool(here)
+        is_named = any(name == written.alley for _, name in self.named)
         return (
-            self.known
-            and (written.alley in (BASE, ANY) or written.alley not in self.unsure)
+            written.alley not in self.unsure
             and (is_named or "" not in self.unsure)
+            and (written.alley in here or (self.known and written.alley not in self.partly))
         )
+
+    def _is_shifted(self, number: int) -> bool:
+        kind = TrackKind.SPUR if number >= FIRST_SPUR else TrackKind.ALLEY
+        return number > self.floors and kind in self.shifted
 
     def _number(self, written: Written) -> int | None:
         """A floor's own alley by the floor's number; spurs and lobbies by their track's."""
@@ -118,7 +132,7 @@ class Layout:
 
     def _known_alleys(self, written: Written) -> str:
         floor = written.floors.first
-        names = [name for at, name in self.named if at == floor and name != BASE]
+        names = [name for at, name in self.named if at == floor and ALLEY_NAME.fullmatch(name)]
         if written.alley != BASE and 1 <= floor <= self.floors:
             return f"alleys of floor {floor}: its own{''.join(f', {name}' for name in names)}"
         return f"floors here: 1 to {self.floors}"
@@ -136,7 +150,9 @@ class Layout:
         if track.kind is not TrackKind.ALLEY:
             return f"{track.kind.value} {number}"
         name = next((name for _, name, one in self._named() if one == number), None)
-        return "a lobby" if name is None else f"alley {name}" if name != BASE else "the floor's own alley"
+        if name is not None and ALLEY_NAME.fullmatch(name) is None:
+            return name or "the floor's own alley"
+        return "a lobby" if name is None else f"alley {name}"
 
     def _named(self) -> list[tuple[int, str, int]]:
         return [(floor, name, number) for (floor, name), number in self.named.items()]
@@ -186,30 +202,32 @@ class Layout:
 
     def extent(self) -> str:
         """What floors and positions there are, in words."""
-        longest = max(alley.length for alley in self.alleys())
-        return f"floors here: 1 to {self.floors}, positions 1 to {longest}"
+        floors = f"floors here: 1 to {self.floors}"
+        longest = max((alley.length for alley in self.alleys() if alley.number not in self.vague), default=0)
+        return f"{floors}, positions 1 to {longest}" if longest else floors
 
 
-def read_floor_list(layout: Layout, table: TomlTable) -> list[int] | None:
-    """Floors at the key ``floors``, rising, each once; all where it is missing, None where it is mistaken."""
+def read_floor_list(layout: Layout, table: TomlTable) -> list[int]:
+    """Floors at the key ``floors``, rising, each once; all where it is missing, those that are right where it is not.
+
+    Empty only where nothing can be made of a mistaken list.
+    """
     here = list(range(1, layout.floors + 1))
     written = table.items("floors", "a list of floors such as [1, 2, 3]")
-    if written is None or not layout.known:
-        return None if "floors" in table.wrong else here
+    if written is None:
+        return [] if "floors" in table.wrong else here
     for number, floor in enumerate(written):
-        if type(floor) is not int or floor not in here:
+        if type(floor) is not int or (layout.known and floor not in here):
             what = "no such floor" if type(floor) is int else f"is {type_name(floor)}"
             table.bad("floors", floor, what, f"floors here: 1 to {len(here)}", item=number)
-    if "floors" in table.wrong:
-        return None
-    if not written:
-        table.bad("floors", written, "no floor at all", f"write such as {here}")
-        return None
-    if written != sorted(set(written)):
-        what = "has a floor twice" if len(set(written)) < len(written) else "not from the lowest to the highest"
-        table.bad("floors", written, what, f"write {sorted(set(written))}")
-        return None
-    return list(written)
+    right = sorted({floor for floor in here if floor in written})
+    if "floors" not in table.wrong:
+        if not written:
+            table.bad("floors", written, "no floor at all", f"write such as {here}")
+        elif written != sorted(set(written)):
+            what = "has a floor twice" if len(set(written)) < len(written) else "not from the lowest to the highest"
+            table.bad("floors", written, what, f"write {sorted(set(written))}")
+    return right
 
 
 def in_order(tracks: Iterable[Track]) -> dict[int, Track]:

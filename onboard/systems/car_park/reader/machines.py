@@ -1,10 +1,12 @@
 """The machines of a car park's site file, and who is steward of what."""
 
+from typing import NamedTuple
+
 from onboard.config.fleet import FleetReader
 from onboard.config.reader import TomlTable
 from onboard.config.toml_lines import path_text
 from onboard.contract.codes import KindCode
-from onboard.core.site import Machine, Segment
+from onboard.core.site import Machine, Segment, Station
 from onboard.systems.car_park.reader.layout import FIRST_LIFT, SIDES, Layout
 from onboard.ways.site import BayUse, Track
 
@@ -13,10 +15,19 @@ _NOWHERE = Segment(0, 0)
 STAND_IN = Segment(1, 1)
 
 
-def read_fleet(root: TomlTable, layout: Layout) -> tuple[FleetReader, dict[int, BayUse]]:
-    """Lifts, compartments and robots of a site file, and the compartments that are for one use only, by node-ID."""
+class Bay(NamedTuple):
+    """A compartment's table; its machine, odd where that is mistaken; where it is, or None; what it is for."""
+
+    table: TomlTable
+    node: int
+    station: Station | None
+    use: BayUse
+
+
+def read_fleet(root: TomlTable, layout: Layout) -> tuple[FleetReader, list[Bay]]:
+    """Lifts, compartments and robots of a site file; and the compartments as they are written."""
     fleet = FleetReader()
-    uses: dict[int, BayUse] = {}
+    bays: list[Bay] = []
     for number, table in enumerate(layout.lifts, start=FIRST_LIFT):
         fleet.add(table, KindCode.LIFT, Segment(number, 1))
     for table in root.tables("compartments"):
@@ -25,14 +36,13 @@ def read_fleet(root: TomlTable, layout: Layout) -> tuple[FleetReader, dict[int, 
         if station is not None:
             layout.kept.setdefault(station.segment, f"the front of {path_text(table.path)} is")
         use = BayUse(table.choice("use", [one.value for one in BayUse], BayUse.BOTH.value))
-        fleet.add(table, KindCode.COMPARTMENT, station.segment if station is not None else _NOWHERE, station)
-        if use is not BayUse.BOTH and "node" not in table.wrong:
-            uses[table.values["node"]] = use
+        machine = fleet.add(table, KindCode.COMPARTMENT, station.segment if station is not None else _NOWHERE, station)
+        bays.append(Bay(table, machine.node_id, station, use))
     for table in root.tables("robots"):
         home = _read_home(table, layout, fleet)
         fleet.robots.append((table, home))
         fleet.add(table, KindCode.ROBOT, home)
-    return fleet, uses
+    return fleet, bays
 
 
 def _read_home(table: TomlTable, layout: Layout, fleet: FleetReader) -> Segment:
@@ -58,7 +68,7 @@ def read_stewards(table: TomlTable, layout: Layout, fleet: FleetReader) -> dict[
     """
     fixed = fleet.fixed()
     stewards = {}
-    if not layout.known or layout.unsure:
+    if not layout.known or layout.shifted:
         table.pass_over(str.isdecimal)
     for number, track in layout.tracks.items():
         if not table.has(str(number)):
@@ -69,7 +79,7 @@ def read_stewards(table: TomlTable, layout: Layout, fleet: FleetReader) -> dict[
         machine = fleet.by_name.get(name)
         if machine in fixed and machine is not None:
             stewards[number] = machine.node_id
-        elif name and (machine is not None or name not in fleet.by_name):
+        elif name and (machine is not None or not fleet.is_odd(name)):
             known = ", ".join(one.name for one in fixed)
             table.bad(str(number), name, "no fixed machine of this name", f"fixed machines here: {known}")
     return stewards

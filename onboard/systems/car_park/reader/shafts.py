@@ -46,7 +46,7 @@ def _read_end(layout: Layout, table: TomlTable) -> list[Segment]:
     """Sills at the left or the right end of the alleys that floors have by themselves."""
     end = table.choice("end", ["left", "right"])
     floors = read_floor_list(layout, table) or list(range(1, layout.floors + 1))
-    if len(floors) == 1 and layout.known and not table.wrong:
+    if len(floors) == 1 and layout.known and not table.wrong & {"end", "floors"}:
         _refuse_one_stop(table, "floors" if "floors" in table.values else "end", f"floor {floors[0]} alone")
     lengths = {floor: layout.tracks[layout.named[floor, BASE]].length for floor in floors}
     sills = [Segment(floor, 1 if end == "left" else lengths[floor]) for floor in floors]
@@ -74,30 +74,30 @@ def _read_doors(layout: Layout, table: TomlTable) -> list[Segment]:
             table.bad("doors", text, "not a door", f"write {_DOOR}", item=item)
         else:
             doors.append(_Door(item, written))
-    if any(door.written.side for door in doors):
-        # Judged also where no lobby can be made, because of another mistake.
-        _read_lobby_mm(layout, table)
-    if floors is None or not all(layout.can_judge(door.written) for door in doors):
-        return []
+    # Judged also where no lobby can be made, because of another mistake.
+    is_beside = any(door.written.side for door in doors)
+    lobby_mm = table.integer("lobby_mm", 1000, 10_000, layout.pitch_mm) if is_beside else 0
+    sure = [door for door in doors if layout.can_judge(door.written)]
+    is_whole = len(sure) == len(doors) and layout.known and not table.wrong & {"doors", "floors"}
     sills: list[Segment] = []
+    wrong_doors = "doors" in table.wrong
     for floor in floors:
         # What is mistaken on one floor is not told again for each.
-        sills += _sills_on(layout, table, doors, floor) if not table.wrong else []
-    if not table.wrong:
+        if wrong_doors is ("doors" in table.wrong):
+            sills += _sills_on(layout, table, sure, floor, lobby_mm)
+    if is_whole and "doors" not in table.wrong:
         _check_stops(layout, table, sills)
-    return sills if not table.wrong else []
+    if not is_whole or "doors" in table.wrong:
+        layout.shifted.add(TrackKind.ALLEY)
+    return sills if is_whole and not table.wrong & {"doors", "end"} else []
 
 
-def _read_lobby_mm(layout: Layout, table: TomlTable) -> int:
-    return table.integer("lobby_mm", 1000, 10_000, layout.pitch_mm)
-
-
-def _sills_on(layout: Layout, table: TomlTable, doors: list[_Door], floor: int) -> list[Segment]:
+def _sills_on(layout: Layout, table: TomlTable, doors: list[_Door], floor: int, lobby_mm: int) -> list[Segment]:
     here = [door for door in doors if floor in door.written.floors]
     if len(here) > _MOST_DOORS:
         table.bad("doors", table.values["doors"], f"{len(here)} doors on floor {floor}", "a lift has one or two")
         return []
-    return [sill for door in here if (sill := _sill(layout, table, door, floor)) is not None]
+    return [sill for door in here if (sill := _sill(layout, table, door, floor, lobby_mm)) is not None]
 
 
 def _check_stops(layout: Layout, table: TomlTable, sills: list[Segment]) -> None:
@@ -112,15 +112,17 @@ def _check_stops(layout: Layout, table: TomlTable, sills: list[Segment]) -> None
         table.bad("doors", written, what, "choose doors of alleys in one direction")
 
 
-def _sill(layout: Layout, table: TomlTable, door: _Door, floor: int) -> Segment | None:
+def _sill(layout: Layout, table: TomlTable, door: _Door, floor: int, lobby_mm: int) -> Segment | None:
     """The segment before the lift: an alley's free end, or the lobby beside it."""
     written = door.written.on(floor)
     before = layout.judged(table, "doors", written, item=door.item)
     if before is None:
         return None
     if written.side:
-        return _lobby(layout, table, before, _SIDE_WORDS[written.side])
+        return _lobby(layout, table, before, _SIDE_WORDS[written.side], lobby_mm)
     track = layout.tracks[before.track]
+    if track.number in layout.vague and before.index > 1:
+        return before
     value = table.values["doors"][door.item]
     if before.index not in (1, track.length):
         what = f"in the middle of {layout.words(track.number)}"
@@ -152,7 +154,7 @@ def _taken_by(layout: Layout, sill: Segment) -> str:
     return f"{layout.kept[sill]} at {sill}"
 
 
-def _lobby(layout: Layout, table: TomlTable, mouth: Segment, side: str) -> Segment | None:
+def _lobby(layout: Layout, table: TomlTable, mouth: Segment, side: str, lobby_mm: int) -> Segment | None:
     """One segment that goes off an alley, with the lift's door at its far end."""
     station = layout.take(table, mouth, side, name="doors")
     number = layout.next_alley()
@@ -161,9 +163,10 @@ def _lobby(layout: Layout, table: TomlTable, mouth: Segment, side: str) -> Segme
     if number >= FIRST_LIFT:
         table.bad("doors", table.values["doors"], f"alley or lobby {number}", f"a site has at most {FIRST_LIFT - 1}")
         return None
-    floor, lobby_mm = layout.level[mouth.track], _read_lobby_mm(layout, table)
+    floor = layout.level[mouth.track]
     layout.tracks[number] = Track(number, TrackKind.ALLEY, 1, lobby_mm, (mouth,), side=SIDES[side], level=floor)
     layout.level[number] = floor
+    layout.tables[number] = table
     layout.sides[number] = frozenset()
     if mouth.track in layout.heading:
         layout.heading[number] = layout.heading[mouth.track] + 1
