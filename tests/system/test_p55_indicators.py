@@ -254,11 +254,13 @@ def test_a_run_that_was_ended_at_once_has_no_figures_and_no_line_is_wider_than_t
 def test_each_compartments_time_is_told_by_what_holds_its_bay() -> None:
     times: list[BayTimes] = []
     scene = play(
-        one_floor(), stays((0, 400), (5, 700)), before=lambda simulation: times.append(BayTimes(simulation.plant))
+        one_floor(),
+        stays((0, 400), (5, 700), (702, None)),
+        before=lambda simulation: times.append(BayTimes(simulation.plant)),
     )
     (bay,) = times[0].figures()
     seconds = scene.simulation.loop.now_us() / 1e6
-    assert (bay.cars_in, bay.cars_out) == (2, 2)
+    assert (bay.cars_in, bay.cars_out) == (3, 2)
     assert bay.free + bay.person + bay.door + bay.shuttle + bay.robot == pytest.approx(1)
     # The output door is the shuttle's as long as it stands open, by its own word.
     opened_s, since_us = 0.0, 0
@@ -267,11 +269,16 @@ def test_each_compartments_time_is_told_by_what_holds_its_bay() -> None:
             opened_s += (time_us - since_us) / 1e6
         since_us = time_us if doors.output_door is DoorPosition.OPEN else 0
     assert bay.shuttle * seconds == pytest.approx(opened_s, abs=0.1) and opened_s > 60
-    # The second car waits outside from its coming until the first is gone; each owner asks until the car is there.
+    # Others wait outside until the car before theirs is gone; each owner asks until the car is there.
     streets = [customer.visit for customer in scene.simulation.plant.street.customers]
     asked_s = sum(visit.out_wait_us or 0 for visit in streets) / 1e6
-    assert bay.queue_most == 1 and 30 < bay.queue_mean * seconds < (streets[1].in_wait_us or 0) / 1e6
+    queued_s = sum(visit.in_wait_us or 0 for visit in streets[1:]) / 1e6
+    assert bay.queue_most == 1 and 30 < bay.queue_mean * seconds < queued_s
     assert bay.asking_most == 1 and asked_s - 80 < bay.asking_mean * seconds < asked_s
     # It was free for hours while nobody could use it, and never for long while somebody could.
     assert bay.free > 0.5 and bay.idle == 0
+    # The third finds it locked for the second, until its robot is there.
+    locked_us, _ = scene.first(DoorState, lambda one: one.input_door is DoorPosition.LOCKED, after_us=712_000_000)
+    opened_us, _ = scene.first(DoorState, lambda one: one.output_door is DoorPosition.OPENING, after_us=712_000_000)
+    assert bay.kept * seconds == pytest.approx((opened_us - locked_us) / 1e6, abs=1) and bay.kept < bay.robot
     assert bay_lines((bay,))[1].startswith(f"{bay.compartment} ")

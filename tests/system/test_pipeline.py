@@ -9,6 +9,7 @@ from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import CallResult, DeskInput, DoorPosition, LightColour, Operation, TaskPhase
 from onboard.contract.messages import Award, BayState, CallForProposals, DeskEvent, DoorState, Message, TaskReport
+from onboard.systems.car_park.pipeline import MOST_OUT
 from onboard.ways.site import way_site
 from tests.sites import at_arrival, at_the_key, one_floor
 from tests.system.scene import Scene, play, stays
@@ -104,6 +105,16 @@ def test_a_loaded_robot_before_a_bay_in_which_another_car_waits_does_not_block_i
     done = [one for _, one in scene.all(TaskReport, "fleet") if one.phase is TaskPhase.DONE]
     stations = [one.station for one in done if one.task in {call.task for call in fetched}]
     assert len(stations) == 2 and stations[0] != bay.number == stations[1]
+
+
+def test_drivers_who_cannot_be_seen_outside_are_let_in_between_the_cars_that_go_out() -> None:
+    """All are asked for at once, and a driver comes meanwhile: he is passed over for three, not for all of them."""
+    parked = [(75 * number, 340) for number in range(MOST_OUT + 1)]
+    scene = play(at_arrival(one_floor()), stays(*parked, (350, None)), extra_s=30)
+    assert_served(scene, len(parked) + 1, len(parked))
+    *fetched, comes = (customer.visit for customer in scene.simulation.plant.street.customers)
+    gone = [visit.gone_us for visit in fetched if visit.gone_us is not None]
+    assert comes.parked_us is not None and sum(gone_us < comes.parked_us for gone_us in gone) == MOST_OUT
 
 
 def restarted(at_s: float, demand: Demand) -> Scene:

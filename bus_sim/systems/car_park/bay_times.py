@@ -29,10 +29,12 @@ class BayHold(Enum):
 
 @dataclass(frozen=True)
 class BayFigures:
-    """One compartment: cars, and shares of time, 0 to 1, that make 1 together without ``idle``.
+    """One compartment: cars, and shares of time, 0 to 1, that make 1 together without ``idle`` and ``kept``.
 
     ``idle`` is the part of ``free`` that lasted for more than ``IDLE_AFTER_US`` while somebody queued with a car or a
-    loaded robot stood before the bay. ``queue`` counts cars outside, ``asking`` people who wait for theirs.
+    robot stood before the bay with a car for it; ``kept`` the part of ``robot`` that lasted so long with a bay locked
+    and empty, for a car that is on its way, while somebody queued. ``queue`` counts cars outside, ``asking`` people who
+    wait for theirs.
     """
 
     compartment: str
@@ -40,6 +42,7 @@ class BayFigures:
     cars_out: int
     free: float
     idle: float
+    kept: float
     person: float
     door: float
     shuttle: float
@@ -57,9 +60,10 @@ class _Bay:
     hold: BayHold = BayHold.FREE
     since_us: int = 0
     held_us: Counter[BayHold] = field(default_factory=Counter)
-    #: Since when it is free though somebody could use it.
-    wasted_from_us: int | None = None
-    idle_us: int = 0
+    #: Whether nobody is in it though somebody could use it, since when, and for how long in all.
+    wasted: BayHold | None = None
+    wasted_from_us: int = 0
+    wasted_us: Counter[BayHold] = field(default_factory=Counter)
     cars_in: int = 0
     cars_out: int = 0
     #: Waiting now, their time in all, and most at once: with a car outside, with a ticket.
@@ -100,7 +104,8 @@ class BayTimes:
             compartment=self._names[node],
             cars_in=bay.cars_in,
             cars_out=bay.cars_out,
-            idle=bay.idle_us / span_us,
+            idle=bay.wasted_us[BayHold.FREE] / span_us,
+            kept=bay.wasted_us[BayHold.ROBOT] / span_us,
             queue_mean=bay.waited_us[0] / span_us,
             queue_most=bay.most[0],
             asking_mean=bay.waited_us[1] / span_us,
@@ -129,21 +134,28 @@ class BayTimes:
         states = Counter(customer.state for customer in self._plant.street.waiting(node))
         bay.waiting = states[CustomerState.QUEUEING], states[CustomerState.AT_DESK]
         bay.most = max(bay.most[0], bay.waiting[0]), max(bay.most[1], bay.waiting[1])
-        wasted = bay.hold is BayHold.FREE and (bay.waiting[0] > 0 or self._is_loaded_before(compartment))
-        if bay.wasted_from_us is not None:
-            begin_us = max(bay.wasted_from_us, self._begin_us)
-            if now_us - begin_us > IDLE_AFTER_US and not wasted:
-                bay.idle_us += now_us - begin_us
-        if not wasted:
-            bay.wasted_from_us = None
-        elif bay.wasted_from_us is None:
-            bay.wasted_from_us = now_us
+        wasted = self._wasted(bay, compartment)
+        if wasted is bay.wasted:
+            return
+        passed_us = now_us - max(bay.wasted_from_us, self._begin_us)
+        if bay.wasted is not None and passed_us > IDLE_AFTER_US:
+            bay.wasted_us[bay.wasted] += passed_us
+        bay.wasted, bay.wasted_from_us = wasted, now_us
 
-    def _is_loaded_before(self, compartment: CompartmentPlant) -> bool:
-        """Whether a robot stands before the bay with a car."""
+    def _wasted(self, bay: _Bay, compartment: CompartmentPlant) -> BayHold | None:
+        """How nobody is in a bay that somebody could use: invited to it, or shut out."""
+        is_queue = bay.waiting[0] > 0
+        if bay.hold is BayHold.FREE:
+            return BayHold.FREE if is_queue or self._is_brought(compartment) else None
+        return BayHold.ROBOT if bay.hold is BayHold.ROBOT and is_queue and compartment.is_empty else None
+
+    def _is_brought(self, compartment: CompartmentPlant) -> bool:
+        """Whether a robot stands before the bay with a car whose owner asks for it there, not with one from the bay."""
         world = self._plant.world
         robot = world.robot_before(compartment.body.station)
-        return robot is not None and world.car_aboard(robot) is not None
+        car = None if robot is None else world.car_aboard(robot)
+        askers = (one for one in self._plant.street.waiting(compartment.node_id) if one.state is CustomerState.AT_DESK)
+        return car is not None and any(asker.stay.car == car for asker in askers)
 
 
 def held_by(compartment: CompartmentPlant) -> BayHold:
@@ -161,14 +173,14 @@ def held_by(compartment: CompartmentPlant) -> BayHold:
 
 def bay_lines(bays: tuple[BayFigures, ...]) -> list[str]:
     """The figures as a person reads them: a row for each compartment."""
-    head = "bay       in   out   free  idle person  door shuttle no robot  queue most  asking most"
+    head = "bay       in   out   free  idle  kept person  door shuttle no robot  queue most  asking most"
     return [head, *(_line(one) for one in bays)] if bays else []
 
 
 def _line(bay: BayFigures) -> str:
-    shares = (bay.free, bay.idle, bay.person, bay.door, bay.shuttle, bay.robot)
+    shares = (bay.free, bay.idle, bay.kept, bay.person, bay.door, bay.shuttle, bay.robot)
     return (
         f"{bay.compartment:<7}{bay.cars_in:>5}{bay.cars_out:>6}"
-        + "".join(f"{share:>{width}.1%}" for share, width in zip(shares, (7, 6, 7, 6, 8, 9), strict=True))
+        + "".join(f"{share:>{width}.1%}" for share, width in zip(shares, (7, 6, 6, 7, 6, 8, 9), strict=True))
         + f"{bay.queue_mean:>7.1f}{bay.queue_most:>5}{bay.asking_mean:>8.1f}{bay.asking_most:>5}"
     )

@@ -2,7 +2,8 @@
 
 With drivers one behind the other outside, cars go in and out by turns: the robot that brings one finds the bay locked
 and empty behind the robot that took the other. Without a queue the next car is called for while a driver still gets
-into his own. ``call_at = "key"`` in the site file leaves all this out (row P50's order).
+into his own; drivers, who cannot be seen outside, are invited after ``MOST_OUT`` cars at the latest. ``call_at =
+"key"`` in the site file leaves all this out (row P50's order).
 """
 
 from collections import deque
@@ -18,9 +19,13 @@ from onboard.systems.car_park.bay_memory import BayMemory, ahead_record
 from onboard.systems.car_park.bay_task import BayPhase, BayTask
 from onboard.systems.car_park.site import ANY_CLASS, CallAt, CarPark
 from onboard.ways.mirror import WayFleet
+from onboard.ways.site import BayUse
 
 #: A driver who waits outside drives in within this once he is invited, us: a second to see it, and one to begin.
 QUEUED_US = 2_500_000
+#: So many cars go out one behind the other while nobody looked for drivers: a look costs ``QUEUED_US`` and the lead of
+#: the next car's robot, some 25 s, a tenth of three of the 53 to 99 s that a car takes a bay (docs/decisions.md).
+MOST_OUT = 3
 #: From driving in until the input door begins to lock, us: a drive of 10 to 30 s and a walk of 4 to 8 s on average.
 ENTERED_US = 26_000_000
 #: Who drives in has pressed the key within this, us: the longest drive, and a person's patience once.
@@ -41,6 +46,9 @@ class Pipeline:
     is_queued: bool = False
     #: Who comes in has until then to press the key; 0 while the bay is empty.
     entering_until_us: int = 0
+    #: Cars that have gone out since drivers were last invited.
+    outs: int = 0
+    _looked_us: int = 0
 
     @property
     def is_on(self) -> bool:
@@ -51,8 +59,18 @@ class Pipeline:
         """When whoever comes in has not pressed the key, or a driver who was invited has not come."""
         if phase is BayPhase.ENTERING:
             return self.entering_until_us
-        waits = self.is_queued and self.free_from_us is not None and self.tickets
-        return self.free_from_us + QUEUED_US if waits and self.free_from_us is not None else None
+        waits = self._is_drivers_turn and bool(self.tickets or self.calls.ahead)
+        if phase is not BayPhase.FREE or self.free_from_us is None or not waits:
+            return None
+        due_us = self.free_from_us + QUEUED_US
+        # Somebody in the bay, or a door that does not stay open: whatever ends that is told.
+        return due_us if due_us > self._looked_us else None
+
+    @property
+    def _is_drivers_turn(self) -> bool:
+        """Drivers come one behind the other, or might: nobody has looked for long."""
+        is_exit = self.park.bay_uses.get(self.fleet.node_id) is BayUse.EXIT
+        return self.is_queued or (self.outs >= MOST_OUT and not is_exit)
 
     # --- a driver comes in -------------------------------------------------------------------------------------
 
@@ -62,6 +80,7 @@ class Pipeline:
             return []
         if self.free_from_us is not None:
             self.is_queued, self.free_from_us = now_us - self.free_from_us <= QUEUED_US, None
+            self.outs = 0
         is_told_by_size = bool(self.park.classes) or self.park.measures_width
         if self.entering_until_us or is_told_by_size or not bay_task.has_room(ANY_CLASS, self.park, self.fleet.mirror):
             return []
@@ -81,17 +100,18 @@ class Pipeline:
             return has_task or (bool(self.tickets) and custody.place_of(self.fleet, self.tickets[0]) is not None), []
         self.entering_until_us = 0
         self.free_from_us = now_us if self.free_from_us is None else self.free_from_us
-        if self.is_queued and now_us - self.free_from_us < QUEUED_US:
-            # Drivers come one after the other, and it is their turn.
+        was_open_for_all = now_us - self.free_from_us >= QUEUED_US
+        if self._is_drivers_turn and not was_open_for_all:
             return False, []
-        self.is_queued = False
-        if self.calls.ahead is not None:
-            return True, []
-        called = self.call(now_us, now_us)
-        return bool(called), called
+        self.is_queued, self.outs = False, 0 if was_open_for_all else self.outs
+        called = [] if self.calls.ahead is not None else self.call(now_us, now_us)
+        is_out = self.calls.ahead is not None
+        self.outs += is_out
+        return is_out, called
 
     def look_ahead(self, phase: BayPhase, now_us: int) -> list[Effect]:
         """Call for the next car while the bay still works, once it is known when it can take it."""
+        self._looked_us = now_us
         job = self.calls.job
         if job is None or self.calls.ahead is not None or not self.tickets or not self.is_on:
             return []
@@ -99,7 +119,7 @@ class Pipeline:
         if job.operation is Operation.PARK:
             taken_us = self.calls.taken_at_us(now_us) if job.winner and not job.is_given_back else None
             return [] if taken_us is None else self.call(max(taken_us, now_us) + door_us, now_us)
-        is_over_soon = phase is BayPhase.HANDOVER and not self.is_queued
+        is_over_soon = phase is BayPhase.HANDOVER and not self._is_drivers_turn
         return self.call(now_us + DRIVER_US + door_us, now_us) if is_over_soon else []
 
     def call(self, ready_us: int, now_us: int) -> list[Effect]:
