@@ -59,7 +59,11 @@ class ItineraryLeg(SetFrame):
 
 @message(frozen=True, slots=True)
 class Progress(Message):
-    """Where the body of a machine is: sent when it enters a segment, starts or stops."""
+    """Where the body of a machine is.
+
+    Sent where it stops, at the first border after that, before it gives back what it left, and else where the last
+    word is 8 s old.
+    """
 
     #: Firm itinerary under way; of a lift: bits 7 to 0 of the version of its gate's token, as it last moved. 0 to 255.
     itinerary_version: int

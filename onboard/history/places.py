@@ -44,7 +44,12 @@ class Places:
         """Take up one word, at a time of the log in us."""
         before = self.by_node.get(progress.sender)
         segment = Segment(progress.track, progress.index)
-        passed = 0 if before is None else before.passed + (segment != before.segment)
+        passed = 0 if before is None else before.passed + _segments(before.segment, segment)
         place = Place(segment, progress.offset_mm, progress.speed_mm_s, time_us, passed)
         self.by_node[progress.sender] = place
         return PlaceTold(progress.sender, place, before)
+
+
+def _segments(before: Segment, now: Segment) -> int:
+    """From one to the other; to another track it is one, and not each is told while a machine moves."""
+    return abs(now.index - before.index) if now.track == before.track else 1

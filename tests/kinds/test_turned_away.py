@@ -24,7 +24,7 @@ def given(effects: list[Effect]) -> set[int]:
 def sent_to_6() -> Carriage:
     """It drives from p(1,2) to p(1,6), which it holds with all between."""
     one = carriage()
-    one.sense(DriveState(ROBOT, 1, PITCH_MM, 0, DriveMode.STANDING, True, False), 0, 1, 0)
+    one.sense(DriveState(ROBOT, 1, PITCH_MM, 0, DriveMode.STANDING, True, False), 0)
     one.go(Segment(1, 6))
     one.advance(0)
     for index in range(2, 7):
@@ -35,7 +35,7 @@ def sent_to_6() -> Carriage:
 
 def test_who_drives_keeps_the_slots_up_to_where_it_was_sent_when_its_way_leads_elsewhere() -> None:
     one = sent_to_6()
-    one.sense(driving(3, 1_500, one.sequence), 1_000, 1, 0)
+    one.sense(driving(3, 1_500, one.sequence), 1_000)
     one.go(Segment(1, 1))
     get(one, Segment(1, 1))
     assert orders(one.advance(1_000)) == [(0, False)]
@@ -45,11 +45,11 @@ def test_who_drives_keeps_the_slots_up_to_where_it_was_sent_when_its_way_leads_e
 
 def test_who_was_turned_back_keeps_the_slots_in_which_it_brakes() -> None:
     one = sent_to_6()
-    one.sense(driving(3, 1_500, one.sequence), 1_000, 1, 0)
+    one.sense(driving(3, 1_500, one.sequence), 1_000)
     one.go(Segment(1, 1))
     get(one, Segment(1, 1))
     assert orders(one.advance(1_000)) == [(0, False)]
-    one.sense(driving(3, 1_500, one.sequence), 2_000, 1, 0)
+    one.sense(driving(3, 1_500, one.sequence), 2_000)
     # 1,500 mm/s at 500 mm/s2 are 2,250 mm: the next slot, and not the one after it.
     effects = one.advance(2_000)
     left = {slot.index for slot in one.left.slots} - {HOME}

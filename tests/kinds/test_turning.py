@@ -56,7 +56,7 @@ def places(effects: list[Effect]) -> list[tuple[int, int, int]]:
 def in_mouth() -> Carriage:
     """It stands in the mouth, which it holds, and is to go into the spur."""
     one = carriage()
-    one.sense(state(MOUTH_MM), 0, 1, 0)
+    one.sense(state(MOUTH_MM), 0)
     one.go(MOUTH)
     one.advance(0)
     get(one, MOUTH)
@@ -71,8 +71,8 @@ def test_without_the_spur_it_asks_and_stands_on_the_alley_as_before() -> None:
     assert asked == [INSIDE.number] and orders(effects) == []
     assert one.occupied() == [MOUTH]
     # The drive says again slowly where it is; it is no news, and the fleet is told of the alley.
-    assert places(one.sense(state(MOUTH_MM), 1, 1, 1)) == []
-    assert places(one.statement(1, 1)) == [(1, 7, 0)]
+    assert places(one.sense(state(MOUTH_MM), 1)) == []
+    assert places(one.statement(0)) == [(1, 7, 0)]
 
 
 def test_with_both_it_is_sent_in_and_tells_of_the_turn() -> None:
@@ -80,12 +80,12 @@ def test_with_both_it_is_sent_in_and_tells_of_the_turn() -> None:
     one.advance(0)
     get(one, INSIDE)
     assert orders(one.advance(0)) == [(0, True)]
-    assert places(one.sense(state(MOUTH_MM, DriveMode.TURNING), 1, 1, 1)) == [(192, 0, 0)]
+    assert places(one.sense(state(MOUTH_MM, DriveMode.TURNING), 1)) == [(192, 0, 0)]
     assert set(one.occupied()) == {MOUTH, INSIDE}
-    one.sense(state(-PITCH_MM, DriveMode.MOVING, across=True), 2, 1, 1)
-    one.sense(state(0, across=True), 3, 1, 1)
+    one.sense(state(-PITCH_MM, DriveMode.MOVING, across=True), 2)
+    one.sense(state(0, across=True), 3)
     assert [one.arrived] == [False], "it has not heard the last order yet"
-    one.sense(state(0, across=True, sequence=one.sequence), 3, 1, 1)
+    one.sense(state(0, across=True, sequence=one.sequence), 3)
     assert (one.arrived, one.occupied()) == (True, [INSIDE])
     given = [e.message for e in one.advance(3) if isinstance(e, Send) and isinstance(e.message, TokenGrant)]
     assert [(m.token, m.holder) for m in given] == [(MOUTH.number, STEWARD)]
@@ -95,15 +95,15 @@ def test_out_it_drives_into_the_mouth_first_and_then_turns() -> None:
     one = in_mouth()
     one.advance(0)
     get(one, INSIDE)
-    one.sense(state(0, across=True), 1, 1, 1)
+    one.sense(state(0, across=True), 1)
     one.go(MOUTH)
     assert orders(one.advance(1)) == [(-PITCH_MM, True)]
-    one.sense(state(-PITCH_MM, across=True), 2, 1, 2)
+    one.sense(state(-PITCH_MM, across=True), 2)
     assert [one.arrived] == [False]
     assert orders(one.advance(2)) == [(MOUTH_MM, False)]
-    one.sense(state(-PITCH_MM, DriveMode.TURNING, across=True), 3, 1, 2)
+    one.sense(state(-PITCH_MM, DriveMode.TURNING, across=True), 3)
     assert orders(one.advance(3)) == [], "the same order stands"
-    assert places(one.sense(state(MOUTH_MM, sequence=one.sequence), 4, 1, 2)) == [(1, 7, 0)]
+    assert places(one.sense(state(MOUTH_MM, sequence=one.sequence), 4)) == [(1, 7, 0)]
     assert (one.arrived, one.track) == (True, 1)
 
 
@@ -115,7 +115,7 @@ def test_a_way_given_up_before_the_turn_leaves_it_on_the_alley() -> None:
 
 def test_turned_into_some_spur_that_nobody_remembers_it_is_nowhere_known() -> None:
     one = carriage()
-    assert one.sense(state(0, across=True), 0, 0, 0) == []
+    assert one.sense(state(0, across=True), 0) == []
     one.go(Segment(1, 5))
     assert one.standing_at is None and one.occupied() == [] and orders(one.advance(0)) == []
 

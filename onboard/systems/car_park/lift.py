@@ -30,7 +30,7 @@ from onboard.systems.car_park.bay_memory import BayMemory
 from onboard.systems.car_park.lift_generation import LiftGeneration
 from onboard.systems.car_park.lift_steps import LIFT_TABLE, LiftDeed, LiftFinding, LiftPhase
 from onboard.systems.car_park.records import RideOverRecord, RideRecord
-from onboard.systems.car_park.stall import Stall
+from onboard.systems.car_park.stall import MOVES, PlaceWords, Stall
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.ways.lifts import MARK_TOLERANCE_MM, gate, nearest_stop, platform, stop_mm, under_gate
 from onboard.ways.mirror import WayFleet
@@ -66,7 +66,9 @@ class Lift:
     _is_stuck: bool = False
     #: The drive's orders: a position in the shaft, mm.
     link: DeviceLink[int] = field(init=False)
-    _told: tuple[int, DriveMode, int] | None = None
+    _told: PlaceWords[int] = field(default_factory=PlaceWords)
+    #: Under which version of the gate it said so last, while that was out.
+    _proved: int | None = None
     _gate_was_out: bool = False
     _made: dict[int, int] = field(default_factory=dict)
     _rides_with_me: dict[int, tuple[Itinerary, bool]] = field(default_factory=dict)
@@ -123,15 +125,17 @@ class Lift:
         self.drive = message
         self.stall.sensed(message.position_mm, now_us)
         self.generation.index = self._index()
-        return self._tell()
+        return self._tell(now_us)
 
-    def _tell(self) -> list[Effect]:
-        """Say where the platform is, once for each floor, mode and version of the gate."""
+    def _tell(self, now_us: int) -> list[Effect]:
+        """Say where the platform stops or has come to, and once under each version by which the gate is out."""
         assert self.drive is not None
-        told = (self._index(), self.drive.mode, self._gate_version)
-        if told == self._told:
+        index, proves = self._index(), None if self._holds_gate() else self._gate_version
+        is_proof = proves is not None and proves != self._proved
+        if not self._told.is_news(index, self.drive.mode, now_us) and not is_proof:
             return []
-        self._told = told
+        self._told.last = (index, self.drive.mode in MOVES, now_us)
+        self._proved = proves
         return [self._word(self.drive)]
 
     @property
@@ -195,7 +199,7 @@ class Lift:
         effects += self._step(now_us)
         if not self._holds_gate():
             # Who has it goes by no word but one that was said since.
-            effects += self._tell()
+            effects += self._tell(now_us)
         return effects
 
     def next_wake(self) -> int | None:

@@ -101,6 +101,7 @@ class ParkingRobot:
         self.carriage = Carriage(self.fleet, self.fleet.machine.home.track)
         self.shuttle = ShuttleWork(self.fleet)
         self.carriage.is_clear = lambda: self.shuttle.is_home
+        self.carriage.in_hand = lambda: (self.program.version, self.program.leg)
         self.carriage.route_ahead = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
         self.riding = Riding(self.fleet)
         self.recovery = JournalRecovery.read(self.fleet.node_id, self.fleet.entries)
@@ -148,7 +149,7 @@ class ParkingRobot:
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """States of drive and shuttle; a shuttle that fails stops the robot for good."""
         if isinstance(message, DriveState):
-            return self.carriage.sense(message, now_us, self.program.version, self.program.leg)
+            return self.carriage.sense(message, now_us)
         if isinstance(message, ShuttleState):
             effects = self.shuttle.sense(message, now_us)
             if self.shuttle.fault and self._fault is Reason.NONE:
@@ -344,7 +345,7 @@ class ParkingRobot:
         effects: list[Effect] = []
         itinerary = self.fleet.mirror.itineraries.get(self.fleet.node_id)
         if itinerary is not None:
-            effects += [Send(itinerary), *self.carriage.statement(self.program.version, self.program.leg)]
+            effects += [Send(itinerary), *self.carriage.statement(now_us)]
         # An initiator that was restarted learns that its task is in hand.
         effects += self._taken_on(self.program.works())
         effects += custody.statements(self.fleet) + self.holding.manual.statement()
@@ -407,8 +408,7 @@ class ParkingRobot:
                 # Before the turn: the drive tells only that it is across, not in which spur.
                 return [floor_record(step.track)]
         elif step.action is LegAction.RIDE:
-            told = self.carriage.statement(self.program.version, self.program.leg)
-            return [ride_record(step), *told, *self.riding.begin(step.track, step.to_index)]
+            return [ride_record(step), *self.carriage.statement(now_us), *self.riding.begin(step.track, step.to_index)]
         else:
             # A way that was given up while its rights were awaited is not gone when they come.
             self.carriage.go(step.destination)

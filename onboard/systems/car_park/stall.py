@@ -1,11 +1,23 @@
-"""A drive that does not do what it is told: its machine is an obstacle until it moves (issue 4, point 3)."""
+"""What the words of a drive come to: whether it does what it is told, and when its place is told to the others.
+
+One that does not makes its machine an obstacle until it moves (issue 4, point 3).
+"""
 
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
+from onboard.contract.codes import DriveMode
 from onboard.core.behaviour import NEVER_US
 
 #: A drive that has orders and has not moved for so long is stuck, us: brakes and locks take less.
 STALL_US = 8_000_000
+#: A word on the way is said where the last is this old, us: plan and speed tell the rest, a segment goes back after the
+#: word, and who is thought to stand is given 20 s (``onboard/ways/standing.py``).
+PLACE_US = 8_000_000
+
+MOVES = (DriveMode.MOVING, DriveMode.BRAKING)
+
+Place = TypeVar("Place")
 
 
 @dataclass
@@ -38,3 +50,19 @@ class Stall:
     def is_stuck(self, now_us: int) -> bool:
         """Whether it has not by now."""
         return self._since_us is not None and now_us - self._since_us >= STALL_US
+
+
+@dataclass
+class PlaceWords(Generic[Place]):
+    """What one machine said last of its place, which tells what is news (contract 2, Places). Bus time in us."""
+
+    #: Where it was by that, whether it moved, and when it said so; whoever says a place, on whatever occasion, sets it.
+    last: tuple[Place | None, bool, int] = (None, False, 0)
+    _mode: DriveMode | None = None
+
+    def is_news(self, place: Place, mode: DriveMode, now_us: int) -> bool:
+        """Whether the drive's state is to be told: it stops, or comes to the first other place since, or long after."""
+        stops = mode not in MOVES and mode is not self._mode
+        self._mode = mode
+        told, was_moving, said_us = self.last
+        return stops or (place != told and (not was_moving or now_us - said_us >= PLACE_US))

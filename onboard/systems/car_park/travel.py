@@ -23,7 +23,7 @@ from onboard.core.site import Segment
 from onboard.systems.car_park.axis import TrackAxis
 from onboard.systems.car_park.placing import Placing
 from onboard.systems.car_park.sill import SillProof
-from onboard.systems.car_park.stall import Stall
+from onboard.systems.car_park.stall import MOVES, PlaceWords, Stall
 from onboard.ways.all_or_none import AllOrNone
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.left_behind import LeftBehind
@@ -59,7 +59,7 @@ class Carriage:
     stopped: bool = False
     #: Where the drive was sent, by the order's sequence, since the one that it goes by: whatever the goal is by now.
     _sent: dict[int, Segment] = field(default_factory=dict)
-    _reported: Segment | None = None
+    _told: PlaceWords[Segment] = field(default_factory=PlaceWords)
     #: What ``advance`` looked at when it last found nothing to do.
     _settled: tuple[object, ...] | None = None
     #: What permitted the last order.
@@ -68,6 +68,8 @@ class Carriage:
     _stood: tuple[DriveState | None, tuple[int, int], Segment | None] | None = None
     #: Slots behind the goal up to the next refuge, for a way without an agreed order; the robot knows its next legs.
     route_ahead: Callable[[], list[Segment]] = list
+    #: Version of the itinerary as told, and the leg of it in hand.
+    in_hand: Callable[[], tuple[int, int]] = lambda: (0, 0)
     #: Whether nothing stands out of the carrier, by its sensors: it gets no order to move else (row P32).
     is_clear: Callable[[], bool] = lambda: True
     whole: AllOrNone = field(init=False)
@@ -154,7 +156,7 @@ class Carriage:
         self._sent.clear()
         self.goal = None
         self.target = None
-        self._reported = None
+        self._told.last = (None, False, 0)
 
     def occupied(self) -> list[Segment]:
         """Slots that the body is in now, with the gate where it is across a sill; empty where it is unknown."""
@@ -177,8 +179,8 @@ class Carriage:
         offset_mm = state.position_mm - self.axis.position_mm(index)
         return self._in_mouth or Segment(self.track, index), offset_mm
 
-    def sense(self, state: DriveState, now_us: int, itinerary_version: int, leg: int) -> list[Effect]:
-        """Take up the drive's state: tell the fleet when the body is in another segment, starts or stops."""
+    def sense(self, state: DriveState, now_us: int) -> list[Effect]:
+        """Take up the drive's state: tell the fleet where the body stops, and now and then where it has come to."""
         if self.placing.is_far_off(state, self.track):
             self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
@@ -191,26 +193,31 @@ class Carriage:
         if placed is None:
             # Turned into some spur, but nobody remembers which.
             return []
-        here, _ = self._told_at(placed)
-        started_or_stopped = before is None or before.mode is not state.mode
-        if here == self._reported and not started_or_stopped:
-            return []
-        return self.statement(itinerary_version, leg)
+        now, known = self._progress(), self.fleet.mirror.progress.get(self.fleet.node_id)
+        here = Segment(now.track, now.index)
+        if self._told.is_news(here, placed.mode, now_us):
+            return self.statement(now_us)
+        if known is not None and here != (known.track, known.index):
+            # It counts for me before others hear it: I give what lies behind to who asks.
+            self.fleet.mirror.on_progress(now)
+        return []
 
-    def statement(self, itinerary_version: int, leg: int) -> list[Effect]:
-        """Where the body is, in leg ``leg`` of the itinerary as told; nothing where no position is known.
+    def statement(self, now_us: int) -> list[Effect]:
+        """Where the body is, in the leg in hand of the itinerary as told; nothing where no position is known.
 
         A journal that is lost knew the track, which the drive does not know: who makes its rights anew tells it.
         """
         if self.sensed is None or self.fleet.has_no_rights or self.fleet.slots_told:
             return []
-        here, offset_mm = self._told_at(self.sensed)
-        self._reported = here
-        progress = Progress(
-            self.fleet.node_id, itinerary_version, leg, here.track, here.index, offset_mm, self.sensed.speed_mm_s
-        )
+        progress = self._progress()
+        self._told.last = (Segment(progress.track, progress.index), self.sensed.mode in MOVES, now_us)
         self.fleet.mirror.on_progress(progress)
         return [Send(progress)]
+
+    def _progress(self) -> Progress:
+        assert self.sensed is not None
+        (track, index), offset_mm = self._told_at(self.sensed)
+        return Progress(self.fleet.node_id, *self.in_hand(), track, index, offset_mm, self.sensed.speed_mm_s)
 
     def go(self, goal: Segment) -> None:
         """Set the goal; ``advance`` does the rest."""
@@ -445,7 +452,7 @@ class Carriage:
         return permit.order(order)
 
     def _give_back(self, now_us: int) -> list[Effect]:
-        """Return segments that the body has left and does not need again before its goal.
+        """Return segments that the body has left and does not need again before its goal, once it says where it is.
 
         Aboard a lift the gate stays: returned, it lets the platform move, and that only a ride may ask for. Else a
         controller that starts again aboard would take the floor of its journal for the one where it is.
@@ -462,13 +469,19 @@ class Carriage:
                 tokens.forget(key)
         free = [slot for slot in map(slot_of, self._held_segments()) if slot not in needed]
         is_under_way = self.goal is not None and not self.arrived and self.target is not None
-        return self.left.give_back(free, now_us, is_under_way=is_under_way)
+        went = not set(self.left.slots) <= set(free)
+        return self._after_place(self.left.give_back(free, now_us, is_under_way=is_under_way), now_us, went=went)
 
     def _return_left(self, now_us: int) -> list[Effect]:
         self._turned = False
         if not self.left.slots:
             return []
-        return self.left.give_all({*self.occupied(), *self._may_come_to()}, now_us)
+        return self._after_place(self.left.give_all({*self.occupied(), *self._may_come_to()}, now_us), now_us)
+
+    def _after_place(self, given: list[Effect], now_us: int, *, went: bool = False) -> list[Effect]:
+        """What is given back, or ``went`` to who asked, after the word that the body has left it."""
+        is_elsewhere = self.sensed is not None and self._told_at(self.sensed)[0] != self._told.last[0]
+        return [*self.statement(now_us), *given] if (given or went) and is_elsewhere else given
 
     def _may_come_to(self) -> set[Segment]:
         """Slots up to where the drive may still be on its way, and those in which it brakes; none where it stands."""

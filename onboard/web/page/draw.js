@@ -62,14 +62,15 @@ export class Stage {
     return this.at(alley, index === 1 ? 0 : this.longest + 1).x;
   }
 
-  // Where a machine is now, in positions of its track.
+  // Where a machine is now, in positions of its track: it goes on as it said, as far as its plan's leg goes, or one position.
   position(machine, nowUs) {
     const track = this.tracks.get(machine.track);
     const pitch = track ? track.pitch_mm : 1;
     const told = machine.index + machine.offset_mm / pitch;
-    const passed = Math.max(0, nowUs - machine.since_us) / 1e6;
-    const moved = Math.max(-1, Math.min(1, (machine.speed_mm_s * passed) / pitch));
-    return told + moved;
+    const moved = (machine.speed_mm_s * Math.max(0, nowUs - machine.since_us)) / 1e6 / pitch;
+    const leg = machine.plan.find(([number, from, to]) => number === machine.track && (to - from) * moved > 0);
+    const most = leg ? Math.abs(leg[2] - told) : 1;
+    return told + Math.max(-most, Math.min(most, moved));
   }
 
   where(node, snapshot, nowUs) {
