@@ -83,7 +83,7 @@ def given(effects: list[Effect]) -> list[int]:
 
 def waiting(carriage: Carriage) -> list[Effect]:
     """At p(1,2) on its way to p(1,6), it waits for p(1,3), and has what is beyond."""
-    carriage.sense(turning.state(turning.PITCH_MM), 0, 1, 0)
+    carriage.sense(turning.state(turning.PITCH_MM), 0)
     turning.get(carriage, Segment(1, 2))
     carriage.go(Segment(1, 6))
     carriage.advance(0)

@@ -8,6 +8,10 @@ from onboard.core.site import Segment
 from onboard.ways.lifts import gate, lift_at, platform
 from onboard.ways.site import Track, WaySite
 
+#: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
+#: journal writes and frames.
+LOOKAHEAD_US = 3_000_000
+
 
 @dataclass(frozen=True)
 class TrackAxis:
@@ -32,6 +36,14 @@ class TrackAxis:
     def pitch_mm(self) -> int:
         """From one index to the next."""
         return self.track.pitch_mm
+
+    @cached_property
+    def soon(self) -> int:
+        """How many segments ahead a carrier needs soon: the braking distance, and what it travels while it asks."""
+        carrier = self.site.carrier
+        braking_mm = carrier.speed_mm_s**2 // (2 * carrier.acceleration_mm_s2)
+        ahead_mm = braking_mm + carrier.speed_mm_s * LOOKAHEAD_US // 1_000_000
+        return 2 + -(-ahead_mm // self.pitch_mm)
 
     @cached_property
     def mouths(self) -> dict[int, Segment]:

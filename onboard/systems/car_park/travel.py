@@ -4,8 +4,7 @@ The drive's target is always the centre of the last segment of an unbroken line 
 inside its authority at any moment; orders are repeated only while ``authorised`` still agrees, and a drive that hears
 nothing brakes by itself.
 
-Through a mouth a carrier turns into another track, and out of it there too (``placing``). In the mouth it needs that
-slot and the one inside before it turns.
+Through a mouth a carrier turns into another track (``placing``), and needs the mouth's slot and the one inside first.
 """
 
 from collections.abc import Callable, Iterable
@@ -32,9 +31,6 @@ from onboard.ways.mirror import WayFleet, slot_of
 from onboard.ways.refuges import refuges
 from onboard.ways.site import TrackKind
 
-#: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
-#: journal writes and frames.
-LOOKAHEAD_US = 3_000_000
 #: A holder's view of the order that has differed from mine for this long will not be mended by asking again, us:
 #: several answers have come and gone.
 ORDER_PATIENCE_US = 5_000_000
@@ -308,7 +304,7 @@ class Carriage:
         self.whole.passed(self.occupied())
         if self.whole.slots:
             return self.whole.advance(self.occupied(), now_us)
-        effects, tokens, soon = list[Effect](), self.fleet.tokens, self._lookahead_segments()
+        effects, tokens, soon = list[Effect](), self.fleet.tokens, self.axis.soon
         line = self.axis.rights(self._open(ahead))[: soon + MORE_AHEAD]
         if all(self._is_asked(slot) for slots in line[:soon] for slot in slots):
             return effects
@@ -377,12 +373,6 @@ class Carriage:
         if slot is None or holder == self.fleet.node_id or seen is None or (seen.track, seen.index) != slot:
             return ahead
         return ahead[: ahead.index(slot.index) + 1] if slot.track == self.track and slot.index in ahead else ahead
-
-    def _lookahead_segments(self) -> int:
-        axis = self.fleet.site.carrier
-        braking_mm = axis.speed_mm_s**2 // (2 * axis.acceleration_mm_s2)
-        ahead_mm = braking_mm + axis.speed_mm_s * LOOKAHEAD_US // 1_000_000
-        return 2 + -(-ahead_mm // self.fleet.site.tracks[self.track].pitch_mm)
 
     def _reach(self, ahead: list[int]) -> tuple[Segment | None, Permit, Reason]:
         """The last position of the unbroken authorised line and what permits it, or None; and why it ends there."""
