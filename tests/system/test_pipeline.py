@@ -8,7 +8,16 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import CallResult, DeskInput, DoorPosition, LightColour, Operation, TaskPhase
-from onboard.contract.messages import Award, BayState, CallForProposals, DeskEvent, DoorState, Message, TaskReport
+from onboard.contract.messages import (
+    Award,
+    BayState,
+    CallForProposals,
+    CarAt,
+    DeskEvent,
+    DoorState,
+    Message,
+    TaskReport,
+)
 from onboard.systems.car_park.pipeline import MOST_OUT
 from onboard.ways.site import way_site
 from tests.sites import at_arrival, at_the_key, one_floor
@@ -117,11 +126,11 @@ def test_drivers_who_cannot_be_seen_outside_are_let_in_between_the_cars_that_go_
     assert comes.parked_us is not None and sum(gone_us < comes.parked_us for gone_us in gone) == MOST_OUT
 
 
-def restarted(at_s: float, demand: Demand) -> Scene:
-    """The compartment loses its controller at ``at_s`` and gets it back with the same journal 3 s later."""
+def restarted(at_s: float, demand: Demand, name: str = "IOC1") -> Scene:
+    """A machine loses its controller at ``at_s`` and gets it back with the same journal 3 s later."""
 
     def plan(simulation: Simulation) -> None:
-        machine = simulation.site.machine("IOC1")
+        machine = simulation.site.machine(name)
 
         async def outage() -> None:
             await asyncio.sleep(at_s)
@@ -144,3 +153,13 @@ AHEAD_S = (311, 314, 316, 318, 320, 323, 327, 331, 336, 342, 350, 358, 366, 374,
 @pytest.mark.parametrize("at_s", some(AHEAD_S, 9))
 def test_a_compartment_killed_while_it_looks_ahead_goes_on_with_both(at_s: int) -> None:
     assert_served(restarted(at_s, stays((0, 305), (300, None))), 2, 1)
+
+
+def test_a_robot_killed_while_it_takes_a_car_that_was_called_for_unmeasured_knows_its_wheelbase() -> None:
+    """It stated a wheelbase of 0, and stopped for good (`small`, two crashes, seed 7711)."""
+    scene = play(at_arrival(find_site("small")), stays((0, None)))
+    loaded_us, loaded = scene.first(TaskReport, lambda one: one.phase is TaskPhase.LOADED)
+    robot = scene.simulation.site.machines[loaded.sender].name
+    killed = restarted(loaded_us / 1e6 - 1.0, stays((0, None)), robot)
+    assert_served(killed, 1, 0)
+    assert {one.wheelbase_mm for _, one in killed.all(CarAt)} == {one.wheelbase_mm for _, one in scene.all(CarAt)}

@@ -182,7 +182,9 @@ class ShuttleWork:
         self._ordered = ShuttleOrder(self.fleet.node_id, self.sequence, order, side, wheelbase_mm)
         self._unheard.ordered("shuttle")
         self.stall.ordered(now_us)
-        begun = StepRecord(self.phase, self.work.handling, self.work.station.number, self.work.car.number)
+        measured_mm = 0 if self.work.wheelbase_mm else wheelbase_mm
+        station, car = self.work.station.number, self.work.car.number
+        begun = StepRecord(self.phase, self.work.handling, station, car, measured_mm)
         return [Record(begun), *permit.order(self._ordered)]
 
     def _finish(self, work: StationWork, now_us: int) -> list[Effect]:

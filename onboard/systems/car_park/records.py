@@ -78,7 +78,10 @@ class HandledRecord(JournalRecord):
 
 @dataclass(frozen=True, slots=True)
 class StepRecord(JournalRecord):
-    """The shuttle's step that is about to be ordered; ``car`` is its number."""
+    """The shuttle's step that is about to be ordered; ``car`` is its number.
+
+    ``wheelbase_mm`` where the award had none: the car was called for before it was measured.
+    """
 
     NAME = "step"
     RULES = (Keep("step"),)
@@ -87,6 +90,7 @@ class StepRecord(JournalRecord):
     handling: CarHandling
     station: int
     car: int
+    wheelbase_mm: int = field(default=0, metadata=UNSAID)
 
 
 @dataclass(frozen=True, slots=True)

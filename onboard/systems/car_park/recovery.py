@@ -133,6 +133,8 @@ class JournalRecovery:
                 self.forget(record.task)
             case StepRecord():
                 self.phase, self.is_news = record.phase, False
+                measured_mm = record.wheelbase_mm
+                self.works[:1] = [one._replace(wheelbase_mm=measured_mm or one.wheelbase_mm) for one in self.works[:1]]
             case HandledRecord():
                 ended = (record.task, record.handling)
                 self.works = [one for one in self.works if (one.call.task, one.handling) != ended]
