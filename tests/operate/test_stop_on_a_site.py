@@ -5,7 +5,7 @@ from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import Reason
-from onboard.contract.messages import EmergencyStop, Go, Halted, Progress
+from onboard.contract.messages import DriveState, EmergencyStop, Go, Halted
 from onboard.operate.commands import CommandRequest, maker_of
 from tests.operate.played import Played, operates
 from tests.system.scene import Scene, play, stays
@@ -27,7 +27,8 @@ def played(*orders: tuple[float, CommandRequest], faults: tuple[str, ...] = ()) 
 
 
 def moving_s(scene: Scene, from_s: float, to_s: float) -> list[float]:
-    return [t / 1e6 for t, one in scene.all(Progress) if from_s < t / 1e6 < to_s and one.speed_mm_s]
+    """When drives told that they move: robots say on the fleet bus only now and then where they are."""
+    return [t / 1e6 for t, one in scene.all(DriveState) if from_s < t / 1e6 < to_s and one.speed_mm_s]
 
 
 def assert_all_served(scene: Scene) -> None:
