@@ -4,19 +4,18 @@ from functools import partial
 
 import pytest
 
-from bus_sim.run import FLEET
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import MachineState, Reason
 from onboard.contract.messages import (
     DoorOrder,
     DriveOrder,
+    DriveState,
     EmergencyStop,
     Go,
     Halted,
     Heartbeat,
     Message,
-    Progress,
     ShuttleOrder,
 )
 from onboard.wire.codec import fleet_codec
@@ -49,8 +48,9 @@ def orders(scene: Scene, from_s: float, to_s: float) -> list[Message]:
     return [one for kind in ORDERS for t, one in scene.all(kind) if from_s * 1e6 < t < to_s * 1e6]
 
 
-def moving(scene: Scene, from_s: float, to_s: float) -> list[Progress]:
-    return [one for t, one in scene.all(Progress, FLEET) if from_s * 1e6 < t < to_s * 1e6 and one.speed_mm_s]
+def moving(scene: Scene, from_s: float, to_s: float) -> list[DriveState]:
+    """What drives told while they moved: robots say on the fleet bus only now and then where they are."""
+    return [one for t, one in scene.all(DriveState) if from_s * 1e6 < t < to_s * 1e6 and one.speed_mm_s]
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,16 @@ from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import MachineState, ManualMode, Reason, ShuttleMode, TaskPhase
-from onboard.contract.messages import Bid, Heartbeat, ManualOrder, ManualState, Progress, ShuttleState, TaskReport
+from onboard.contract.messages import (
+    Bid,
+    DriveState,
+    Heartbeat,
+    ManualOrder,
+    ManualState,
+    Progress,
+    ShuttleState,
+    TaskReport,
+)
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import car_park
 from onboard.trace.story.why import WaitingStory
@@ -58,9 +67,11 @@ def rests_us(scene: Scene, node: int) -> int:
     return scene.first(ManualState, lambda state: state.sender == node and state.at_rest)[0]
 
 
-def moves(scene: Scene, node: int, from_us: float, to_us: float) -> list[Progress]:
-    told = [one for t, one in scene.all(Progress) if one.sender == node and from_us < t < to_us]
-    places = {(one.track, one.index) for one in told}
+def moves(scene: Scene, node: int, from_us: float, to_us: float) -> list[DriveState]:
+    """What its drive told while it moved: it says on the fleet bus only now and then where it is."""
+    name = scene.simulation.site.machines[node].name
+    told = [one for t, one in scene.all(DriveState, name) if from_us < t < to_us]
+    places = {one.position_mm for one in told}
     return [one for one in told if one.speed_mm_s or len(places) > 1]
 
 
@@ -114,7 +125,7 @@ def test_all_robots_held_at_once_are_no_stall_and_all_goes_on() -> None:
     scene = held(orders)
     scene.assert_sound()
     assert scene.simulation.plant.street.summary().parked == 3
-    assert not [one for t, one in scene.all(Progress) if one.sender in (FIRST, OTHER) and 80e6 < t < 420e6]
+    assert [moves(scene, node, 80e6, 420e6) for node in (FIRST, OTHER)] == [[], []]
 
 
 def test_an_order_said_again_is_only_answered_and_a_step_by_hand_changes_nothing() -> None:
