@@ -99,14 +99,14 @@ def test_no_package_imports_one_that_imports_it() -> None:
 
 @pytest.mark.parametrize("system", ["cell", "turning"])
 def test_a_system_without_ways_loads_none(system: str) -> None:
-    reached, todo = set[str](), [f"onboard.systems.{system}.system"]
-    while todo:
-        module = todo.pop()
+    reached, unread = set[str](), [f"onboard.systems.{system}.system"]
+    while unread:
+        module = unread.pop()
         path = ROOT.joinpath(*module.split("."))
         file = path.with_suffix(".py") if path.with_suffix(".py").is_file() else path / "__init__.py"
         if module in reached or not module.startswith("onboard.") or not file.is_file():
             continue
         reached.add(module)
         tree = ast.parse(file.read_text(encoding="utf-8"))
-        todo += [one.module for one in imports_of(tree, ROOT, module, is_package=file.name == "__init__.py")]
+        unread += [one.module for one in imports_of(tree, ROOT, module, is_package=file.name == "__init__.py")]
     assert not [module for module in reached if module.startswith("onboard.ways")]
