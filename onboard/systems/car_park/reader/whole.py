@@ -87,7 +87,7 @@ def _check_machines(root: TomlTable, bays: list[Bay]) -> None:
 
 def _check_joined(root: TomlTable, layout: Layout, site: CarPark, fleet: FleetReader, bays: list[Bay]) -> None:
     """That every alley can be reached from every other, so from every compartment and by every robot."""
-    groups = _joined_tracks(layout)
+    groups = _groups(layout)
     told = set()
     homes = {
         KindCode.COMPARTMENT: {bay.station.track if bay.station is not None else 0 for bay in bays},
@@ -112,7 +112,7 @@ def _check_joined(root: TomlTable, layout: Layout, site: CarPark, fleet: FleetRe
         root.bad("lifts", None, what, "join them by a lift, or write a site file for each")
 
 
-def _joined_tracks(layout: Layout) -> list[set[int]]:
+def _groups(layout: Layout) -> list[set[int]]:
     """The tracks in groups, between which one can drive or ride."""
     groups = [{alley.number} for alley in layout.alleys()]
     for track in layout.tracks.values():
