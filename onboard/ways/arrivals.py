@@ -49,7 +49,10 @@ class Arrivals(dict[tuple[Segment, int], Arriving]):
     def _forbidden(self, there: Segment, tail: int) -> list[tuple[int, int]]:
         """Arrivals that others forbid, in order: all between the last one before and the next one behind."""
         roads, departures = self._departures.roads, self._departures
-        held, found = departures.held_on(there.track), []
+        found: list[tuple[int, int]] = []
+        held = departures.held_on(there.track)
+        if not held and roads.lift_at(there) is None:
+            return found
         step, sweeps = roads.tails[tail]
         for offset, enter_us, leave_us in sweeps:
             windows = held.get(there.index + step * offset)

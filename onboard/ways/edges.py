@@ -8,7 +8,7 @@ where they leave no departure all longer runs are out of the question too. They 
 wherever they come from: when one may arrive is worked out once for all of them (``arrivals``).
 """
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Mapping
 
 from onboard.core.site import Segment
@@ -59,13 +59,20 @@ Edge = tuple[int, int, int, int, int, int, bool]
 #: What is left of a bound that was looked at.
 NO_EDGE: Edge = (0, 0, 0, 0, 0, 0, True)
 
+#: An index of a track and until when stopping there may pay.
+_Paying = tuple[int, int]
 #: Departures between which none is safe, both of them excluded.
 _Forbidden = tuple[int, int]
 
 
-def _forbidden(windows: Held, enter_us: int, leave_us: int) -> list[_Forbidden]:
-    """What others forbid by holding a segment that the move enters and leaves so long after its departure."""
-    return [(begin_us - leave_us, end_us - enter_us) for begin_us, end_us in zip(*windows, strict=True)]
+def _forbid(found: list[_Forbidden], windows: Held, times: tuple[int, int], edge: Edge) -> None:
+    """Add what others forbid of an edge's departures by holding a segment ``times`` after them: enter, leave."""
+    (begins, ends), (enter_us, leave_us) = windows, times
+    place, count = bisect_right(ends, edge[0] + enter_us), len(ends)
+    latest_us = edge[1] + leave_us
+    while place < count and (begin_us := begins[place]) < latest_us:
+        found.append((begin_us - leave_us, ends[place] - enter_us))
+        place += 1
 
 
 class _Shared:
@@ -85,35 +92,30 @@ class _Shared:
 
     def take(self, count: int) -> None:
         """Take the first ``count`` sweeps into account."""
-        from_us, to_us, known, held = self.from_us, self.to_us, self.known, self._held
+        from_us, to_us, clear_us, known = self.from_us, self.to_us, self.clear_us, self.known
+        held, longest, index, step = self._held, self._longest, self._index, self._step
         while known < count and from_us < to_us:
-            offset, enter_us, leave_us = self._longest[known]
+            offset, enter_us, leave_us = longest[known]
             known += 1
-            windows = held.get(self._index + self._step * offset)
+            windows = held.get(index + step * offset)
             if windows is None:
                 continue
             begins, ends = windows
-            meets = bisect_right(ends, from_us + enter_us)
-            if meets == len(ends):
+            meets, windows_count = bisect_right(ends, from_us + enter_us), len(ends)
+            if meets == windows_count:
                 continue
-            clear_us = begins[meets] - leave_us
-            if clear_us < from_us:
+            met_us = begins[meets] - leave_us
+            if met_us < from_us:
                 from_us = -((enter_us - ends[meets]) // _MS) * _MS
-                known, self.clear_us = 0, FOREVER
-            elif clear_us < to_us - 1:
-                self.clear_us = min(self.clear_us, clear_us)
-                to_us = _last_safe(windows, enter_us, leave_us, to_us)
-        self.from_us, self.to_us, self.known = from_us, to_us, known
-
-
-def _last_safe(windows: Held, enter_us: int, leave_us: int, to_us: int) -> int:
-    """The end of departures before ``to``, of which the last is safe: found as the first is, from the other side."""
-    begins, ends = windows
-    meets = bisect_right(ends, to_us - 1 + enter_us)
-    while meets < len(ends) and begins[meets] - leave_us < to_us - 1:
-        to_us = begins[meets] - leave_us + 1
-        meets = bisect_right(ends, to_us - 1 + enter_us)
-    return to_us
+                known, clear_us = 0, FOREVER
+            elif met_us < to_us - 1:
+                clear_us = min(clear_us, met_us)
+                # The last safe departure before the end is found as the first is, from the other side.
+                meets = bisect_right(ends, to_us - 1 + enter_us, meets)
+                while meets < windows_count and begins[meets] - leave_us < to_us - 1:
+                    to_us = begins[meets] - leave_us + 1
+                    meets = bisect_right(ends, to_us - 1 + enter_us)
+        self.from_us, self.to_us, self.clear_us, self.known = from_us, to_us, clear_us, known
 
 
 def _cut(edge: Edge, clear_us: int) -> list[Edge]:
@@ -134,7 +136,7 @@ class Edges:
         #: All states that were asked for, by their numbers.
         self.numbered: list[State] = []
         self._states: dict[Segment, list[State]] = {}
-        self._until_us: dict[int, dict[int, int]] = {}
+        self._paying: dict[int, list[_Paying]] = {}
         self._arrivals = Arrivals(departures, self.states)
 
     def states(self, segment: Segment) -> list[State]:
@@ -156,7 +158,7 @@ class Edges:
         if from_us < state.since_us:
             state.since_us = from_us
             state.to_goals.clear()
-            state.edges = self._runs(state, from_us, self._paying_until(state.segment.track))
+            state.edges = self._runs(state, from_us, self._paying_on(state.segment.track))
             if self._roads.hops(state.segment):
                 state.edges += self._hops(state, from_us)
         return state.edges
@@ -169,38 +171,44 @@ class Edges:
         found = state.to_goals.get(goals)
         if found is None:
             track = state.segment.track
-            until_us = self._paying_until(track)
-            on_track = {
-                one.index: FOREVER for one in goals if one.track == track and until_us.get(one.index, FOREVER) < FOREVER
-            }
+            always = {index for index, until_us in self._paying_on(track) if until_us >= FOREVER}
+            on_track = sorted(
+                (one.index, FOREVER)
+                for one in goals
+                if one.track == track and one.index not in always and self._roads.knows(one)
+            )
             if len(state.to_goals) >= _MAX_GOAL_SETS:
                 state.to_goals.clear()
             found = state.to_goals[goals] = self._runs(state, state.since_us, on_track) if on_track else []
             found.sort(key=_arrival_us)
         return found
 
-    def _paying_until(self, track: int) -> dict[int, int]:
-        found = self._until_us.get(track)
+    def _paying_on(self, track: int) -> list[_Paying]:
+        found = self._paying.get(track)
         if found is None:
-            found = self._until_us[track] = paying_until_us(self.departures, track)
+            found = self._paying[track] = paying_until_us(self.departures, track)
         return found
 
-    def _runs(self, state: State, from_us: int, until_us: dict[int, int]) -> list[Edge]:
-        """Runs along the track to indices of ``until_us`` that is later than ``from_us``, by growing index."""
-        return self._runs_towards(state, from_us, -1, until_us)[::-1] + self._runs_towards(state, from_us, 1, until_us)
+    def _runs(self, state: State, from_us: int, paying: list[_Paying]) -> list[Edge]:
+        """Runs along the track to where stopping pays later than ``from_us``, by growing index."""
+        split = bisect_left(paying, (state.segment.index, 0))
+        down = self._runs_towards(state, from_us, -1, paying[:split][::-1])
+        return down[::-1] + self._runs_towards(state, from_us, 1, paying[split:])
 
-    def _runs_towards(self, state: State, from_us: int, step: int, until_us: dict[int, int]) -> list[Edge]:
+    def _runs_towards(self, state: State, from_us: int, step: int, paying: list[_Paying]) -> list[Edge]:
         """Runs in one direction, the nearest first."""
         found: list[Edge] = []
+        if not paying:
+            return found
         here = state.segment
-        held, arrivals = self.departures.held_on(here.track), self._arrivals
+        held, arrivals, runs = self.departures.held_on(here.track), self._arrivals, self._roads.runs(here)
         shared = _Shared(self._roads.longest(here.track), held, here.index, step, from_us, state.to_us)
         leaves_by_us = self._leaves_by_us(state)
-        for there, duration_us, distance_mm, alike, tail, leave_us in self._roads.runs(here, step):
-            pays_us = until_us.get(there.index, 0)
-            if pays_us <= from_us:
+        for index, pays_us in paying:
+            if pays_us <= from_us or (run := runs[index]) is None:
                 continue
-            if shared.known < alike:
+            there, duration_us, distance_mm, alike, tail, leave_us = run
+            if held and shared.known < alike:
                 shared.take(alike)
             depart_us, to_us = shared.from_us, min(shared.to_us, leaves_by_us - leave_us + 1)
             if depart_us >= shared.to_us:
@@ -241,9 +249,9 @@ class Edges:
         first_us, last_us, until_us, duration_us, number, distance_mm, _ = edge
         there = self.numbered[number].segment
         if here.segment.track == there.track:
-            forbidden = self._run_forbidden(here.segment, there)
+            forbidden = self._run_forbidden(here.segment, there, edge)
         else:
-            forbidden = self._hop_forbidden(here.segment, there, duration_us, distance_mm)
+            forbidden = self._hop_forbidden(here.segment, there, edge)
         found: list[Edge] = []
         for clear_us, next_us in sorted(forbidden):
             if clear_us >= last_us or first_us >= last_us:
@@ -256,12 +264,16 @@ class Edges:
             found.append((first_us, last_us, until_us, duration_us, number, distance_mm, True))
         return found
 
-    def _hop_forbidden(self, here: Segment, there: Segment, duration_us: int, distance_mm: int) -> list[_Forbidden]:
+    def _hop_forbidden(self, here: Segment, there: Segment, edge: Edge) -> list[_Forbidden]:
+        duration_us, distance_mm = edge[3], edge[5]
         lift = None if distance_mm else self._roads.lift_at(here)
         taken = junction_segments(self._roads.site, here, there) if lift is None else [platform(lift[0])]
-        return [one for segment in taken for one in _forbidden(self.departures.held(segment), 0, duration_us)]
+        found: list[_Forbidden] = []
+        for segment in taken:
+            _forbid(found, self.departures.held(segment), (0, duration_us), edge)
+        return found
 
-    def _run_forbidden(self, here: Segment, there: Segment) -> list[_Forbidden]:
+    def _run_forbidden(self, here: Segment, there: Segment, edge: Edge) -> list[_Forbidden]:
         """What others hold of what a run sweeps; from or to a platform it crosses the sill while that is there."""
         roads, index, held = self._roads, here.index, self.departures.held_on(here.track)
         step = 1 if there.index > index else -1
@@ -270,11 +282,11 @@ class Edges:
         for offset, enter_us, leave_us in sweeps:
             windows = held.get(index + step * offset)
             if windows is not None:
-                found += _forbidden(windows, enter_us, leave_us)
+                _forbid(found, windows, (enter_us, leave_us), edge)
         reach = -sweeps[0].offset
         for position, sweep in ((here, sweeps[reach]), (there, sweeps[-1 - reach])):
             if roads.lift_at(position) is not None:
-                found += _forbidden(self.departures.held(position), sweep.enter_us, sweep.leave_us)
+                _forbid(found, self.departures.held(position), (sweep.enter_us, sweep.leave_us), edge)
         return found
 
 

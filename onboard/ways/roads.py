@@ -6,6 +6,7 @@ each alley that it serves, index 0 or length + 1; a ride is a move from one of t
 
 from collections.abc import Collection, Iterator, Sequence
 from functools import cached_property
+from operator import ne
 from typing import NamedTuple
 
 from onboard.core.site import Segment
@@ -48,13 +49,14 @@ class Roads:
         self._hops: dict[Segment, list[Move]] = {}
         self._junctions: dict[int, list[Segment]] = {}
         self._platforms: dict[Segment, tuple[int, int]] = {}
-        self._runs: dict[tuple[Segment, int], tuple[_Run, ...]] = {}
+        self._runs: dict[Segment, RunsFrom] = {}
         self._touched: dict[Segment, list[Segment]] = {}
         self._longest: dict[int, tuple[Sweep, ...]] = {}
         self._swept: dict[tuple[int, int], tuple[tuple[Sweep, ...], int]] = {}
         #: How runs end: direction and last sweeps, with offsets and times counted from where and when they arrive.
         self.tails: list[tuple[int, tuple[Sweep, ...]]] = []
         self._tails: dict[tuple[int, tuple[Sweep, ...]], int] = {}
+        self._tail_of: dict[tuple[int, int], int] = {}
         self._ways_us: dict[frozenset[Segment], WaysToGoals] = {}
         self._shortest_us: dict[tuple[Segment, Segment], int] = {}
         self._to_goals: dict[frozenset[Segment], _Ways] = {}
@@ -120,38 +122,46 @@ class Roads:
             found = self._touched[position] = aboard + alley_segments(self.site, position)
         return found
 
-    def runs(self, here: Segment, step: int) -> "tuple[_Run, ...]":
-        """Runs from a position along its track to lower (``step`` -1) or higher indices (1), the shortest first."""
-        found = self._runs.get((here, step))
+    def runs(self, here: Segment) -> "RunsFrom":
+        """Runs from a position along its track, by the index to which they lead."""
+        found = self._runs.get(here)
         if found is None:
-            found = self._runs[here, step] = tuple(self._run(here, move, step) for move in self._find_runs(here, step))
+            found = self._runs[here] = RunsFrom(self, here)
         return found
 
-    def _run(self, here: Segment, move: Move, step: int) -> "_Run":
-        there, end_us = move.destination, move.duration_us
-        sweeps, alike = self.swept(here.track, abs(there.index - here.index))
+    def run(self, here: Segment, there: Segment) -> "_Run":
+        """The run from a position to another on its track."""
+        track, steps = here.track, there.index - here.index
+        sweeps, alike = self.swept(track, abs(steps))
+        pitch_mm, reach = self.site.tracks[track].pitch_mm, -sweeps[0].offset
+        tail = self._tail(track, steps)
+        return there, self._run_us[track][abs(steps)], abs(steps) * pitch_mm, alike, tail, sweeps[reach].leave_us
+
+    def _tail(self, track: int, steps: int) -> int:
+        """How runs over so many steps end, lower indices below 0: their place among ``tails``."""
+        found = self._tail_of.get((track, steps))
+        if found is not None:
+            return found
+        (sweeps, alike), end_us = self.swept(track, abs(steps)), self._run_us[track][abs(steps)]
         reach, last = -sweeps[0].offset, sweeps[-1].offset + sweeps[0].offset
         # The sweep of where it ends is among the last ones in any case: there may be a sill.
         tail = tuple(
             Sweep(offset - last, enter_us - end_us, leave_us - end_us)
             for offset, enter_us, leave_us in sweeps[min(alike, reach + last) :]
         )
-        number = self._tails.setdefault((step, tail), len(self.tails))
+        step = 1 if steps > 0 else -1
+        number = self._tail_of[track, steps] = self._tails.setdefault((step, tail), len(self.tails))
         if number == len(self.tails):
             self.tails.append((step, tail))
-        return there, end_us, move.distance_mm, alike, number, sweeps[reach].leave_us
+        return number
+
+    def leads(self, here: Segment, index: int) -> bool:
+        """Whether a run from a position may end at an index of its track."""
+        return index in self._positions[here.track]
 
     def hops(self, here: Segment) -> Sequence[Move]:
         """Hops and rides from a position, in the order of the site's tracks."""
         return self._hops.get(here, ())
-
-    def _find_runs(self, here: Segment, step: int) -> Iterator[Move]:
-        durations, pitch_mm = self._run_us[here.track], self.site.tracks[here.track].pitch_mm
-        positions = self._positions[here.track]
-        for count in range(1, len(positions)):
-            there = positions.get(here.index + step * count)
-            if there is not None:
-                yield Move(there, durations[count], count * pitch_mm)
 
     def run_us(self, track: int, count: int) -> int:
         """Duration of a run over ``count`` steps of a track."""
@@ -178,9 +188,8 @@ class Roads:
         found = self._swept.get((track, count))
         if found is None:
             sweeps = leg_sweeps(self.site, track, count)
-            pairs = zip(sweeps, self.longest(track), strict=False)
-            alike = next((n for n, (one, other) in enumerate(pairs) if one != other), len(sweeps))
-            found = self._swept[track, count] = sweeps, alike
+            differ = [*map(ne, sweeps, self.longest(track))]
+            found = self._swept[track, count] = sweeps, differ.index(True) if True in differ else len(sweeps)
         return found
 
     def shortest_us(self, origin: Segment, goal: Segment) -> int:
@@ -250,6 +259,20 @@ class Roads:
             yield one, durations[abs(here.index - one.index)]
 
 
+class RunsFrom(dict[int, "_Run | None"]):
+    """Runs from one position by the index to which they lead, None where there is none; worked out when asked for."""
+
+    def __init__(self, roads: Roads, here: Segment) -> None:
+        super().__init__()
+        self._roads, self._here = roads, here
+
+    def __missing__(self, index: int) -> "_Run | None":
+        roads, here = self._roads, self._here
+        there = Segment(here.track, index)
+        found = self[index] = roads.run(here, there) if index != here.index and roads.leads(here, index) else None
+        return found
+
+
 class WaysToGoals:
     """Least times from positions to any of some goals, as in ``Roads.nearest_us``, worked out when asked for."""
 
@@ -275,9 +298,9 @@ class DirectedRoads(Roads):
         ahead = [(index, rest_us) for index, rest_us in ways if track.goes(origin.index, index)]
         return min((durations[abs(origin.index - index)] + rest_us for index, rest_us in ahead), default=FOREVER)
 
-    def _find_runs(self, here: Segment, step: int) -> Iterator[Move]:
-        track = self.site.tracks[here.track]
-        return (run for run in super()._find_runs(here, step) if track.goes(here.index, run.destination.index))
+    def leads(self, here: Segment, index: int) -> bool:
+        """Whether a run from a position may end at an index of its track."""
+        return super().leads(here, index) and self.site.tracks[here.track].goes(here.index, index)
 
     def _junctions_before(self, here: Segment) -> Iterator[tuple[Segment, int]]:
         track = self.site.tracks[here.track]

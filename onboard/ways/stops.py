@@ -8,27 +8,28 @@ every run goes the same way, so it passes what is held at the same times. (Up to
 milliseconds.)
 """
 
+from onboard.core.site import Segment
 from onboard.ways.departures import Departures
 from onboard.ways.occupancy import body_mm
 from onboard.ways.reservations import FOREVER
 from onboard.ways.roads import Roads
 
 
-def paying_until_us(departures: Departures, track: int) -> dict[int, int]:
-    """Until when stopping at each position of a track (by index) may pay; 0 for never, FOREVER at junctions.
+def paying_until_us(departures: Departures, track: int) -> list[tuple[int, int]]:
+    """The indices of a track at which stopping may pay, in order, each with until when: FOREVER at junctions.
 
     For a goal it always pays, which is for the caller to add.
     """
     roads = departures.roads
-    found = {position.index: 0 for position in roads.positions(track)}
+    found: dict[int, int] = {}
     far = settling_segments(roads, track)
     for middle in roads.positions(track):
         held_us = departures.held_until_us(middle)
         for index in range(middle.index - far, middle.index + far + 1) if held_us else ():
-            if index in found and found[index] < held_us:
+            if found.get(index, 0) < held_us:
                 found[index] = held_us
-    found.update((one.index, FOREVER) for one in roads.junctions(track) if one.index in found)
-    return found
+    found.update((one.index, FOREVER) for one in roads.junctions(track))
+    return sorted((index, until_us) for index, until_us in found.items() if roads.knows(Segment(track, index)))
 
 
 def settling_segments(roads: Roads, track: int) -> int:
