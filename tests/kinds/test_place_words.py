@@ -4,6 +4,7 @@ from onboard.contract.codes import DriveMode, TokenKind
 from onboard.contract.messages import DriveState, Progress, TokenGrant
 from onboard.core.authority import segment_token
 from onboard.core.effects import Effect, Send
+from onboard.core.site import Segment
 from onboard.systems.car_park.lift import Lift
 from onboard.systems.car_park.stall import PLACE_US
 from onboard.systems.car_park.travel import Carriage
@@ -38,6 +39,20 @@ def test_what_a_robot_left_goes_back_after_the_word_for_where_it_is() -> None:
     assert given(effects) and places(effects) == [(1, 5, 0)]
     grants = [number for number, effect in enumerate(effects) if isinstance(effect, Send) and _goes(effect)]
     assert effects.index(Send(_place(effects))) < min(grants)
+
+
+def test_who_said_that_it_reaches_into_a_slot_says_where_it_is_before_that_slot_goes_back() -> None:
+    """Crash point 5797 of ``small``: stopped over a sill, a robot gave the gate back when it had driven off it."""
+    one = sent_to_6()
+    comes_to(one, 3, 1)
+    one.advance(1)
+    across = DriveState(ROBOT, one.sequence, 4 * PITCH_MM - 400, 0, DriveMode.STANDING, False, False)
+    assert places(one.sense(across, 2)) == [(1, 5, -400)]
+    assert Segment(1, 4) in one.occupied()
+    one.advance(2)
+    assert comes_to(one, 5, 3) == [], "the same place"
+    effects = one.advance(3)
+    assert 4 in given(effects) and places(effects) == [(1, 5, 0)]
 
 
 def test_what_a_robot_left_and_granted_to_who_asked_is_followed_by_the_word_for_where_it_is() -> None:

@@ -16,7 +16,7 @@ from bus_sim.cli import main
 RUNS = {
     "level1 --random 40 15 --cars 3": "3c8ec92ccfe34276",
     "small --random 40 15 --cars 3 --fault crash:target=MR1,at_s=80,restart_s=5": "2222b7524a602013",
-    "standard --random 30 15 --cars 3": "49c61b409ccc0b05",
+    "standard --random 30 15 --cars 3": "a11449a8fbbccbcb",
     "large --random 30 15 --cars 2": "62458cdef37d6229",
     "graph --for 150": "1a4438a05bd81180",
     "terminal --for 150": "7faf3d03b6ad3d8d",

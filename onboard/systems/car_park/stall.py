@@ -3,7 +3,7 @@
 One that does not makes its machine an obstacle until it moves (issue 4, point 3).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from onboard.contract.codes import DriveMode
@@ -58,6 +58,8 @@ class PlaceWords(Generic[Place]):
 
     #: Where it was by that, whether it moved, and when it said so; whoever says a place, on whatever occasion, sets it.
     last: tuple[Place | None, bool, int] = (None, False, 0)
+    #: What its body was in then: whoever gives one of these back, and is still at that place, says where it is now.
+    slots: set[Place] = field(default_factory=set)
     _mode: DriveMode | None = None
 
     def is_news(self, place: Place, mode: DriveMode, now_us: int) -> bool:

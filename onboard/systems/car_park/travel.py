@@ -150,8 +150,7 @@ class Carriage:
         self.sensed = self.placing.ridden(self.sensed, self.track, floor)
         self.track = floor
         self._sent.clear()
-        self.goal = None
-        self.target = None
+        self.goal = self.target = None
         self._told.last = (None, False, 0)
 
     def occupied(self) -> list[Segment]:
@@ -160,9 +159,8 @@ class Carriage:
             return []
         if self._in_mouth is not None:
             return [self._in_mouth]
-        half_mm = self.fleet.site.carrier_length_mm // 2
-        position_mm = self.sensed.position_mm
-        return self.axis.overlapped(position_mm - half_mm, position_mm + half_mm)
+        half_mm, centre_mm = self.fleet.site.carrier_length_mm // 2, self.sensed.position_mm
+        return self.axis.overlapped(centre_mm - half_mm, centre_mm + half_mm)
 
     @property
     def _in_mouth(self) -> Segment | None:
@@ -181,8 +179,7 @@ class Carriage:
             self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
         self.stall.sensed(state.position_mm, now_us)
-        before = self.sensed
-        if before is None:
+        if self.sensed is None:
             self.sequence = state.sequence
         self.track, placed = self.placing.placed(state, self.track, self.goal)
         self.sensed = placed
@@ -207,6 +204,7 @@ class Carriage:
             return []
         progress = self._progress()
         self._told.last = (Segment(progress.track, progress.index), self.sensed.mode in MOVES, now_us)
+        self._told.slots = {*self.occupied()}
         self.fleet.mirror.on_progress(progress)
         return [Send(progress)]
 
@@ -470,8 +468,10 @@ class Carriage:
 
     def _after_place(self, given: list[Effect], now_us: int, *, went: bool = False) -> list[Effect]:
         """What is given back, or ``went`` to who asked, after the word that the body has left it."""
-        is_elsewhere = self.sensed is not None and self._told_at(self.sensed)[0] != self._told.last[0]
-        return [*self.statement(now_us), *given] if (given or went) and is_elsewhere else given
+        has_left = self.sensed is not None and not (
+            self._told_at(self.sensed)[0] == self._told.last[0] and self._told.slots <= {*self.occupied()}
+        )
+        return [*self.statement(now_us), *given] if (given or went) and has_left else given
 
     def _may_come_to(self) -> set[Segment]:
         """Slots up to where the drive may still be on its way, and those in which it brakes; none where it stands."""
