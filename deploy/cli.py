@@ -17,11 +17,14 @@ from deploy.replace import write_replacement
 from deploy.update.manifest import UpdateError, version_key
 from deploy.update.signature import make_keys
 from deploy.wheels import DeployError
+from onboard.bounded_file import read_bounded
 from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
 
 #: Outside of any checkout, and nobody else's.
 SECRET = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "onboard" / "update-key.pem"
+#: A public key as PEM has 113 bytes.
+_MOST_KEY = 10_000
 HELP = """\
 exit status:
   0  done; each file written is one line
@@ -136,7 +139,7 @@ def _build(args: argparse.Namespace) -> list[Path | str]:
         case "image":
             args.out.parent.mkdir(parents=True, exist_ok=True)
             version_key(args.version)
-            release = Release(args.version, args.key.read_bytes() if args.key else b"")
+            release = Release(args.version, _key(args.key) if args.key else b"")
             image = build_image(args.out, release, pi_firmware=args.pi_firmware)
             return [image.disk, f"sha256 {image.digest}", f"root file system: sha256 {image.root.digest}"]
         case "keys":
@@ -149,3 +152,12 @@ def _build(args: argparse.Namespace) -> list[Path | str]:
         case command:
             args.out.parent.mkdir(parents=True, exist_ok=True)
             return [build_archive(args.out) if command == "archive" else build_package(args.out)]
+
+
+def _key(file: Path) -> bytes:
+    try:
+        return read_bounded(file, _MOST_KEY)
+    except OSError as error:
+        raise DeployError(
+            f"--key {file}: {error.strerror}; name the .pub.pem that python -m deploy keys wrote"
+        ) from error

@@ -72,7 +72,7 @@ def from_bytes(said: bytes) -> Manifest:
     try:
         read = json.loads(said)
         return _checked(read)
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise UpdateError("its manifest cannot be read; make the update anew") from None
 
 

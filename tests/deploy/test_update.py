@@ -1,8 +1,10 @@
 """Signed updates on a board made of plain files: what is refused, what is written, and what the loader does next."""
 
 import contextlib
+import gzip
 import io
 import json
+import os
 import tarfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -200,6 +202,28 @@ def test_a_file_that_is_something_else_is_refused(place: BoardFiles, tmp_path: P
         entry.size = 1 << 17
         other.addfile(entry, io.BytesIO(bytes(entry.size)))
     assert refused(tmp_path / "other.tar", place) == "it is not an update file"
+
+
+@pytest.mark.parametrize("form", [tarfile.XHDTYPE, tarfile.GNUTYPE_LONGNAME, tarfile.GNUTYPE_SPARSE, tarfile.SYMTYPE])
+def test_a_head_that_a_reader_would_unfold_is_refused_unread(place: BoardFiles, tmp_path: Path, form: bytes) -> None:
+    """A reader of any archive holds 4 GB of an extended head before it knows whose the file is."""
+    head = tarfile.TarInfo(MANIFEST)
+    head.type, head.size = form, 4 << 30
+    file = tmp_path / "head.update"
+    file.write_bytes(head.tobuf(tarfile.GNU_FORMAT))
+    os.truncate(file, 5 << 30)
+    assert refused(file, place) == "it is not an update file, or not a whole one"
+
+
+def test_a_packed_update_is_not_unpacked(place: BoardFiles, make: Callable[..., Path], tmp_path: Path) -> None:
+    file = tmp_path / "packed.update"
+    file.write_bytes(gzip.compress(make().read_bytes(), 1))
+    assert refused(file, place) == "it is not an update file, or not a whole one"
+
+
+def test_what_is_no_file_is_not_opened(place: BoardFiles, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.update")
+    assert refused(tmp_path / "pipe.update", place) == "it is not a file; name an update file"
 
 
 def test_a_root_file_system_larger_than_the_slot_is_refused(place: BoardFiles, make: Callable[..., Path]) -> None:
