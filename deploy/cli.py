@@ -4,6 +4,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from datetime import timedelta
 from pathlib import Path
 
 import onboard
@@ -14,8 +15,9 @@ from deploy.image.release import Release
 from deploy.image.root import build_root
 from deploy.package import build_package
 from deploy.replace import write_replacement
-from deploy.update.manifest import UpdateError, version_key
-from deploy.update.signature import make_keys
+from deploy.update.bundle import LIFE
+from deploy.update.manifest import UpdateError, today, version_key
+from deploy.update.signature import make_keys, public_keys
 from deploy.wheels import DeployError
 from onboard.bounded_file import read_bounded
 from onboard.config.arguments import Parser
@@ -23,6 +25,8 @@ from onboard.config.problems import ConfigError
 
 #: Outside of any checkout, and nobody else's.
 SECRET = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "onboard" / "update-key.pem"
+#: Whoever wants updates that count for longer wants none that expire.
+MOST_DAYS = 1_000
 #: A public key as PEM has 113 bytes.
 _MOST_KEY = 10_000
 HELP = """\
@@ -77,6 +81,12 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _days(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= MOST_DAYS:
+        raise argparse.ArgumentTypeError(f"{text}: write a number of days from 1 to {MOST_DAYS}")
+    return int(text)
+
+
 def _existing(text: str) -> Path:
     if not Path(text).is_file():
         raise argparse.ArgumentTypeError(f"{text}: no such file")
@@ -87,7 +97,12 @@ def _add_image(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     image = commands.add_parser("image", help="the image that 64-bit ARM boards are flashed with")
     image.add_argument("--out", type=Path, default=Path("dist/onboard.img"), metavar="FILE")
     image.add_argument(
-        "--key", type=_existing, metavar="PEM", help="public key of its updates; without one it takes none"
+        "--key",
+        type=_existing,
+        action="append",
+        default=[],
+        metavar="PEM",
+        help="public key of its updates; repeat it for a second key, kept elsewhere; without one it takes none",
     )
     image.add_argument(
         "--pi-firmware",
@@ -101,6 +116,17 @@ def _add_image(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     update.add_argument("--out", type=Path, metavar="FILE", help="dist/onboard-VERSION.update")
     update.add_argument(
         "--secret", type=_existing, required=True, metavar="PEM", help="the secret key (python -m deploy keys)"
+    )
+    update.add_argument(
+        "--key",
+        type=_existing,
+        action="append",
+        default=[],
+        metavar="PEM",
+        help="public key that boards trust after it (repeatable; default: that of --secret); all others are revoked",
+    )
+    update.add_argument(
+        "--days", type=_days, default=LIFE.days, metavar="N", help=f"boards take it so long ({LIFE.days})"
     )
     update.add_argument("--site", default="", metavar="NAME", help="only machines of this site take it")
     for parser in (image, update):
@@ -139,7 +165,7 @@ def _build(args: argparse.Namespace) -> list[Path | str]:
         case "image":
             args.out.parent.mkdir(parents=True, exist_ok=True)
             version_key(args.version)
-            release = Release(args.version, _key(args.key) if args.key else b"")
+            release = Release(args.version, _keys(args.key))
             image = build_image(args.out, release, pi_firmware=args.pi_firmware)
             return [image.disk, f"sha256 {image.digest}", f"root file system: sha256 {image.root.digest}"]
         case "keys":
@@ -148,15 +174,23 @@ def _build(args: argparse.Namespace) -> list[Path | str]:
             make_keys(args.out, public)
             return [args.out, public]
         case "update":
-            return [build_update(args.out, args.secret, args.version, args.site)]
+            release, expires = Release(args.version, _keys(args.key)), today() + timedelta(days=args.days)
+            return [build_update(args.out, args.secret, release, args.site, expires)]
         case command:
             args.out.parent.mkdir(parents=True, exist_ok=True)
             return [build_archive(args.out) if command == "archive" else build_package(args.out)]
 
 
+def _keys(files: Sequence[Path]) -> bytes:
+    return b"".join(map(_key, files))
+
+
 def _key(file: Path) -> bytes:
     try:
-        return read_bounded(file, _MOST_KEY)
+        found = read_bounded(file, _MOST_KEY)
+        if public_keys(found) != [found]:
+            raise DeployError(f"--key {file}: is no public key; name the .pub.pem that python -m deploy keys wrote")
+        return found
     except OSError as error:
         raise DeployError(
             f"--key {file}: {error.strerror}; name the .pub.pem that python -m deploy keys wrote"

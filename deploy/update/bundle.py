@@ -9,23 +9,41 @@ import hashlib
 import io
 import tarfile
 from collections.abc import Iterator, Mapping
+from datetime import date, timedelta
 from pathlib import Path
 from typing import Self
 
-from deploy.update.manifest import BOARD, PARTS, Content, Manifest, UpdateError, from_bytes, to_bytes, version_key
+from deploy.update.manifest import (
+    BOARD,
+    PARTS,
+    Content,
+    Manifest,
+    UpdateError,
+    from_bytes,
+    to_bytes,
+    today,
+    version_key,
+)
 from deploy.update.signature import SIGNATURE_BYTES, is_signed, sign
 
+#: So long an update is taken where nothing else is said: time to go round a site, not to lie about for years.
+LIFE = timedelta(days=90)
 MANIFEST, SIGNATURE = "manifest.json", "manifest.sig"
 #: No manifest of ours comes near; a file that says otherwise is not ours.
 _MANIFEST_LIMIT = 65_536
 _BLOCK = 1 << 20
 
 
-def write_bundle(to: Path, parts: Mapping[str, Path], secret: Path, version: str, site: str = "") -> Manifest:
-    """Write an update from its parts' files. Raises ``UpdateError``, ``OSError``."""
+def write_bundle(
+    to: Path, parts: Mapping[str, Path], secret: Path, version: str, site: str = "", expires: date | None = None
+) -> Manifest:
+    """Write an update from its parts' files; it ``expires`` ``LIFE`` from now unless told. May raise ``UpdateError``.
+
+    ``OSError`` as well.
+    """
     version_key(version)
     contents = {name: _content(parts[name]) for name in PARTS}
-    manifest = Manifest(version, BOARD, site, contents)
+    manifest = Manifest(version, BOARD, site, expires or today() + LIFE, contents)
     said = to_bytes(manifest)
     with tarfile.open(to, "w", format=tarfile.USTAR_FORMAT) as archive:
         for name, content in ((MANIFEST, said), (SIGNATURE, sign(said, secret))):
@@ -62,7 +80,7 @@ class Bundle:
                 raise UpdateError("it is not an update file, or not a whole one")
             said, signature = self._read(MANIFEST), self._read(SIGNATURE)
             if len(signature) != SIGNATURE_BYTES or not is_signed(said, signature, public):
-                raise UpdateError("it is not signed with the key that this system trusts")
+                raise UpdateError("it is not signed with a key that this system trusts")
             self.manifest = from_bytes(said)
             on_failure.pop_all()
 
