@@ -9,12 +9,15 @@ from pathlib import Path
 
 import onboard
 from deploy.archive import build_archive
+from deploy.audit import audited
 from deploy.fleet import write_fleet
 from deploy.image.image import build_image, build_update
 from deploy.image.release import Release
 from deploy.image.root import build_root
+from deploy.locks import write_locks
 from deploy.package import build_package
 from deploy.replace import write_replacement
+from deploy.sbom import write_bill
 from deploy.update.bundle import LIFE
 from deploy.update.manifest import UpdateError, today, version_key
 from deploy.update.signature import make_keys, public_keys
@@ -32,6 +35,7 @@ _MOST_KEY = 10_000
 HELP = """\
 exit status:
   0  done; each file written is one line
+  1  audit: a library has a known weakness; one line for each says which, and where it is mended
   2  a mistake, or something that is missing; one line says what to do
 
 examples:
@@ -44,6 +48,8 @@ examples:
                                            dist/onboard.img, which boards are flashed with
   sudo python -m deploy update --secret ~/.config/onboard/update-key.pem --version 0.2.0
                                            a signed update for boards that were flashed with such an image
+  python -m deploy sbom                    dist/onboard.cdx.json, what all of it is made of
+  make audit                               whether any of that has a known weakness; fails where nobody could tell
   python -m deploy machines mysite.toml    dist/machines/NAME/, the files for every board's boot partition
 """
 
@@ -78,6 +84,13 @@ def build_parser() -> argparse.ArgumentParser:
     )
     replace.add_argument("--journal", type=Path, metavar="DIR", help="its journal's folder, where it can be read")
     replace.add_argument("--out", type=Path, default=Path("dist/replace"), metavar="DIR")
+    commands.add_parser(
+        "lock", help="deploy/locks anew: versions and digests of what each extra installs, as pip chooses"
+    )
+    bill = commands.add_parser("sbom", help="what boards and extras are made of, as CycloneDX (JSON)")
+    bill.add_argument("--out", type=Path, default=Path("dist/onboard.cdx.json"), metavar="FILE")
+    audit = commands.add_parser("audit", help="whether any pinned library has a known weakness, by pip-audit")
+    audit.add_argument("--tool", default="pip-audit", metavar="PROGRAM", help="where it is installed (pip-audit)")
     return parser
 
 
@@ -139,6 +152,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     args = build_parser().parse_args(argv)
     try:
+        if args.command == "audit":
+            return _audit(args.tool)
         for path in _build(args):
             print(path)
     except ConfigError as error:
@@ -173,12 +188,23 @@ def _build(args: argparse.Namespace) -> list[Path | str]:
             args.out.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
             make_keys(args.out, public)
             return [args.out, public]
+        case "lock" | "sbom":
+            return [*write_locks()] if args.command == "lock" else [write_bill(args.out, onboard.__version__)]
         case "update":
             release, expires = Release(args.version, _keys(args.key)), today() + timedelta(days=args.days)
             return [build_update(args.out, args.secret, release, args.site, expires)]
         case command:
             args.out.parent.mkdir(parents=True, exist_ok=True)
             return [build_archive(args.out) if command == "archive" else build_package(args.out)]
+
+
+def _audit(tool: str) -> int:
+    looked_at, weak = audited(tool)
+    for one in weak:
+        print(one)
+    told = {0: "none has", 1: "1 of the libraries has"}.get(len(weak), f"{len(weak)} of the libraries have")
+    print(f"{looked_at} pins were looked at, {told} a known weakness")
+    return 1 if weak else 0
 
 
 def _keys(files: Sequence[Path]) -> bytes:
