@@ -3,6 +3,7 @@
 
 VENV := .venv
 BIN := $(VENV)/bin
+AUDIT := $(VENV)/audit
 PACKAGES := bus_sim dbc hil onboard
 # Interpreter for a new environment: the first of these that starts, is 3.11 or newer and can make one. A name on the
 # path is not enough: version managers leave names that do not start, Debian's Python comes without ensurepip.
@@ -15,7 +16,7 @@ export REQUIRE
 # Each program that a test starts, and each start in the guest, would otherwise compile all that it loads.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help run check test test-long coverage lint format models mutants bench docs clean
+.PHONY: help run check test test-long coverage lint format models mutants bench docs audit clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
@@ -62,6 +63,12 @@ docs: $(VENV)/.test ## write onboard/contract and docs/network.md anew from the 
 	$(BIN)/python -m onboard.contract.generate
 	$(BIN)/python -m onboard.wire.network_doc
 	$(BIN)/python -m tests.systems_page
+
+audit: $(VENV)/.run ## whether any pinned library has a known weakness (pip-audit); fails where that could not be looked at
+	@test -x $(AUDIT)/bin/pip-audit || { $(BIN)/python -m venv $(AUDIT) && \
+		$(AUDIT)/bin/pip install --quiet --disable-pip-version-check 'pip-audit>=2.9,<3'; } || { \
+		rm -rf $(AUDIT); echo "make audit: pip could not install pip-audit; is there a network?" >&2; exit 2; }
+	@$(BIN)/python -m deploy audit --tool $(AUDIT)/bin/pip-audit
 
 clean: ## remove the environment and everything generated
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage htmlcov runs

@@ -4,27 +4,38 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from datetime import timedelta
 from pathlib import Path
 
 import onboard
 from deploy.archive import build_archive
+from deploy.audit import audited
 from deploy.fleet import write_fleet
 from deploy.image.image import build_image, build_update
 from deploy.image.release import Release
 from deploy.image.root import build_root
+from deploy.locks import write_locks
 from deploy.package import build_package
 from deploy.replace import write_replacement
-from deploy.update.manifest import UpdateError, version_key
-from deploy.update.signature import make_keys
+from deploy.sbom import write_bill
+from deploy.update.bundle import LIFE
+from deploy.update.manifest import UpdateError, today, version_key
+from deploy.update.signature import make_keys, public_keys
 from deploy.wheels import DeployError
+from onboard.bounded_file import read_bounded
 from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
 
 #: Outside of any checkout, and nobody else's.
 SECRET = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "onboard" / "update-key.pem"
+#: Whoever wants updates that count for longer wants none that expire.
+MOST_DAYS = 1_000
+#: A public key as PEM has 113 bytes.
+_MOST_KEY = 10_000
 HELP = """\
 exit status:
   0  done; each file written is one line
+  1  audit: a library has a known weakness; one line for each says which, and where it is mended
   2  a mistake, or something that is missing; one line says what to do
 
 examples:
@@ -37,6 +48,8 @@ examples:
                                            dist/onboard.img, which boards are flashed with
   sudo python -m deploy update --secret ~/.config/onboard/update-key.pem --version 0.2.0
                                            a signed update for boards that were flashed with such an image
+  python -m deploy sbom                    dist/onboard.cdx.json, what all of it is made of
+  make audit                               whether any of that has a known weakness; fails where nobody could tell
   python -m deploy machines mysite.toml    dist/machines/NAME/, the files for every board's boot partition
 """
 
@@ -71,7 +84,20 @@ def build_parser() -> argparse.ArgumentParser:
     )
     replace.add_argument("--journal", type=Path, metavar="DIR", help="its journal's folder, where it can be read")
     replace.add_argument("--out", type=Path, default=Path("dist/replace"), metavar="DIR")
+    commands.add_parser(
+        "lock", help="deploy/locks anew: versions and digests of what each extra installs, as pip chooses"
+    )
+    bill = commands.add_parser("sbom", help="what boards and extras are made of, as CycloneDX (JSON)")
+    bill.add_argument("--out", type=Path, default=Path("dist/onboard.cdx.json"), metavar="FILE")
+    audit = commands.add_parser("audit", help="whether any pinned library has a known weakness, by pip-audit")
+    audit.add_argument("--tool", default="pip-audit", metavar="PROGRAM", help="where it is installed (pip-audit)")
     return parser
+
+
+def _days(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= MOST_DAYS:
+        raise argparse.ArgumentTypeError(f"{text}: write a number of days from 1 to {MOST_DAYS}")
+    return int(text)
 
 
 def _existing(text: str) -> Path:
@@ -84,7 +110,12 @@ def _add_image(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     image = commands.add_parser("image", help="the image that 64-bit ARM boards are flashed with")
     image.add_argument("--out", type=Path, default=Path("dist/onboard.img"), metavar="FILE")
     image.add_argument(
-        "--key", type=_existing, metavar="PEM", help="public key of its updates; without one it takes none"
+        "--key",
+        type=_existing,
+        action="append",
+        default=[],
+        metavar="PEM",
+        help="public key of its updates; repeat it for a second key, kept elsewhere; without one it takes none",
     )
     image.add_argument(
         "--pi-firmware",
@@ -99,6 +130,17 @@ def _add_image(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     update.add_argument(
         "--secret", type=_existing, required=True, metavar="PEM", help="the secret key (python -m deploy keys)"
     )
+    update.add_argument(
+        "--key",
+        type=_existing,
+        action="append",
+        default=[],
+        metavar="PEM",
+        help="public key that boards trust after it (repeatable; default: that of --secret); all others are revoked",
+    )
+    update.add_argument(
+        "--days", type=_days, default=LIFE.days, metavar="N", help=f"boards take it so long ({LIFE.days})"
+    )
     update.add_argument("--site", default="", metavar="NAME", help="only machines of this site take it")
     for parser in (image, update):
         parser.add_argument(
@@ -110,6 +152,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     args = build_parser().parse_args(argv)
     try:
+        if args.command == "audit":
+            return _audit(args.tool)
         for path in _build(args):
             print(path)
     except ConfigError as error:
@@ -136,7 +180,7 @@ def _build(args: argparse.Namespace) -> list[Path | str]:
         case "image":
             args.out.parent.mkdir(parents=True, exist_ok=True)
             version_key(args.version)
-            release = Release(args.version, args.key.read_bytes() if args.key else b"")
+            release = Release(args.version, _keys(args.key))
             image = build_image(args.out, release, pi_firmware=args.pi_firmware)
             return [image.disk, f"sha256 {image.digest}", f"root file system: sha256 {image.root.digest}"]
         case "keys":
@@ -144,8 +188,36 @@ def _build(args: argparse.Namespace) -> list[Path | str]:
             args.out.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
             make_keys(args.out, public)
             return [args.out, public]
+        case "lock" | "sbom":
+            return [*write_locks()] if args.command == "lock" else [write_bill(args.out, onboard.__version__)]
         case "update":
-            return [build_update(args.out, args.secret, args.version, args.site)]
+            release, expires = Release(args.version, _keys(args.key)), today() + timedelta(days=args.days)
+            return [build_update(args.out, args.secret, release, args.site, expires)]
         case command:
             args.out.parent.mkdir(parents=True, exist_ok=True)
             return [build_archive(args.out) if command == "archive" else build_package(args.out)]
+
+
+def _audit(tool: str) -> int:
+    looked_at, weak = audited(tool)
+    for one in weak:
+        print(one)
+    told = {0: "none has", 1: "1 of the libraries has"}.get(len(weak), f"{len(weak)} of the libraries have")
+    print(f"{looked_at} pins were looked at, {told} a known weakness")
+    return 1 if weak else 0
+
+
+def _keys(files: Sequence[Path]) -> bytes:
+    return b"".join(map(_key, files))
+
+
+def _key(file: Path) -> bytes:
+    try:
+        found = read_bounded(file, _MOST_KEY)
+        if public_keys(found) != [found]:
+            raise DeployError(f"--key {file}: is no public key; name the .pub.pem that python -m deploy keys wrote")
+        return found
+    except OSError as error:
+        raise DeployError(
+            f"--key {file}: {error.strerror}; name the .pub.pem that python -m deploy keys wrote"
+        ) from error

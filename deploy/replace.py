@@ -6,9 +6,10 @@ import tomllib
 from pathlib import Path
 
 from deploy.wheels import DeployError
+from onboard.bounded_file import MOST_TEXT, read_bounded
 from onboard.config.machine import load_machine
 from onboard.core.site import journal_owner
-from onboard.io.journal import FILE_NAME, FileJournal
+from onboard.io.journal import FILE_NAME, MOST_BYTES, FileJournal
 
 #: Of the dead board's boot partition, beside the two files that the machine file and the site are in: keys.
 _KEYS = ("*.pem", "*.key", "*.crt")
@@ -27,10 +28,10 @@ def write_replacement(card: Path, journal: Path | None, to: Path) -> list[str]:
     if (folder / "journal").exists():
         raise DeployError(f"{folder}: holds a journal already, and two boards may not have one; name another --out")
     folder.mkdir(parents=True, exist_ok=True)
-    site = card / tomllib.loads(config.file.read_text(encoding="utf-8"))["machine"]["site"]
+    site = card / tomllib.loads(read_bounded(config.file).decode("utf-8-sig"))["machine"]["site"]
     files = [config.file, site, *(file for form in _KEYS for file in sorted(card.glob(form)))]
     for file in files:
-        shutil.copyfile(file, folder / file.name)
+        _copy(file, folder / file.name)
     lines = [str(folder / file.name) for file in files]
     if journal is None:
         return [
@@ -46,8 +47,8 @@ def _take_over(journal: Path, to: Path, owner: str) -> int:
     if not (journal / FILE_NAME).is_file():
         raise DeployError(f"{journal}: holds no {FILE_NAME}; name the journal's folder, or leave --journal out")
     to.mkdir()
-    shutil.copyfile(journal / FILE_NAME, to / FILE_NAME)
     try:
+        _copy(journal / FILE_NAME, to / FILE_NAME, MOST_BYTES)
         copy = FileJournal(to, owner)
         records = len(copy.replay())
         asyncio.run(copy.close())
@@ -60,3 +61,10 @@ def _take_over(journal: Path, to: Path, owner: str) -> int:
         raise
     (to / "lock").unlink(missing_ok=True)
     return records
+
+
+def _copy(file: Path, to: Path, most_bytes: int = MOST_TEXT) -> None:
+    try:
+        to.write_bytes(read_bounded(file, most_bytes))
+    except OSError as error:
+        raise DeployError(f"{file}: {error.strerror}; name the old board's boot partition and journal") from error

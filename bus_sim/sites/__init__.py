@@ -4,6 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from onboard.config.files import read_text
 from onboard.config.site import load_site, parse_site
 from onboard.core.site import Site
 
@@ -36,7 +37,7 @@ def site_text(name: str) -> str:
     for folder in (files(__name__), files(__name__).joinpath(_LAYOUTS)):
         if name in _names(folder):
             return folder.joinpath(f"{name}.toml").read_text(encoding="utf-8")
-    return Path(name).read_text(encoding="utf-8")
+    return read_text(Path(name), "site")
 
 
 def find_site(name: str) -> Site:

@@ -2,7 +2,8 @@
 
 import hashlib
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import date
 from pathlib import Path
 
 from deploy.image.apt import run_tool
@@ -47,16 +48,21 @@ def build_image(to: Path, release: Release, store: Path = STORE, pi_firmware: Pa
     return Image(to, digest, root)
 
 
-def build_update(to: Path | None, secret: Path, version: str, site: str = "", store: Path = STORE) -> Path:
-    """Build a root file system of this version, and write it as a signed update. The public key in it is the secret's.
+def build_update(
+    to: Path | None, secret: Path, release: Release, site: str = "", expires: date | None = None, store: Path = STORE
+) -> Path:
+    """Build a root file system of this release, and write it as a signed update; without a key it trusts the secret's.
+
+    A key that is not in it is revoked on every board that it stays on.
 
     Raises ``DeployError``, ``UpdateError``, ``OSError``.
     """
-    version_key(version)
-    file = to or Path("dist") / f"onboard-{version}.update"
+    version_key(release.version)
+    file = to or Path("dist") / f"onboard-{release.version}.update"
     parts = file.with_suffix(".parts")
-    root = build_root(parts, Release(version, public_key(secret)), store)
-    write_bundle(file, {KERNEL: root.kernel, INITRD: root.initrd, ROOT: root.squashfs}, secret, version, site)
+    root = build_root(parts, release if release.key else replace(release, key=public_key(secret)), store)
+    kernel = {KERNEL: root.kernel, INITRD: root.initrd, ROOT: root.squashfs}
+    write_bundle(file, kernel, secret, release.version, site, expires)
     shutil.rmtree(parts)
     return file
 

@@ -13,7 +13,7 @@ PLACE = "etc/onboard"
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """Version of a root file system, and the public key (PEM) of its updates; without one it takes none.
+    """Version of a root file system, and the public keys (PEM, one after another) of its updates; none, no updates.
 
     ``extra`` are further files in it by name, for a board that needs some.
     """

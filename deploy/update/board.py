@@ -7,10 +7,11 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from subprocess import run
 
-from deploy.update.manifest import BOARD, Running, UpdateError
+from deploy.update.manifest import BOARD, Running, UpdateError, today
 from deploy.update.slots import SLOTS, STATE_BYTES, STATE_NAME, Slots, from_block, to_block
 from onboard.config.machine import MachineConfig, load_machine
 from onboard.config.problems import ConfigError
@@ -34,6 +35,7 @@ class BoardFiles:
     release: Path
     key: Path
     writable: Callable[[], AbstractContextManager[None]]
+    today: Callable[[], date] = today
 
     def state(self) -> Slots:
         """What the boot loader will do."""
@@ -57,7 +59,7 @@ class BoardFiles:
         said = json.loads(self.release.read_text(encoding="utf-8"))
         machine = self.machine()
         site = machine.site.name if machine is not None else ""
-        return Running(said["version"], said["board"], site, self.state().failed)
+        return Running(said["version"], said["board"], site, self.today(), self.state().failed)
 
     def machine(self) -> MachineConfig | None:
         """What the machine file says, None where it is not in order."""

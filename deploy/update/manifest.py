@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import UTC, date, datetime
 from typing import Any
 
 #: Every 64-bit ARM board takes the same image.
@@ -29,22 +30,32 @@ class Content:
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """An update; ``site`` is the site that it is for, "" for any."""
+    """An update; ``site`` is the site that it is for, "" for any. After the day ``expires`` nobody takes it."""
 
     version: str
     board: str
     site: str
+    expires: date
     parts: Mapping[str, Content]
 
 
 @dataclass(frozen=True, slots=True)
 class Running:
-    """The system that judges an update: what runs, and which version was given up here before ("" for none)."""
+    """The system that judges an update: what runs, and which version was given up here before ("" for none).
+
+    ``today`` is what its clock says.
+    """
 
     version: str
     board: str
     site: str
+    today: date
     failed: str = ""
+
+
+def today() -> date:
+    """The day in UTC by this computer's clock."""
+    return datetime.now(UTC).date()
 
 
 def version_key(version: str) -> tuple[int, ...]:
@@ -62,6 +73,7 @@ def to_bytes(manifest: Manifest) -> bytes:
         "version": manifest.version,
         "board": manifest.board,
         "site": manifest.site,
+        "expires": manifest.expires.isoformat(),
         "parts": parts,
     }
     return (json.dumps(said, sort_keys=True, indent=1) + "\n").encode()
@@ -72,7 +84,7 @@ def from_bytes(said: bytes) -> Manifest:
     try:
         read = json.loads(said)
         return _checked(read)
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise UpdateError("its manifest cannot be read; make the update anew") from None
 
 
@@ -85,7 +97,8 @@ def _checked(read: Any) -> Manifest:
     ):
         raise ValueError(parts)
     version_key(str(read["version"]))
-    return Manifest(str(read["version"]), str(read["board"]), str(read["site"]), parts)
+    expires = date.fromisoformat(read["expires"])
+    return Manifest(str(read["version"]), str(read["board"]), str(read["site"]), expires, parts)
 
 
 def refusal(manifest: Manifest, running: Running) -> str | None:
@@ -94,6 +107,8 @@ def refusal(manifest: Manifest, running: Running) -> str | None:
         return f"it is for {manifest.board} boards, and this is one of {running.board}"
     if manifest.site and manifest.site != running.site:
         return f"it is for site {manifest.site}, and this machine's is {running.site or 'not known'}"
+    if running.today > manifest.expires:
+        return f"it was to be taken until {manifest.expires}, and the clock here says {running.today}; make it anew"
     if version_key(manifest.version) == version_key(running.version):
         return f"version {manifest.version} runs already"
     if version_key(manifest.version) < version_key(running.version):

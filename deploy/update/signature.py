@@ -1,5 +1,6 @@
 """Ed25519 signatures (RFC 8032) by the command ``openssl``: no cipher of our own, and no library on the boards."""
 
+import re
 import subprocess
 import tempfile
 from pathlib import Path
@@ -10,6 +11,7 @@ SIGNATURE_BYTES = 64
 #: What tells a checkout's topmost folder.
 _MARKS = (".git", ".hg", ".svn", ".jj")
 _LIMIT_S = 60
+_PUBLIC = re.compile(rb"-----BEGIN PUBLIC KEY-----\n.*?-----END PUBLIC KEY-----\n", re.DOTALL)
 
 
 def make_keys(secret: Path, public: Path) -> None:
@@ -33,6 +35,11 @@ def public_key(secret: Path) -> bytes:
     return _openssl("pkey", "-in", str(secret), "-pubout").encode()
 
 
+def public_keys(text: bytes) -> list[bytes]:
+    """The public keys in a PEM text, each by itself."""
+    return _PUBLIC.findall(text)
+
+
 def sign(said: bytes, secret: Path) -> bytes:
     """The signature of some bytes. Raises ``UpdateError``."""
     with tempfile.TemporaryDirectory() as folder:
@@ -43,13 +50,20 @@ def sign(said: bytes, secret: Path) -> bytes:
 
 
 def is_signed(said: bytes, signature: bytes, public: Path) -> bool:
-    """Whether the owner of the key has signed these bytes. Raises ``UpdateError`` where there is no openssl."""
+    """Whether the owner of one of the keys in ``public``, one PEM after another, has signed these bytes.
+
+    Raises ``UpdateError`` where there is no openssl.
+    """
     with tempfile.TemporaryDirectory() as folder:
-        file, sealed = Path(folder, "said"), Path(folder, "signature")
+        file, sealed, key = Path(folder, "said"), Path(folder, "signature"), Path(folder, "key")
         file.write_bytes(said)
         sealed.write_bytes(signature)
-        words = ["-verify", "-pubin", "-inkey", str(public), "-rawin", "-in", str(file), "-sigfile", str(sealed)]
-        return _run("pkeyutl", *words).returncode == 0
+        words = ["-verify", "-pubin", "-inkey", str(key), "-rawin", "-in", str(file), "-sigfile", str(sealed)]
+        for one in public_keys(public.read_bytes()):
+            key.write_bytes(one)
+            if _run("pkeyutl", *words).returncode == 0:
+                return True
+    return False
 
 
 def _openssl(*words: str) -> str:

@@ -8,6 +8,8 @@ from typing import Protocol
 YES, NO = frozenset({"y", "yes"}), frozenset({"n", "no"})
 #: A question is asked so often before it counts as not answered.
 TRIES = 3
+#: Longest line that is taken for an answer, characters: a device in place of a person ends no line.
+_MOST_CHARS = 1_000
 
 
 class NoAnswerError(Exception):
@@ -34,7 +36,7 @@ class ConsolePerson:
     async def ask(self, question: str) -> str:
         """Wait in a thread for a line of standard input; from a pipe the answer is printed too, for the record."""
         print(f"{question} ", end="", flush=True)
-        line: str = await asyncio.to_thread(sys.stdin.readline)
+        line: str = await asyncio.to_thread(sys.stdin.readline, _MOST_CHARS)
         if not line:
             raise NoAnswerError
         if not sys.stdin.isatty():

@@ -5,14 +5,16 @@ elsewhere, is found by its seal. One ``fdatasync`` makes a record durable togeth
 """
 
 import asyncio
+import errno
 import fcntl
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from onboard.bounded_file import read_bounded
 from onboard.core.journal_state import JournalCondition, JournalState
-from onboard.io.sealed import Reading, Tail, begin, read
+from onboard.io.sealed import MOST_LINE, MOST_RECORDS, Appending, Reading, Tail, begin, read
 from onboard.ports.journal import Compaction, Entry
 
 FILE_NAME = "journal.log"
@@ -20,6 +22,9 @@ FILE_NAME = "journal.log"
 LEAST_BYTES = 256_000
 #: And only when it has grown by this factor since: writing anew then costs less than all appends did.
 GROWTH = 2
+#: Longest journal that is read and written, bytes: a gateway's with all the reports that it keeps (20,000) has two
+#: thirds of it, a controller's 200,000 records without a moment in which it could be written anew.
+MOST_BYTES = 32_000_000
 _IDENTITY_BYTES = 8
 
 
@@ -73,13 +78,20 @@ class FileJournal:
     def replay(self) -> list[Entry]:
         """As in the port. A torn last record is cut off, and records that have a second copy are restored.
 
-        A journal that is short or foreign is left exactly as it is, for a person to look at.
+        A journal that is short or foreign is left exactly as it is, for a person to look at. Raises ``OSError`` for
+        one that cannot be read.
         """
         try:
-            content = self._path.read_bytes()
+            content = read_bounded(self._path, MOST_BYTES)
         except FileNotFoundError:
             self.condition = JournalCondition(JournalState.NEW)
             self._write_whole([])
+            return []
+        except OSError as error:
+            if error.errno != errno.EFBIG:
+                raise
+            why = f"{self._path}: {error.strerror}, which no journal of ours becomes"
+            self.condition = JournalCondition(JournalState.SHORT, None, 0, why)
             return []
         reading = read(content, self.owner, str(self._path))
         self.condition = reading.condition
@@ -129,6 +141,7 @@ class FileJournal:
     def _append(self, entry: Entry) -> None:
         file, tail = self._ready()
         appending = tail.appending(entry)
+        _check_bounds(appending, tail.records + 1)
         try:
             _write_all(file, appending.line.data, appending.line.offset)
             if appending.in_two:
@@ -149,7 +162,7 @@ class FileJournal:
 
     def _compact(self, fewer: Compaction) -> None:
         self._ready()
-        reading = read(self._path.read_bytes(), self.owner, str(self._path))
+        reading = read(read_bounded(self._path, MOST_BYTES), self.owner, str(self._path))
         if not reading.condition.is_reliable:
             raise JournalDamagedError(reading.condition.why)
         self._write_whole(fewer(reading.entries))
@@ -201,6 +214,13 @@ class FileJournal:
             os.ftruncate(file, size)
         except OSError as error:
             self._broken = error
+
+
+def _check_bounds(appending: Appending, records: int) -> None:
+    """What could not be read again is not written: the disk counts as full."""
+    line = appending.line
+    if len(line.data) > MOST_LINE or line.offset + len(line.data) > MOST_BYTES or records > MOST_RECORDS:
+        raise OSError(errno.EFBIG, f"a journal takes {MOST_BYTES / 1e6:g} MB and {MOST_RECORDS:,} records")
 
 
 def _hold(path: Path) -> int:

@@ -10,6 +10,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+from onboard.bounded_file import read_bounded
 from onboard.contract.codes import Reason
 from onboard.io.endings import ExitStatus
 
@@ -17,6 +18,9 @@ from onboard.io.endings import ExitStatus
 LIMIT = 3
 #: A life that took so long has done its work, us; what ends it is news.
 HEALTHY_US = 600_000_000
+
+#: Each of the two files is one line of some dozen characters, bytes.
+_MOST_BYTES = 1_024
 
 #: What systemd says of a service that ended in ``$SERVICE_RESULT`` (systemd.exec(5)), in words for a person.
 _RESULTS = {
@@ -72,14 +76,14 @@ class LifeBook:
 
     def _result(self) -> str:
         try:
-            return self._seen.read_text(encoding="utf-8", errors="replace").strip()
+            return read_bounded(self._seen, _MOST_BYTES).decode("utf-8", "replace").strip()
         except OSError:
             return ""
 
     def _read(self) -> dict[str, object]:
         try:
-            found = json.loads(self._own.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            found = json.loads(read_bounded(self._own, _MOST_BYTES))
+        except (OSError, ValueError, RecursionError):
             return {}
         return found if isinstance(found, dict) else {}
 

@@ -24,6 +24,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from hashlib import blake2s
+from itertools import chain, islice
 from typing import NamedTuple
 
 from onboard.core.journal_records import JournalRecord, records_in
@@ -34,6 +35,9 @@ FORMAT = 2
 #: One page of the medium, bytes: a write that fails spoils one slot, never both.
 SLOT_BYTES = 4096
 SLOTS_BYTES = 2 * SLOT_BYTES
+#: Most records that are read, and the longest line of one, bytes: a journal that is written anew in time has some
+#: thousands (journal.py), the longest record a tenth of that. What is beyond them is damage, however it is chained.
+MOST_RECORDS, MOST_LINE = 200_000, 100_000
 _LINK_BYTES = 8
 _LINK_CHARS = 2 * _LINK_BYTES
 _CRC_CHARS = 8
@@ -148,7 +152,7 @@ def read(content: bytes, owner: str, name: str) -> Reading:
         return _read_old_form(content, name)
     seals = [_seal(content[at : at + SLOT_BYTES]) for at in (0, SLOT_BYTES)]
     seal = max((one for one in seals if one is not None), key=lambda one: one.records, default=None)
-    lines = list(_lines(content[SLOTS_BYTES:]))
+    lines = list(_lines(content))
     entries = [line.entry for line in lines[1:]]
     if (found := _other_owner(seal, lines, owner)) is not None:
         return _refused([], JournalState.FOREIGN, 0, f"{name}: this is the journal of {found}, not of {owner}")
@@ -211,14 +215,34 @@ def _restored(seal: Seal, lines: list[SealedLine]) -> list[SealedLine]:
 
 
 def _lines(content: bytes) -> Iterator[SealedLine]:
-    """Good lines from the first on, up to the first that is not."""
+    """Good lines behind the slots from the first on, up to the first that is not."""
     link = b""
-    for number, text in enumerate(content.splitlines(keepends=True)):
+    for number, text in enumerate(islice(_split(content, SLOTS_BYTES), 1 + MOST_RECORDS)):
         line = _checked(text, number, link)
         if line is None:
             return
         yield line
         link = line.link
+
+
+def _split(content: bytes, start: int) -> Iterator[bytes]:
+    """Lines with their ends, one by one: a list of all would take a multiple of what they take."""
+    while start < len(content):
+        end = content.find(b"\n", start) + 1 or len(content)
+        yield content[start:end]
+        start = end
+
+
+def _entry(text: bytes) -> Entry | None:
+    """One flat record; None for anything else. A link is no proof of who made it: what it holds is looked at too."""
+    if len(text) > MOST_LINE:
+        return None
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    is_flat = isinstance(found, dict) and all(isinstance(value, str | int) for value in found.values())
+    return found if is_flat else None
 
 
 def _checked(text: bytes, number: int, before: bytes) -> SealedLine | None:
@@ -228,8 +252,8 @@ def _checked(text: bytes, number: int, before: bytes) -> SealedLine | None:
     body = b" ".join(fields[1:])
     if fields[0] != _link(before, body):
         return None
-    entry: Entry = json.loads(fields[2])
-    return SealedLine(number, entry, fields[0], text)
+    entry = _entry(fields[2])
+    return SealedLine(number, entry, fields[0], text) if entry is not None else None
 
 
 def _said(head: SealedLine) -> HeadRecord:
@@ -289,9 +313,15 @@ def _seal(slot: bytes) -> Seal | None:
     if len(slot) != SLOT_BYTES or link != _link(b"slot", body):
         return None
     head, *lines = body.split(b"\n")
-    fields = json.loads(head)
-    copies = tuple(line + b"\n" for line in lines[: fields["copies"]])
-    return Seal(fields["owner"], fields["identity"], fields["records"], fields["link"], copies)
+    fields = _entry(head) or {}
+    try:
+        records, copies = int(fields["records"]), int(fields["copies"])
+        owner, identity, last = (str(fields[name]) for name in ("owner", "identity", "link"))
+    except (KeyError, ValueError):
+        return None
+    if min(records, copies) < 0:
+        return None
+    return Seal(owner, identity, records, last, tuple(line + b"\n" for line in lines[:copies]))
 
 
 # --- the form before this one ----------------------------------------------------------------------------------
@@ -305,27 +335,26 @@ def _is_old_form(content: bytes) -> bool:
 def _read_old_form(content: bytes, name: str) -> Reading:
     """Its entries. What is lost at its end cannot be seen; a damaged record before good ones can."""
     entries: list[Entry] = []
-    lines = content.split(b"\n")
-    for index, line in enumerate(lines):
+    state = JournalState.INTACT if content.endswith(b"\n") else JournalState.TORN
+    lines = islice(_split(content, 0), MOST_RECORDS)
+    for line in lines:
         entry = _old_entry(line, len(entries) + 1)
         if entry is None:
-            if any(_old_entry(later, None) is not None for later in lines[index:]):
+            if any(_old_entry(later, None) is not None for later in chain([line], lines)):
                 why = f"{name}: record {len(entries) + 1} is damaged and later ones are not: the medium has failed"
                 return _refused(entries, JournalState.SHORT, None, why)
+            state = JournalState.TORN
             break
         entries.append(entry)
-    torn = len(entries) < len(lines) - 1 or lines[-1] != b""
-    state = JournalState.TORN if torn else JournalState.INTACT
     return Reading(entries, JournalCondition(state), None, is_old_form=True)
 
 
 def _old_entry(line: bytes, number: int | None) -> Entry | None:
-    fields = line.split(b" ", _FIELDS - 1)
+    fields = line.removesuffix(b"\n").split(b" ", _FIELDS - 1)
     if len(fields) != _FIELDS or len(fields[0]) != _CRC_CHARS:
         return None
     if fields[0] != b"%08x" % zlib.crc32(b" ".join(fields[1:])):
         return None
     if number is not None and fields[1] != b"%d" % number:
         return None
-    entry: Entry = json.loads(fields[2])
-    return entry
+    return _entry(fields[2])

@@ -9,6 +9,8 @@ from onboard.operate.order import OperatorCommand
 from onboard.operate.station import OperatorStation
 
 _YES = ("y", "yes")
+#: Longest line that is taken for an answer, characters: a device in place of a person ends no line.
+_MOST_CHARS = 1_000
 
 
 class Asker:
@@ -46,13 +48,13 @@ class Asker:
 
         def read() -> None:
             if not answered.done():
-                answered.set_result(self._source.readline())
+                answered.set_result(self._source.readline(_MOST_CHARS))
 
         try:
             loop.add_reader(self._source, read)
         except (PermissionError, ValueError, OSError):
             # A file, or no input at all, never lets one wait.
-            return self._source.readline()
+            return self._source.readline(_MOST_CHARS)
         interrupted = loop.create_task(self._station.interrupted())
         try:
             await asyncio.wait((answered, interrupted), return_when=asyncio.FIRST_COMPLETED)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from deploy.image.layer import FILES as IMAGE_FILES
 from deploy.package import FILES
 from onboard.io.endings import ExitStatus
 from tests.tools import require_tool, run_tool
@@ -30,6 +31,30 @@ def test_systemd_takes_the_unit(unit: Path, tmp_path: Path) -> None:
     )
     complaints = [line for line in done.stderr.splitlines() if unit.name in line]
     assert done.returncode == 0 and complaints == [], done.stderr
+
+
+@pytest.mark.parametrize(
+    ("units", "most"),
+    [
+        (["onboard.service"], 2.0),
+        # On our image the user is there from the beginning.
+        (["onboard.service", "image.conf"], 2.0),
+        (["onboard-gateway.service"], 2.0),
+        (["onboard-recorder.service"], 2.0),
+        (["onboard-web.service"], 2.0),
+        (["onboard-stick.service"], 4.0),
+    ],
+)
+def test_a_service_has_no_more_of_the_board_than_it_needs(units: list[str], most: float, tmp_path: Path) -> None:
+    """As systemd counts exposure, from 0 to 10."""
+    require_tool("systemd-analyze")
+    unit = tmp_path / units[0]
+    places = (FILES, IMAGE_FILES)
+    unit.write_text("".join(file.read_text() for name in units for place in places for file in place.glob(name)))
+    words = ["--offline=true", "--no-pager", f"--threshold={most * 10:.0f}", str(unit)]
+    done = subprocess.run(["systemd-analyze", "security", *words], capture_output=True, text=True, check=False)
+    assert "Overall exposure level" in done.stdout
+    assert done.returncode == 0, "".join(line + "\n" for line in done.stdout.splitlines() if "✗" in line or "→" in line)
 
 
 def test_every_service_comes_back_and_none_after_a_mistake() -> None:

@@ -1,11 +1,14 @@
 """Signed updates on a board made of plain files: what is refused, what is written, and what the loader does next."""
 
 import contextlib
+import gzip
 import io
 import json
+import os
 import tarfile
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -17,13 +20,14 @@ from deploy.update.bundle import MANIFEST, write_bundle
 from deploy.update.install import install as install_telling
 from deploy.update.judge import judge
 from deploy.update.manifest import INITRD, KERNEL, ROOT, Manifest, UpdateError
-from deploy.update.signature import make_keys, public_key
+from deploy.update.signature import make_keys, public_key, sign
 from deploy.update.slots import ATTEMPTS, BoardEvent, Slots, after
 from tests.tools import require_tool
 
 SITE = Path(__file__).parents[2] / "bus_sim" / "sites" / "small.toml"
 PARTS = {KERNEL: b"kernel 2" * 1000, INITRD: b"initrd 2" * 100, ROOT: b"root 2" * 300_000}
 SLOT_BYTES = 3_000_000
+TODAY = date(2026, 11, 23)
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +49,8 @@ def place(secret: Path, tmp_path: Path) -> BoardFiles:
     (tmp_path / "release.json").write_text('{"board": "arm64", "version": "1.0"}')
     (tmp_path / "update.pem").write_bytes(public_key(secret))
     devices = {slot: tmp_path / slot for slot in "ab"}
-    made = BoardFiles("a", devices, boot, tmp_path / "release.json", tmp_path / "update.pem", contextlib.nullcontext)
+    release, key = tmp_path / "release.json", tmp_path / "update.pem"
+    made = BoardFiles("a", devices, boot, release, key, contextlib.nullcontext, lambda: TODAY)
     made.keep(Slots())
     return made
 
@@ -54,13 +59,13 @@ def place(secret: Path, tmp_path: Path) -> BoardFiles:
 def make(secret: Path, tmp_path: Path) -> Callable[..., Path]:
     """Makes an update file."""
 
-    def update(version: str = "1.1", key: Path = secret, site: str = "", **parts: bytes) -> Path:
+    def update(version: str = "1.1", key: Path = secret, site: str = "", expires: date = TODAY, **parts: bytes) -> Path:
         folder = tmp_path / "parts"
         folder.mkdir(exist_ok=True)
         for name, content in PARTS.items():
             (folder / name).write_bytes(parts.get(name.partition(".")[0], content))
         file = tmp_path / f"{version}.update"
-        write_bundle(file, {name: folder / name for name in PARTS}, key, version, site)
+        write_bundle(file, {name: folder / name for name in PARTS}, key, version, site, expires)
         return file
 
     return update
@@ -149,8 +154,57 @@ def test_an_update_that_is_not_newer_is_refused(
 
 def test_an_update_of_another_key_is_refused(place: BoardFiles, make: Callable[..., Path], tmp_path: Path) -> None:
     make_keys(tmp_path / "other.pem", tmp_path / "other.pub.pem")
-    why = "it is not signed with the key that this system trusts"
+    why = "it is not signed with a key that this system trusts"
     assert refused(make(key=tmp_path / "other.pem"), place) == why
+
+
+def test_an_update_is_taken_until_its_last_day(place: BoardFiles, make: Callable[..., Path]) -> None:
+    """Whoever kept an old one, with a weakness that is known by now, cannot put it onto a board that is older still."""
+    late = replace(place, today=lambda: TODAY + timedelta(days=1))
+    why = "it was to be taken until 2026-11-23, and the clock here says 2026-11-24; make it anew"
+    assert refused(make(), late) == why
+    assert install(make(), place).expires == TODAY
+
+
+def test_what_does_not_say_until_when_is_refused(
+    place: BoardFiles, make: Callable[..., Path], secret: Path, tmp_path: Path
+) -> None:
+    with tarfile.open(make()) as whole, tarfile.open(tmp_path / "endless.update", "w") as endless:
+        parts = {entry.name: io.BytesIO(whole.extractfile(entry).read()) for entry in whole}  # type: ignore[union-attr]  # all are files
+        said = json.loads(parts["manifest.json"].read())
+        del said["expires"]
+        parts["manifest.json"] = io.BytesIO(json.dumps(said).encode())
+        parts["manifest.sig"] = io.BytesIO(sign(parts["manifest.json"].getvalue(), secret))
+        for name, content in parts.items():
+            entry = tarfile.TarInfo(name)
+            entry.size = len(content.getvalue())
+            endless.addfile(entry, content)
+    assert refused(tmp_path / "endless.update", place) == "its manifest cannot be read; make the update anew"
+
+
+def test_where_nothing_is_said_an_update_lives_for_some_months(secret: Path, tmp_path: Path) -> None:
+    for name in PARTS:
+        (tmp_path / name).write_bytes(b"x")
+    manifest = write_bundle(tmp_path / "new.update", {name: tmp_path / name for name in PARTS}, secret, "1.1")
+    assert timedelta(days=89) <= manifest.expires - datetime.now(UTC).date() <= timedelta(days=90)
+
+
+def test_a_stolen_key_is_revoked_by_an_update_of_the_other(
+    place: BoardFiles, make: Callable[..., Path], secret: Path, tmp_path: Path
+) -> None:
+    """A board trusts two; the one in the safe signs a system that trusts others."""
+    keys = {}
+    for name in ("safe", "new"):
+        make_keys(tmp_path / f"{name}.pem", tmp_path / f"{name}.pub.pem")
+        keys[name] = public_key(tmp_path / f"{name}.pem")
+    place.key.write_bytes(public_key(secret) + keys["safe"])
+    assert install(make(), place).version == "1.1"
+    place.keep(Slots())
+    assert install(make("1.2", key=tmp_path / "safe.pem"), place).version == "1.2"
+    board = started(place, "b", "1.2")
+    board.key.write_bytes(keys["new"] + keys["safe"])
+    board.keep(Slots(good="b"))
+    assert "is not signed with" in refused(make("1.3"), board)
 
 
 def test_an_update_for_another_site_or_board_is_refused(place: BoardFiles, make: Callable[..., Path]) -> None:
@@ -200,6 +254,28 @@ def test_a_file_that_is_something_else_is_refused(place: BoardFiles, tmp_path: P
         entry.size = 1 << 17
         other.addfile(entry, io.BytesIO(bytes(entry.size)))
     assert refused(tmp_path / "other.tar", place) == "it is not an update file"
+
+
+@pytest.mark.parametrize("form", [tarfile.XHDTYPE, tarfile.GNUTYPE_LONGNAME, tarfile.GNUTYPE_SPARSE, tarfile.SYMTYPE])
+def test_a_head_that_a_reader_would_unfold_is_refused_unread(place: BoardFiles, tmp_path: Path, form: bytes) -> None:
+    """A reader of any archive holds 4 GB of an extended head before it knows whose the file is."""
+    head = tarfile.TarInfo(MANIFEST)
+    head.type, head.size = form, 4 << 30
+    file = tmp_path / "head.update"
+    file.write_bytes(head.tobuf(tarfile.GNU_FORMAT))
+    os.truncate(file, 5 << 30)
+    assert refused(file, place) == "it is not an update file, or not a whole one"
+
+
+def test_a_packed_update_is_not_unpacked(place: BoardFiles, make: Callable[..., Path], tmp_path: Path) -> None:
+    file = tmp_path / "packed.update"
+    file.write_bytes(gzip.compress(make().read_bytes(), 1))
+    assert refused(file, place) == "it is not an update file, or not a whole one"
+
+
+def test_what_is_no_file_is_not_opened(place: BoardFiles, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.update")
+    assert refused(tmp_path / "pipe.update", place) == "it is not a file; name an update file"
 
 
 def test_a_root_file_system_larger_than_the_slot_is_refused(place: BoardFiles, make: Callable[..., Path]) -> None:

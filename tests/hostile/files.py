@@ -4,6 +4,7 @@ import os
 import struct
 import zlib
 from collections.abc import Iterator
+from hashlib import blake2s
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,15 +15,22 @@ _LOG = b"(1795219200.000000) fleet 18FF0201#08C3\n"
 
 
 class Hostile(NamedTuple):
-    """``command`` reads it under the name ``{}``; ``content`` None is a pipe that never ends, a path a device."""
+    """A file, and the ``command`` that reads it under the name ``{}``.
+
+    ``content`` None is a pipe that never ends, a path a device, a number so many bytes that are holes.
+
+    A ``suffix`` that begins with a stroke is its name in a folder, and ``{}`` is that folder.
+    """
 
     name: str
     command: str
-    content: bytes | Path | None
+    content: bytes | Path | int | None
     suffix: str = ""
 
 
 ZERO = Path("/dev/zero")
+#: So many bytes of a file that has none.
+_HOLES = 5_000_000_000
 DEEP = b"[" * 50_000
 DOTS = b"a." * 50_000 + b"a = 1\n"
 HUGE = b"9" * 100_000
@@ -36,6 +44,7 @@ _CHECK = "onboard trace check {} --site small"
 _DUMP = "onboard trace dump {} --decode --site small"
 _DBC = "onboard trace dump log --decode --dbc {}"
 _IMPORT = "bus-sim import {} -o site.toml"
+_SPOOL = "onboard gateway -i virtual -c f --site small --mqtt mqtt://127.0.0.1:9 --spool {}"
 _GATEWAY = "onboard gateway -i virtual -c f --site small --mqtt mqtt://127.0.0.1:9"
 
 
@@ -65,9 +74,21 @@ def hostile() -> Iterator[Hostile]:
     yield Hostile("machine file: endless", _ONBOARD, ZERO)
     yield Hostile("machine file: a pipe that never ends", _ONBOARD, None)
     yield Hostile("machine file: an endless site", _ONBOARD, _MACHINE.format(site="/dev/zero").encode(), ".toml")
+    yield Hostile("machine file to commission: endless", "hil commission --machine {}", ZERO)
+    yield Hostile("old board: nested", "deploy replace --card {} --out new", b"x = " + DEEP, "/machine.toml")
+    yield Hostile("old journal: endless", "deploy replace --card card --journal {} --out new", _HOLES, "/journal.log")
+    yield Hostile("journal: endless", _SPOOL, ZERO, "/journal.log")
+    yield Hostile("journal: a pipe that never ends", _SPOOL, None, "/journal.log")
+    yield Hostile("journal: nested", _SPOOL, _chained(DEEP), "/journal.log")
+    yield Hostile("journal: 8,000,000 lines", _SPOOL, _chained(b"{}") + b"x\n" * 8_000_000, "/journal.log")
+    yield Hostile("journal: 250,000 records", _SPOOL, bytes(2 * 4_096) + b"".join(_records(250_000)), "/journal.log")
+    yield Hostile("key of updates: endless", "deploy image --key {} --out image", _HOLES)
+    yield Hostile("boards' site: endless", "deploy machines {} --out machines", ZERO)
     yield Hostile("broker's password: endless", _GATEWAY + " --mqtt-password {}", ZERO)
     yield Hostile("broker's password: a pipe that never ends", _GATEWAY + " --mqtt-password {}", None)
     yield Hostile("authority: endless", _GATEWAY.replace("mqtt://", "mqtts://") + " --mqtt-ca {}", ZERO)
+    yield Hostile("certificate: endless", _GATEWAY + " --mqtt-cert {} --mqtt-key log", ZERO)
+    yield Hostile("certificate's key: endless", _GATEWAY + " --mqtt-cert log --mqtt-key {}", ZERO)
     yield Hostile(
         "served bus's token: endless",
         "bus-sim run small --one-car 60 --for 1 --serve 127.0.0.1:0 --serve-token {}",
@@ -94,6 +115,8 @@ def hostile() -> Iterator[Hostile]:
     yield Hostile("mapping: nested", _MAPPING, b"x = " + DEEP, ".toml")
     # Logs and contracts.
     yield Hostile("log: endless", _CHECK, ZERO)
+    yield Hostile("page's log: endless", "onboard web {} --site small --web 0", ZERO)
+    yield Hostile("contract: endless", _CHECK.replace("{}", "log") + " --dbc {}", ZERO)
     yield Hostile("candump: a line of 300 MB", _CHECK, _LOG + b"(1795219200.0000", ".log")
     yield Hostile(
         "ASC: a line of 300 MB", _DUMP, b"date Sat Nov 21 00:00:00.000 am 2026\nbase hex timestamps absolute\n", ".asc"
@@ -139,6 +162,7 @@ def hostile() -> Iterator[Hostile]:
     )
     yield Hostile("map: 10^9 cells wide", _IMPORT, b"type octile\nheight 1\nwidth 1000000000\nmap\n.\n", ".map")
     yield Hostile("map: a pipe that never ends", _IMPORT, None, ".map")
+    yield Hostile("tasks: endless", "bus-sim import small.map {} -o site.toml", ZERO, ".task")
 
 
 #: What is longer than it is worth keeping in memory: the suffix of its beginning, and how it goes on.
@@ -148,7 +172,11 @@ LONG = {".log": 300, ".asc": 300, ".trc": 300}
 def made(one: Hostile, folder: Path, number: int) -> Path:
     """Its file."""
     path = folder / f"hostile-{number}{one.suffix}"
-    if one.content is None:
+    path.parent.mkdir(exist_ok=True)
+    if isinstance(one.content, int):
+        path.touch()
+        os.truncate(path, one.content)
+    elif one.content is None:
         os.mkfifo(path)
     elif isinstance(one.content, Path):
         path.symlink_to(one.content)
@@ -158,6 +186,19 @@ def made(one: Hostile, folder: Path, number: int) -> Path:
             # A hole reads as zeros and takes no room.
             os.truncate(path, LONG[one.suffix] * 1_000_000)
     return path
+
+
+def _chained(record: bytes) -> bytes:
+    """A journal without slots whose one line has the link that it should have."""
+    return bytes(2 * 4_096) + b"".join(_records(1, record))
+
+
+def _records(count: int, record: bytes = b"{}") -> Iterator[bytes]:
+    link = b""
+    for number in range(count):
+        body = b"%d %s" % (number, record)
+        link = blake2s(link + b" " + body, digest_size=8).hexdigest().encode()
+        yield link + b" " + body + b"\n"
 
 
 def _laughs() -> bytes:

@@ -15,6 +15,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypedDict
 
 from bus_sim import cli as bus_sim
+from deploy import cli as deploy
+from hil import cli as hil
 from onboard import bounded_file
 from onboard import cli as onboard
 from onboard.trace import cli as trace
@@ -22,7 +24,12 @@ from onboard.trace import cli as trace
 #: Processor seconds and wall seconds after which a play is ended, and address space that it may take, bytes.
 MOST_CPU_S, MOST_WALL_S, MOST_SPACE = 6, 60, 2 << 30
 _MOST_SAID = 100_000
-PROGRAMS: dict[str, Callable[[Sequence[str]], int]] = {"bus-sim": bus_sim.main, "onboard": onboard.main}
+PROGRAMS: dict[str, Callable[[Sequence[str]], int]] = {
+    "bus-sim": bus_sim.main,
+    "deploy": deploy.main,
+    "hil": hil.main,
+    "onboard": onboard.main,
+}
 
 
 class Play(TypedDict):

@@ -5,6 +5,7 @@ import json
 import os
 import sys
 import zlib
+from hashlib import blake2s
 from pathlib import Path
 
 import pytest
@@ -304,6 +305,60 @@ async def test_a_short_journal_is_begun_anew_and_the_old_one_kept(tmp_path: Path
     await journal.close()
     assert (tmp_path / f"{FILE_NAME}.1").read_bytes() == short
     assert await read(tmp_path) == (ENTRIES, JournalState.INTACT)
+
+
+#: What a record is not, as text: nested beyond any parser, and of other types than a record has.
+NO_RECORDS = [
+    b"[" * 50_000,
+    b'{"a":' * 20_000,
+    b"[]",
+    b"7",
+    b'{"record":["boot"]}',
+    b'{"record":null}',
+    b"{" + b"9" * 9_000,
+]
+
+
+def chained(body: bytes, before: bytes = b"") -> bytes:
+    """A line with a link that is right: whoever can write the file can make it."""
+    return b"%s %s" % (blake2s(before + b" " + body, digest_size=8).hexdigest().encode(), body)
+
+
+@pytest.mark.parametrize("said", NO_RECORDS, ids=lambda said: f"{said[:12]!r}")
+def test_what_is_no_record_is_damage_though_its_seal_is_right(said: bytes) -> None:
+    head = begin(OWNER, "1")[0]
+    after = lines_of(head)[0][:16]
+    body = b"1 " + said + b"\n"
+    found = read_bytes(head + chained(body.rstrip(b"\n"), after) + b"\n", OWNER, "x")
+    assert (found.entries, found.condition.state) == ([], JournalState.TORN)
+    old = b"%08x 1 " % zlib.crc32(b"1 " + said) + said + b"\n"
+    assert read_bytes(old, OWNER, "x").condition.state is JournalState.SHORT
+    slot = (said + b"\n").ljust(SLOT_BYTES - 18)[: SLOT_BYTES - 18] + b"\n"
+    assert read_bytes(chained(slot, b"slot") * 2, OWNER, "x").condition.state is JournalState.SHORT
+
+
+async def test_a_journal_that_does_not_end_is_left_alone(tmp_path: Path) -> None:
+    """A device, or a file of holes: neither is held in memory."""
+    (tmp_path / FILE_NAME).symlink_to("/dev/zero")
+    journal = opened(tmp_path)
+    assert journal.replay() == [] and journal.condition.state is JournalState.SHORT
+    assert "is longer than 32 MB" in journal.condition.line
+    with pytest.raises(JournalDamagedError):
+        await journal.append(ENTRIES[0])
+    await journal.renew(ENTRIES)
+    await journal.close()
+    assert await read(tmp_path) == (ENTRIES, JournalState.INTACT)
+
+
+async def test_what_could_not_be_read_again_is_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = await write(tmp_path, ENTRIES[:2])
+    monkeypatch.setattr("onboard.io.journal.MOST_BYTES", len(whole) + 20)
+    journal = opened(tmp_path)
+    assert journal.replay() == ENTRIES[:2]
+    with pytest.raises(OSError, match="a journal takes"):
+        await journal.append(ENTRIES[2])
+    await journal.close()
+    assert await read(tmp_path) == (ENTRIES[:2], JournalState.INTACT)
 
 
 @given(st.binary(max_size=200))

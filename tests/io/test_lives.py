@@ -54,6 +54,14 @@ def test_files_that_cannot_be_read_or_written_stop_nobody(tmp_path: Path) -> Non
     assert lives.end(ExitStatus.STOPPED, 0) is ExitStatus.STOPPED
 
 
+def test_files_that_are_not_ours_stop_nobody(tmp_path: Path) -> None:
+    (tmp_path / "journal.life").write_text("[" * 1_000)
+    (tmp_path / "journal.ended").symlink_to("/dev/zero")
+    assert LifeBook(tmp_path / "journal").begin() == LastLife()
+    (tmp_path / "other.life").symlink_to("/dev/zero")
+    assert LifeBook(tmp_path / "other").begin() == LastLife()
+
+
 def test_what_only_a_person_can_know_waits_for_one() -> None:
     by_itself = {reason for reason in Reason if ending_of(reason) is ExitStatus.COMES_BACK}
     assert by_itself == {Reason.INVARIANT_BROKEN, Reason.RUNAWAY, Reason.WATCHDOG, Reason.BUS_LOST}

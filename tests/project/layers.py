@@ -151,7 +151,7 @@ LAYERS: dict[str, Layer] = {
         ("onboard.core", "onboard.holon", "onboard.wire", "onboard.ports"),
         not_stdlib=CLOCK_AND_CHANCE | {"socket", "os", "pathlib"},
     ),
-    "onboard.io": Layer(("onboard.ports", "onboard.core", "onboard.wire"), ("can", "aiomqtt")),
+    "onboard.io": Layer(("onboard.bounded_file", "onboard.ports", "onboard.core", "onboard.wire"), ("can", "aiomqtt")),
     "onboard.trace": Layer(
         (*CORE_TYPES, *REGISTRY, "onboard.history", "onboard.wire"),
         not_stdlib=frozenset({"asyncio", "random", "threading"}),
@@ -247,7 +247,15 @@ LAYERS: dict[str, Layer] = {
     # A board's updater listens for its own controller's heartbeats.
     "deploy": Layer(
         (
-            *("onboard", "onboard.config", "onboard.entry", *CORE_TYPES, "onboard.io.journal", "onboard.wire"),
+            *(
+                "onboard",
+                "onboard.bounded_file",
+                "onboard.config",
+                "onboard.entry",
+                *CORE_TYPES,
+                "onboard.io.journal",
+                "onboard.wire",
+            ),
             *("hil.guest.effort", "hil.guest.initrd", "hil.guest.kernel"),
         ),
         ("pytest",),
