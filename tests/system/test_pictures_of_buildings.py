@@ -1,6 +1,7 @@
 """Buildings of more than an alley a floor: in the terminal, on the page, as a drawing; the highest floor first."""
 
 import re
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import pytest
@@ -19,6 +20,7 @@ from onboard.systems.car_park.outlines import Outlines
 from onboard.systems.car_park.scene import CarParkScene
 from onboard.systems.car_park.site import car_park
 from onboard.trace.view import SiteView
+from tests.web.test_contrast import contrast
 
 
 def test_the_terminal_shows_each_floor_with_who_is_there() -> None:
@@ -120,9 +122,131 @@ def test_floors_lie_as_high_as_the_file_says_though_no_lift_joins_one_to_the_nex
     assert 'fill="#e4e4e4"' not in svg[svg.index(">p(5,1)<") : svg.index("floor 4, 8.7 m")]
 
 
-@pytest.mark.parametrize("name", ["level1", "standard"])
-def test_a_straight_building_is_drawn_as_well(name: str) -> None:
-    assert str(draw(car_park(find_site(name)))).endswith("</svg>\n")
+class Words(NamedTuple):
+    """What is written in a drawing, and where: left, top, right, bottom, px."""
+
+    words: str
+    fill: str
+    box: tuple[float, float, float, float]
+
+
+def written(root: ElementTree.Element) -> list[Words]:
+    """All texts of a drawing; a letter is 0.58 of its height wide, as DejaVu Sans has it."""
+    found = []
+    for one in root.iter("{http://www.w3.org/2000/svg}text"):
+        x, y, size = float(one.get("x", "0")), float(one.get("y", "0")), float(one.get("font-size", "11"))
+        words, wide = one.text or "", 0.58 * size * len(one.text or "")
+        before = {"start": 0.0, "middle": wide / 2, "end": wide}[one.get("text-anchor", "start")]
+        box = (x - before, y - 0.75 * size, x - before + wide, y)
+        if one.get("transform") is not None:
+            box = (x - 0.75 * size, y - before, x, y - before + wide)
+        found.append(Words(words, one.get("fill", ""), box))
+    return found
+
+
+def areas(root: ElementTree.Element, fill: str) -> list[tuple[float, float, float, float]]:
+    """Rectangles of one colour."""
+    found = []
+    for one in root.iter("{http://www.w3.org/2000/svg}polygon"):
+        if one.get("fill") == fill:
+            points = [[float(part) for part in point.split(",")] for point in one.get("points", "").split()]
+            xs, ys = zip(*points, strict=True)
+            found.append((min(xs), min(ys), max(xs), max(ys)))
+    return found
+
+
+def is_within(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    return one[0] >= other[0] and one[1] >= other[1] and one[2] <= other[2] and one[3] <= other[3]
+
+
+#: Twenty machines with the longest names, narrow slots, a spur of one segment that is a home, a class by a long name.
+NARROW = """
+[site]
+name = "narrow"
+[floors]
+count = 2
+positions = 40
+pitch_mm = 1200
+[carrier]
+length_mm = 1100
+[[lifts]]
+name = "Lift_by_the_wall"
+node = 5
+end = "left"
+[[lifts]]
+name = "Lift_by_the_tree"
+node = 6
+doors = ["p(*,2)F"]
+[[spurs]]
+at = "p(*,10)"
+[[compartments]]
+name = "Bay_to_the_south"
+node = 1
+at = "p(1,4)"
+use = "exit"
+[[compartments]]
+name = "In"
+node = 2
+at = "p(1,5)"
+[[classes]]
+name = "small ones of the neighbours"
+max_length_mm = 4000
+charging = true
+places = ["p(2,20-40)"]
+[[robots]]
+name = "Robot_number_one"
+node = 11
+home = "p(192,1)"
+"""
+
+
+@pytest.mark.parametrize("name", [*layout_names(), "level1", "small", "standard", "large", "narrow"])
+def test_what_is_written_can_be_read(name: str) -> None:
+    """Nothing is clipped or lies on other words; white names lie wholly on dark bodies."""
+    site = parse_site(NARROW, "n.toml") if name == "narrow" else find_site(name)
+    root = ElementTree.fromstring(str(draw(car_park(site))))
+    whole = (0.0, 0.0, float(root.get("width", "0")), float(root.get("height", "0")))
+    words, bodies = written(root), areas(root, "#404040")
+    assert [one for one in words if not is_within(one.box, whole)] == []
+    met = [
+        (one.words, other.words)
+        for number, one in enumerate(words)
+        for other in words[number + 1 :]
+        if one.box[0] < other.box[2]
+        and other.box[0] < one.box[2]
+        and one.box[1] < other.box[3]
+        and other.box[1] < one.box[3]
+    ]
+    assert met == []
+    white = [one for one in words if one.fill == "#ffffff"]
+    assert all(any(is_within(one.box, body) for body in bodies) for one in white)
+    assert {machine.name for machine in site.machines.values()} <= {one.words for one in words}
+
+
+def test_a_drawing_has_the_contrast_that_its_readers_need() -> None:
+    """Lines 3:1 on paper and on ways, words 4.5:1 (WCAG 2.2); thin ones only part what other lines bound."""
+    for name in ("ring", "sizes"):
+        root = ElementTree.fromstring(str(draw(car_park(find_site(name)))))
+        lines = {one.get("stroke", "") for one in root.iter() if float(one.get("stroke-width", "0")) >= 1} - {None}
+        weak = {line for line in lines - {"#ffffff", "#e4e4e4", ""} if contrast(line, "#ffffff") < 3}
+        inside = {"#7a7a7a", "#00835F", "#0072B2", "#000000"}
+        assert weak | {line for line in inside & lines if contrast(line, "#e4e4e4") < 3} == set()
+        fills = {one.fill for one in written(root)}
+        assert {fill for fill in fills - {"#ffffff"} if contrast(fill, "#ffffff") < 4.5} == set()
+        assert contrast("#444444", "#e4e4e4") >= 4.5
+        assert contrast("#ffffff", "#404040") >= 4.5
+
+
+def test_a_drawing_tells_alleys_doors_turns_uses_and_classes() -> None:
+    twin, sizes = (str(draw(car_park(find_site(name)))) for name in ("twin", "sizes"))
+    # On three floors two lifts with a door to each alley, and a sign of it in the head.
+    assert twin.count('stroke="#0072B2" stroke-width="6"') == 3 * 2 * 2
+    assert twin.count(">B<") == 3, "the alley by the name that the file gives it"
+    assert twin.count("<circle") == 3 * 4 + 1
+    assert (twin.count(">in only<"), twin.count(">out only<")) == (1, 1)
+    assert ">charging: to 5300 mm long, 1800 mm high, 2050 mm wide, 3000 kg, to charge<" in sizes
+    # A place has the number of its class, whatever its colour.
+    assert [sizes.count(f">{number}<") for number in (1, 2, 3)] == [24 + 1, 30 + 1, 6 + 1]
 
 
 def test_the_page_is_told_classes_places_to_charge_and_what_desks_show() -> None:
