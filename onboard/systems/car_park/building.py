@@ -6,10 +6,9 @@ from itertools import count
 
 from onboard.contract.codes import KindCode
 from onboard.core.site import Segment, Station
-from onboard.systems.car_park.outlines import Box, Outlines
+from onboard.systems.car_park.outlines import Box, Outlines, level_heights_mm
 from onboard.systems.car_park.site import CarPark, SizeClass
 from onboard.trace.chart.svg import SvgDrawing, colour
-from onboard.ways.lifts import stop_mm
 from onboard.ways.site import BayUse, TrackKind
 
 #: px a mm, and of the narrowest slot at least, px: what is written has room. A picture is as wide as its floors.
@@ -43,7 +42,7 @@ class _Building:
         self.scale = max(_SCALE, _LEAST_SLOT / self.outlines.slot_mm)
         self.width = max(_LEAST_WIDTH, (max(box.right for box in boxes) - self.left) * self.scale + 2 * _MARGIN)
         self.homes = {one.home: one.name for one in site.machines.values() if one.kind is KindCode.ROBOT}
-        self.heights_mm = _level_heights_mm(site, self.levels)
+        self.heights_mm = level_heights_mm(site)
 
     def draw(self) -> SvgDrawing:
         signs = list(self._signs())
@@ -353,26 +352,3 @@ def _class_words(one: SizeClass) -> str:
     words = f"{one.name}: to {one.max_length_mm} mm long, {one.max_height_mm} mm high"
     words += f", {one.max_width_mm} mm wide" if one.max_width_mm else ""
     return f"{words}, {one.max_load_kg} kg" + (", to charge" if one.charging else "")
-
-
-def _level_heights_mm(site: CarPark, levels: list[int]) -> dict[int, int]:
-    """How high each floor lies above the lowest, as lifts' stops tell; floors that none joins are as high as usual."""
-    known: dict[int, int] = {}
-    for level in reversed(levels):
-        if level not in known:
-            known[level] = (level - 1) * site.floor_height_mm
-            _tell_above(site, known)
-    low = min(known.values())
-    return {level: height_mm - low for level, height_mm in known.items()}
-
-
-def _tell_above(site: CarPark, known: dict[int, int]) -> None:
-    """Add the heights of all floors that are joined to known ones, if over several lifts."""
-    shafts = [
-        {site.level(sill.track): stop_mm(site, lift, at) for at, sill in enumerate(site.tracks[lift].joins, start=1)}
-        for lift in site.lifts
-    ]
-    while shaft := next((one for one in shafts if known.keys() & one.keys() and one.keys() - known.keys()), None):
-        first = min(known.keys() & shaft.keys())
-        for level, height_mm in shaft.items():
-            known.setdefault(level, known[first] + height_mm - shaft[first])
