@@ -71,7 +71,8 @@ def test_a_car_of_a_class_is_as_large_as_the_class_allows(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("row", "line"),
     [
-        ("long,,,,,", "length_mm 'long' is no number; write one from 1000 to 8191"),
+        ("long,,,,,", "length_mm 'long' is no number; write a whole number from 1000 to 8191"),
+        ('"4,25",,,,,,', "length_mm '4,25' has a comma; write a whole number from 1000 to 8191, without a comma"),
         ("900,,,,,", "length_mm '900' is out of range; write a whole number from 1000 to 8191"),
         (",,,1.5,,", "weight_kg '1.5' is out of range; write a whole number from 50 to 4095"),
         (",,,,,,maybe", "charging 'maybe': write yes or no"),

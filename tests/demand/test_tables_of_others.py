@@ -381,18 +381,20 @@ def test_an_hour_that_the_clock_showed_twice_is_counted_twice(tmp_path: Path) ->
 def test_bad_rows_of_counts_are_named(tmp_path: Path) -> None:
     text = (
         "hour,arrivals,departures\n7,1,1\n7,1,1\n24,1,1\n8,x,1\n9,-1,1\n10,1.5,1\n11,1,\n07:30,1,1\n"
-        "2019-07-24T07:30Z,1,1\n2019-07-24T08:00Z,1,1\n"
+        '2019-07-24T07:30Z,1,1\n2019-07-24T08:00Z,1,1\n12,"4,25",1\n13,4,25,1\n'
     )
     told = [
         "table.csv:3: hour '7' is that of line 2 too; leave one out",
         "table.csv:4: hour '24' is out of range; write one from 0 to 23",
-        "table.csv:5: arrivals 'x' is no number; write one from 0 to 10000",
+        "table.csv:5: arrivals 'x' is no number; write a whole number from 0 to 10000",
         "table.csv:6: arrivals '-1' is out of range; write a whole number from 0 to 10000",
         "table.csv:7: arrivals '1.5' is out of range; write a whole number from 0 to 10000",
         "table.csv:8: departures is empty; every row needs one",
         "table.csv:9: hour '07:30' is no date and time; write it as",
         "table.csv:10: hour '2019-07-24T07:30Z' is no full hour; write when each hour begins",
         "table.csv:11: hour '2019-07-24T08:00Z': others are written in another way; write all with a date, or none",
+        "table.csv:12: arrivals '4,25' has a comma; write a whole number from 0 to 10000, without a comma",
+        "table.csv:13: has 4 cells, the first line 3 names; put values that hold a comma in quotes, and write numbers",
     ]
     lines = refused(tmp_path, text, kind="counts")
     assert len(lines) == len(told) + 1

@@ -20,10 +20,13 @@ from tests.once import once
 
 ROOT = Path(__file__).parents[2]
 SITE_FILES = ROOT / "bus_sim" / "sites"
+#: Sites of a folder of their own.
+_LAYOUTS = ("twin",)
 #: What a site's run is asked for, where it is not its own day.
 _WORDS = {
     "standard": ["--random", "20", "5", "--cars", "8", "--for", "420"],
     "small": ["--one-car", "60"],
+    "twin": ["--one-car", "60", "--for", "15"],
     "turning": ["--for", "900"],
 }
 #: Where no site of a system ships, one that is made for tests.
@@ -34,7 +37,7 @@ _MADE = {"mapd": lambda: site_text(4, drawn(8, 5))}
 def file_of(name: str) -> Path:
     """The site file of a shipped site, or of one that is made."""
     if name not in _MADE:
-        return SITE_FILES / f"{name}.toml"
+        return SITE_FILES / ("layouts" if name in _LAYOUTS else "") / f"{name}.toml"
 
     def write(folder: Path) -> None:
         (folder / f"{name}.toml").write_text(_MADE[name](), encoding="utf-8")

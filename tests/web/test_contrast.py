@@ -56,7 +56,7 @@ def test_shapes_and_text_stand_out_from_every_ground(theme: dict[str, str]) -> N
 def test_every_colour_that_is_drawn_is_one_that_is_judged() -> None:
     used = {
         name
-        for file in ("draw.js", "plan.js", "paint.js", "page.css")
+        for file in ("draw.js", "building.js", "plan.js", "paint.js", "page.css")
         for name in re.findall(r"--(\w+)", (PAGE / file).read_text(encoding="utf-8"))
     }
     assert used <= {*SHAPES, *TEXTS, *FILLS}

@@ -69,6 +69,45 @@ def test_plans_go_along_the_ways(browser: Page, errors: list[str], tmp_path: Pat
     assert not errors
 
 
+def test_every_machine_of_a_building_has_its_name_and_every_lift_its_doors(
+    browser: Page, errors: list[str], tmp_path: Path
+) -> None:
+    """Where there is no room within a machine its name is beside it, on no machine and on no other name."""
+    words = ["onboard", "web", str(log_of("twin")), "--site", "twin", "--web", "0"]
+    with served(words, tmp_path) as address:
+        paused(browser, address)
+        at(browser, 1000)
+        is_beside = []
+        for width in (1600, 700):
+            browser.set_viewport_size({"width": width, "height": 800})
+            drawn(browser, "machine")
+            boxes: list[dict[str, Any]] = browser.evaluate("document.querySelector('#picture').drawn")
+            machines = [box for box in boxes if box["what"] == "machine"]
+            assert sorted(box["name"] for box in machines) == ["ER1", "ER2", "In", "MR1", "MR2", "Out"]
+            beside = [box["beside"] for box in machines if box.get("beside") is not None]
+            for number, one in enumerate(beside):
+                assert not any(meet(one, other) for other in [*beside[number + 1 :], *machines])
+            is_beside.append(len(beside))
+            assert sum(box["what"] == "door" for box in boxes) == 3 * 2 * 2
+            assert {box["id"]: box["use"] for box in machines if "use" in box} == {1: "entry", 2: "exit"}
+        assert is_beside[0] < is_beside[1]
+        inner = browser.evaluate(
+            """async () => (await import("./paint.js"))
+                .load({ fillRect() {} }, { x: 0, y: 0, w: 40, h: 20 })"""
+        )
+        assert 0 < inner["x"] < inner["x"] + inner["w"] < 40, "what is written on a load is within it"
+        marks = browser.evaluate(
+            """async () => [...(await import("./draw.js")).marksOf(
+                { classes: { 1: "small", 2: "short", 3: "plug" }, charging: [3] })]"""
+        )
+        assert dict(marks) == {"small": "sm", "short": "sh", "plug": "\u26a1"}
+    assert not errors
+
+
+def meet(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    return all(one[a] < other[a] + other[b] and other[a] < one[a] + one[b] for a, b in ("xw", "yh"))
+
+
 @pytest.mark.parametrize(
     ("site", "machines", "boxes"), [("small", ["IOC1", "ER1", "MR1"], ["1", "5", "11"]), ("turning", ["L1"], None)]
 )

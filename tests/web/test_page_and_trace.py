@@ -13,6 +13,7 @@ from onboard.contract.constants import ANY_STATION, OUTSIDE
 from onboard.contract.messages import Award, Bid, CallForProposals, CarAt, Progress, Reference, TaskReport
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import car_park
+from onboard.ways.lifts import lift_at
 from tests.web.browser import drawn, rows, served
 from tests.web.logs import SITE_FILES, film_of, log_of, said_in
 
@@ -82,7 +83,9 @@ def _compare(page: Page, told: Told) -> None:
     shown = {row[0]: row for row in rows(page, "machines")}
     for node, name in ROBOTS.items():
         at = told.places.get(node)
-        assert shown[name][2] == (f"p({at.track},{at.index})" if at is not None else str(SITE.machines[node].home))
+        where = Segment(at.track, at.index) if at is not None else SITE.machines[node].home
+        lift = lift_at(SITE, where)
+        assert shown[name][2] == (str(where) if lift is None else f"in {SITE.machines[SITE.stewards[lift]].name}")
         aboard = [one.car for one in told.cars.values() if one.station == ANY_STATION and one.sender == node]
         assert shown[name][3] == "".join(_name(car) for car in aboard)
     standing = {one.station: one.car for one in told.cars.values() if one.station not in (ANY_STATION, OUTSIDE)}

@@ -75,9 +75,10 @@ class CsvRow(NamedTuple):
         try:
             value = float(text)
         except ValueError as error:
-            raise CellError(f"{column} {text!r} is no number; write one from {low} to {high}") from error
+            has = "has a comma" if "," in text else "is no number"
+            raise CellError(f"{column} {text!r} {has}; write {_whole(text, low, high)}") from error
         if not low <= value <= high or value != int(value):
-            raise CellError(f"{column} {text!r} is out of range; write a whole number from {low} to {high}")
+            raise CellError(f"{column} {text!r} is out of range; write {_whole(text, low, high)}")
         return int(value)
 
 
@@ -116,7 +117,8 @@ class CsvTable:
                 row = CsvRow(reader.line_num, _known(cells, at))
                 if len(cells) < len(head) or any(cell.strip() for cell in cells[len(head) :]):
                     found = f"has {len(cells)} cell{'s' * (len(cells) > 1)}, the first line {len(head)} names"
-                    self.note(row, CellError(f"{found}; put values that hold a {self._mark()} in quotes"))
+                    more = ", and write numbers without one" if self.form.delimiter == "," else ""
+                    self.note(row, CellError(f"{found}; put values that hold a {self._mark()} in quotes{more}"))
                 else:
                     yield row
         except csv.Error as error:
@@ -171,6 +173,11 @@ class CsvTable:
         named = ",".join(f"{column}=NAME" for column in needed)
         shown = ", ".join(head[:12]) + (", ..." if len(head) > 12 else "")
         return f"it has {shown}; say which is which: --columns {named}"
+
+
+def _whole(text: str, low: int, high: int) -> str:
+    """What to write in the stead of a text: a comma divides neither thousands nor parts."""
+    return f"a whole number from {low} to {high}" + (", without a comma" if "," in text else "")
 
 
 def at_most(lines: Sequence[str]) -> list[str]:

@@ -13,9 +13,10 @@ from bus_sim.systems.car_park.slots import boxed, named, style, text_columns
 from bus_sim.systems.picture import LiveOutput
 from onboard.contract.codes import KindCode, MachineState, Side
 from onboard.core.site import Segment, Station
-from onboard.systems.car_park.outlines import is_elevation
+from onboard.systems.car_park.outlines import is_elevation, shifts
 from onboard.systems.car_park.site import car_park
 from onboard.trace.view import SiteView
+from onboard.ways.kept import Kept
 from onboard.ways.lifts import lift_at, lift_tracks, sill
 from onboard.ways.site import TrackKind, WaySite
 
@@ -61,9 +62,17 @@ class DayClock:
 CELLS = (5, 3, 2, 1)
 
 
+_shifts: Kept[WaySite, dict[int, int]] = Kept(lambda site: shifts(car_park(site)))
+
+
+def shift(site: WaySite, track: int) -> int:
+    """Positions by which an alley begins to the right of the leftmost, as shafts at right ends join them."""
+    return _shifts.of(site).get(track, 0)
+
+
 def cell_width(site: WaySite, width: int) -> int:
     """Columns for one position, so that the longest alley fits in ``width`` columns if any does."""
-    length = max(track.length for track in site.tracks.values() if track.kind is TrackKind.ALLEY)
+    length = max(shift(site, t.number) + t.length for t in site.tracks.values() if t.kind is TrackKind.ALLEY)
     return next(
         (cell for cell in CELLS if _LABEL + 2 * _shaft_width(site, cell) + length * cell + 4 <= width), CELLS[-1]
     )
@@ -82,7 +91,8 @@ def draw_floor(site: WaySite, view: SiteView, track: int, cell: int = CELLS[0]) 
     rows = []
     for side in (Side.FAR, Side.NEAR):
         label = f"{track:>2} {side.name[0]} " if side is Side.FAR else "   N "
-        row = Text(label + " " * _shaft_width(site, cell), no_wrap=True, overflow="crop")
+        before = _shaft_width(site, cell) + shift(site, track) * cell
+        row = Text(label + " " * before, no_wrap=True, overflow="crop")
         for index in range(1, site.tracks[track].length + 1):
             station = Station(track, index, side)
             car = taken.get(station.number)
@@ -112,7 +122,7 @@ def _spur(view: SiteView, inside: Segment, cell: int) -> Text:
 
 
 def _alley(site: WaySite, view: SiteView, track: int, cell: int) -> Text:
-    row = Text(" " * _LABEL, no_wrap=True, overflow="crop")
+    row = Text(" " * (_LABEL + shift(site, track) * cell), no_wrap=True, overflow="crop")
     row.append_text(_shaft(site, view, track, 0, cell))
     here: dict[int, list[int]] = {}
     for node, place in view.history.places.by_node.items():
@@ -162,7 +172,7 @@ def _alley_line(site: WaySite, view: SiteView, track: int, cell: int) -> Text:
     row = _alley(site, view, track, cell)
     taken, desks = view.history.loads.standing(), set(site.compartments.values())
     plain = list(row.plain)
-    first = _LABEL + _shaft_width(site, cell)
+    first = _LABEL + _shaft_width(site, cell) + shift(site, track) * cell
     for index in range(1, site.tracks[track].length + 1):
         far, near = Station(track, index, Side.FAR), Station(track, index, Side.NEAR)
         at = first + (index - 1) * cell + (cell - 1) // 2
@@ -206,8 +216,8 @@ def _floors(site: WaySite, view: SiteView, width: int, room: int, events: int) -
     """
     park = car_park(site)
     if not is_elevation(park):
-        return draw_plans(park, view, width)[-max(1, room - events) :]
-    cell = cell_width(site, width)
+        return draw_plans(park, view, width, None if room >= _ENOUGH else max(1, room - events))
+    cell = cell_width(park, width)
     tracks = sorted((n for n, t in site.tracks.items() if t.kind is TrackKind.ALLEY), reverse=True)
     if FLOOR_LINES * len(tracks) + events <= room:
         return [row for track in tracks for row in draw_floor(site, view, track, cell)]

@@ -15,6 +15,10 @@ from onboard.ways.site import TrackKind, WaySite
 
 #: Columns before a floor: its number.
 _LABEL = 5
+#: Columns between two floors beside each other.
+_BETWEEN = 2
+#: How a one-way alley's slots are marked, by where its index grows or falls to.
+_TIPS = {(1, 0): ">", (-1, 0): "<", (0, 1): "^", (0, -1): "v"}
 #: Columns that one slot takes, widest first; the widest that fits is used.
 _CELLS = (5, 3, 2, 1)
 
@@ -23,15 +27,43 @@ Spot = tuple[int, int]
 _outlines: Kept[WaySite, Outlines] = Kept(lambda site: Outlines(car_park(site)))
 
 
-def draw_plans(site: CarPark, view: SiteView, width: int) -> list[Text]:
-    """All floors, the highest first, an empty line between two."""
+def draw_plans(site: CarPark, view: SiteView, width: int, room: int | None = None) -> list[Text]:
+    """All floors, the highest first, an empty line between two: in ``room`` lines if they have room there in any way.
+
+    Slots are as wide as they can be; rather than leave floors out they are narrower, and floors beside each other. Of
+    what has no room even so the highest lines are left out, and the floor that is cut has its number where it begins.
+    """
     outlines = _outlines.of(site)
     plans = [_FloorPicture(outlines, view, level) for level in outlines.levels]
-    wide = max(plan.columns for plan in plans)
-    cell = next((one for one in _CELLS if _LABEL + wide * one <= width), _CELLS[-1])
-    rows: list[Text] = []
-    for plan in plans:
-        rows += [*([Text("")] if rows else []), *plan.lines(cell)]
+    slots = max(plan.columns for plan in plans)
+    cells = [one for one in _CELLS if _LABEL + slots * one <= width] or [_CELLS[-1]]
+    rows: list[tuple[Text, list[int]]] = []
+    for cell in cells:
+        many = max(1, width // (_LABEL + slots * cell + _BETWEEN)) if room is not None else 1
+        rows = _beside(plans, cell, 1)
+        rows = rows if room is None or len(rows) <= room else _beside(plans, cell, many)
+        if room is None or len(rows) <= room:
+            return [row for row, _ in rows]
+    shown = rows[len(rows) - max(1, room or 1) :]
+    first, levels = shown[0]
+    if first.plain[:_LABEL].strip() == "" and levels:
+        first = Text.assemble(f"{levels[0]:>2}".ljust(_LABEL), first[_LABEL:], no_wrap=True, overflow="crop")
+    return [first, *[row for row, _ in shown[1:]]]
+
+
+def _beside(plans: list["_FloorPicture"], cell: int, many: int) -> list[tuple[Text, list[int]]]:
+    """Lines with so many floors beside each other, each with the numbers of its floors; empty ones between."""
+    rows: list[tuple[Text, list[int]]] = []
+    for begin in range(0, len(plans), many):
+        group = plans[begin : begin + many]
+        lines = [plan.lines(cell) for plan in group]
+        rows += [(Text(""), [])] if rows else []
+        for number in range(max(len(one) for one in lines)):
+            line = Text("", no_wrap=True, overflow="crop")
+            for column, one in enumerate(lines):
+                part = one[number] if number < len(one) else Text(" " * len(one[0].plain))
+                line.append_text(Text(" " * _BETWEEN) + part if column else part)
+            rows.append((line, [plan.level for plan in group]))
     return rows
 
 
@@ -41,8 +73,10 @@ class _FloorPicture:
     def __init__(self, outlines: Outlines, view: SiteView, level: int) -> None:
         self.outlines, self.site, self.view, self.level = outlines, outlines.site, view, level
         box = outlines.level(level)
-        self.left, self.low = box.left, box.low
-        self.columns = round((box.right - box.left) / outlines.slot_mm)
+        # A shaft is in one column on all floors.
+        boxes = [outlines.level(one) for one in outlines.levels]
+        self.left, self.low = min(one.left for one in boxes), box.low
+        self.columns = round((max(one.right for one in boxes) - self.left) / outlines.slot_mm)
         self.rows = round((box.high - box.low) / outlines.slot_mm)
 
     def lines(self, cell: int) -> list[Text]:
@@ -71,7 +105,10 @@ class _FloorPicture:
     def _ways(self, cell: int) -> dict[Spot, tuple[str, str]]:
         found = {}
         for number in self.outlines.tracks_on(self.level):
-            mark = ":" if self.site.tracks[number].kind is TrackKind.SPUR else "."
+            track, line = self.site.tracks[number], self.outlines.plan.lines[number]
+            mark = ":" if track.kind is TrackKind.SPUR else "."
+            if track.one_way:
+                mark = _TIPS[line.dx * track.one_way, line.dy * track.one_way]
             for index in range(1, self.site.tracks[number].length + 1):
                 found[self._at(Segment(number, index))] = f"{mark:^{cell}}", "dim"
         return found

@@ -25,6 +25,6 @@ def boxed(text: str, box: str, cell: int) -> str:
 
 
 def named(view: SiteView, node: int, cell: int) -> str:
-    """A machine's name in a slot, its last letters where there is little room."""
-    name = view.name(node)
-    return f"{name[:4] if cell >= _WALLED else name[-cell:]:^{cell}}"
+    """A machine's name in a slot, its last letters where there is little room: by those, names differ."""
+    room = min(cell, 4) if cell >= _WALLED else cell
+    return f"{view.name(node)[-room:]:^{cell}}"

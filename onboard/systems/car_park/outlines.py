@@ -10,6 +10,7 @@ from onboard.contract.codes import Side
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.floor_plan import FloorPlan, at_mm, floor_plan
+from onboard.ways.lifts import stop_mm
 from onboard.ways.site import TrackKind
 
 
@@ -47,8 +48,7 @@ class Outlines:
     @property
     def levels(self) -> list[int]:
         """The floors, the highest first."""
-        numbers = [track.number for track in self.site.tracks.values() if track.kind is not TrackKind.LIFT]
-        return sorted({self.site.level(number) for number in numbers}, reverse=True)
+        return levels_of(self.site)[::-1]
 
     def slot(self, segment: Segment) -> Box:
         """What a segment takes, or the position beyond an end: its pitch along the track, a usual slot across."""
@@ -119,3 +119,39 @@ def is_elevation(site: CarPark) -> bool:
         and not any(track.ends for track in alleys)
         and all(track.length == 1 for track in spurs)
     )
+
+
+def shifts(site: CarPark) -> dict[int, int]:
+    """Where each alley of an elevation begins, in positions to the right of the leftmost: a shaft is vertical."""
+    lines = floor_plan(site).lines
+    alleys = [track for track in site.tracks.values() if track.kind is TrackKind.ALLEY]
+    left_mm = min(lines[track.number].x_mm for track in alleys)
+    return {track.number: round((lines[track.number].x_mm - left_mm) / track.pitch_mm) for track in alleys}
+
+
+def levels_of(site: CarPark) -> list[int]:
+    """The floors, the lowest first."""
+    return sorted({site.level(track.number) for track in site.tracks.values() if track.kind is not TrackKind.LIFT})
+
+
+def level_heights_mm(site: CarPark) -> dict[int, int]:
+    """How high each floor lies above the lowest, as lifts' stops tell; floors that none joins are as high as usual."""
+    known: dict[int, int] = {}
+    for level in levels_of(site):
+        if level not in known:
+            known[level] = (level - 1) * site.floor_height_mm
+            _tell_above(site, known)
+    low = min(known.values())
+    return {level: height_mm - low for level, height_mm in known.items()}
+
+
+def _tell_above(site: CarPark, known: dict[int, int]) -> None:
+    """Add the heights of all floors that are joined to known ones, if over several lifts."""
+    shafts = [
+        {site.level(sill.track): stop_mm(site, lift, at) for at, sill in enumerate(site.tracks[lift].joins, start=1)}
+        for lift in site.lifts
+    ]
+    while shaft := next((one for one in shafts if known.keys() & one.keys() and one.keys() - known.keys()), None):
+        first = min(known.keys() & shaft.keys())
+        for level, height_mm in shaft.items():
+            known.setdefault(level, known[first] + height_mm - shaft[first])

@@ -10,10 +10,11 @@ from onboard.contract.codes import KindCode, LegAction, TokenKind
 from onboard.contract.messages import BayState, DeskOrder, DoorState, Message, ShuttleState
 from onboard.core.site import Segment
 from onboard.history.history import Fact
-from onboard.systems.car_park.outlines import Outlines, is_elevation
+from onboard.systems.car_park.outlines import Outlines, is_elevation, level_heights_mm, shifts
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.trace.scene.scene import Json
 from onboard.trace.view import SiteView
+from onboard.ways.lifts import lift_at
 from onboard.ways.site import TrackKind, WaySite
 
 
@@ -53,7 +54,8 @@ class CarParkScene:
     def layout(self) -> Json:
         """Tracks and places; ``blockable`` are the segments that a person may name, ``building`` lies in mm.
 
-        ``classes`` are the names of classes by place, ``charging`` the places where one can charge.
+        ``classes`` are the names of classes by place, ``charging`` the places where one can charge. Of an elevation
+        ``heights_mm`` are those of alleys above the lowest, and ``shifts`` their beginnings in positions.
         """
         site, park = self.site, car_park(self.site)
         of_place = {place: park.classes[number - 1] for place, number in park.place_class.items()}
@@ -73,7 +75,8 @@ class CarParkScene:
             "places": [place.number for place in site.places],
             "classes": {place: one.name for place, one in of_place.items()},
             "charging": [place for place, one in of_place.items() if one.charging],
-            "building": None if is_elevation(park) else _building(park),
+            "bay_uses": {node: use.value for node, use in park.bay_uses.items()},
+            **(_elevation(park) if is_elevation(park) else {"building": _building(park)}),
             "blockable": [
                 str(Segment(track.number, index))
                 for track in site.tracks.values()
@@ -112,6 +115,10 @@ class CarParkScene:
         return told
 
     def _where(self, segment: Segment) -> str:
+        lift = lift_at(self.site, segment)
+        if lift is not None:
+            return f"in {self.words.machine(self.site.stewards[lift])}"
+        segment = self.site.mouths.get(segment, segment)
         track = self.site.tracks.get(segment.track)
         if track is None or track.kind is not TrackKind.LIFT:
             return str(segment)
@@ -145,6 +152,17 @@ _GAP_MM = 3_000
 _ASPECT = 1.7
 
 
+def _elevation(site: CarPark) -> Json:
+    """Where the floors' alleys lie: heights by the lifts, and shifts where the shaft is at their right ends."""
+    heights_mm = level_heights_mm(site)
+    alleys = [track for track in site.tracks.values() if track.kind is TrackKind.ALLEY]
+    return {
+        "building": None,
+        "heights_mm": {track.number: heights_mm[site.level(track.number)] for track in alleys},
+        "shifts": shifts(site),
+    }
+
+
 def _building(site: CarPark) -> Json:
     """Where everything is drawn, mm, x to the right and y down: floors in rows, the highest first.
 
@@ -171,6 +189,7 @@ def _building(site: CarPark) -> Json:
         "width": columns * wide,
         "height": _rows(levels, columns) * high + _GAP_MM,
         "reach_mm": site.shuttle_reach_mm,
+        "links": [[track.number, index, *mouth] for track in site.tracks.values() for index, mouth in track.ends],
         "floors": [[level, corner[level][0], corner[level][1]] for level in levels],
         "lines": {
             number: [*spot(site.level(number), line.x_mm, line.y_mm), line.dx, -line.dy]

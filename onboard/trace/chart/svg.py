@@ -44,9 +44,34 @@ class SvgDrawing:
         title = f"<title>{escape(note)}</title>" if note else ""
         self._parts.append(f'<polygon points="{path}" fill="{fill}" fill-opacity="{opacity}">{title}</polygon>')
 
-    def text(self, x: float, y: float, words: str, *, anchor: str = "start", fill: str = "#222222") -> None:
-        """Words with their baseline at x and y, px; signs that SVG reserves are escaped."""
-        self._parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{fill}">{escape(words)}</text>')
+    def ring(self, x: float, y: float, radius: float, stroke: str, *, width: float = 1) -> None:
+        """A circle around x and y, px, that is not filled."""
+        self._parts.append(
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="none" stroke="{stroke}" stroke-width="{width}"/>'
+        )
+
+    def text(
+        self,
+        x: float,
+        y: float,
+        words: str,
+        *,
+        anchor: str = "start",
+        fill: str = "#222222",
+        size: float | None = None,
+        halo: str | None = None,
+        upwards: bool = False,
+    ) -> None:
+        """Words with their baseline at x and y, px; signs that SVG reserves are escaped.
+
+        ``halo`` is the colour of a rim that parts them from what lies below; ``upwards`` is read from below.
+        """
+        more = f' font-size="{size:.1f}"' if size is not None else ""
+        more += f' stroke="{halo}" stroke-width="3" paint-order="stroke"' if halo is not None else ""
+        more += f' transform="rotate(-90 {x:.1f} {y:.1f})"' if upwards else ""
+        self._parts.append(
+            f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{fill}"{more}>{escape(words)}</text>'
+        )
 
     def arrow(self, x1: float, x2: float, y: float, stroke: str) -> None:
         """A level arrow from one lane to another."""

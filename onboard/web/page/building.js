@@ -72,8 +72,21 @@ export class Building extends Stage {
   }
 
   slot(track, index) {
-    const spot = this.at(track, index);
-    return this.span(spot, spot);
+    return this.strip(track, index, index);
+  }
+
+  // From one slot of a track to another: as long as its positions are apart, as wide as the narrowest alley's are.
+  strip(track, first, last) {
+    const [one, other] = [this.at(track, first), this.at(track, last)];
+    const { dx } = this.heading(track);
+    const along = (this.tracks.get(track).pitch_mm * this.scale) / 2, across = this.cell / 2;
+    const [wide, high] = dx ? [along, across] : [across, along];
+    const [x, y] = [Math.min(one.x, other.x) - wide, Math.min(one.y, other.y) - high];
+    return { x, y, w: Math.abs(one.x - other.x) + 2 * wide, h: Math.abs(one.y - other.y) + 2 * high };
+  }
+
+  spurSlot(spur, index) {
+    return this.slot(spur.number, index);
   }
 
   drawFloors(pen, snapshot) {
@@ -82,18 +95,40 @@ export class Building extends Stage {
     pen.font = `600 ${Math.max(9, Math.min(18, this.cell * 0.7))}px system-ui`;
     for (const [level, x, y] of this.plan.floors) pen.fillText(`floor ${level}`, x * this.scale + 4, (y - 1100) * this.scale);
     pen.textAlign = "center";
-    const spurs = this.layout.tracks.filter((track) => track.kind === "spur");
-    for (const track of [...this.alleys, ...spurs]) {
-      const box = this.span(this.at(track.number, 1), this.at(track.number, track.length));
-      pen.fillStyle = css("--free");
-      pen.strokeStyle = css("--line");
-      pen.fillRect(box.x, box.y, box.w, box.h);
-      pen.strokeRect(box.x, box.y, box.w, box.h);
+    const tracks = [...this.alleys, ...this.spurs];
+    this.drawWays(pen, tracks);
+    for (const track of tracks) {
       for (let index = 1; index <= track.length; index++) {
         this.hits.push({ ...this.slot(track.number, index), what: "segment", id: `p(${track.number},${index})` });
         if (track.one_way && index % 3 === 1) this.arrow(pen, track, index);
         for (const side of [0, 1]) this.drawStation(pen, snapshot, track.number, index, side);
       }
+    }
+  }
+
+  // All edges first and all slots over them: an edge is left where nothing goes on.
+  drawWays(pen, tracks) {
+    const parts = tracks.map((track) => this.strip(track.number, 1, track.length));
+    for (const [track, end, mouth, index] of this.plan.links) {
+      parts.push(this.span(this.at(mouth, index), this.at(track, end ? end - 1 : 1)));
+    }
+    for (const lift of this.lifts) {
+      lift.joins.forEach(([track, index], stop) => parts.push(this.span(this.at(track, index), this.stopAt(lift.number, stop + 1))));
+    }
+    pen.strokeStyle = css("--line");
+    pen.lineWidth = 2;
+    for (const box of parts) pen.strokeRect(box.x, box.y, box.w, box.h);
+    pen.lineWidth = 1;
+    pen.fillStyle = css("--free");
+    for (const box of parts) pen.fillRect(box.x, box.y, box.w, box.h);
+    for (const spur of this.spurs) this.dashed(pen, this.strip(spur.number, 1, spur.length));
+    // Where robots turn.
+    pen.strokeStyle = css("--line");
+    for (const [, , mouth, index] of this.plan.links) {
+      const spot = this.at(mouth, index);
+      pen.beginPath();
+      pen.arc(spot.x, spot.y, this.cell * 0.2, 0, 7);
+      pen.stroke();
     }
   }
 
@@ -179,8 +214,9 @@ export class Building extends Stage {
   drawShafts(pen, snapshot, nowUs) {
     for (const [track, machine] of this.liftMachines) {
       const here = this.where(machine.node, snapshot, nowUs);
-      for (const [number] of this.plan.platforms[track].entries()) {
-        const spot = this.stopAt(track, number + 1);
+      const stops = new Map(this.plan.platforms[track].map((_, number) => [number + 1, this.stopAt(track, number + 1)]));
+      const spots = new Map([...stops.values()].map((spot) => [`${spot.x},${spot.y}`, spot]));
+      for (const spot of spots.values()) {
         const box = this.span(spot, spot);
         const isHere = spot.x === here.x && spot.y === here.y;
         pen.strokeStyle = css("--lift");
@@ -188,17 +224,33 @@ export class Building extends Stage {
         pen.strokeRect(box.x + 1, box.y + 1, box.w - 2, box.h - 2);
         pen.lineWidth = 1;
         if (!isHere) continue;
-        const name = this.text(pen, machine.name, { ...box, h: box.h * 0.5 }, css("--dim"));
+        const name = this.text(pen, machine.name, { ...box, x: box.x + 3, w: box.w - 6 }, css("--ink"), 9);
         const isCrossed = hasFailed(snapshot.machines[machine.node]);
         if (isCrossed) crossOut(pen, box);
-        this.hits.push({ ...box, what: "machine", id: machine.node, name, isCrossed });
+        this.hits.push({ ...box, what: "machine", id: machine.node, name, words: machine.name, isCrossed });
       }
+      for (const [stop, spot] of stops) this.drawLiftDoor(pen, spot, this.at(...this.tracks.get(track).joins[stop - 1]));
     }
   }
 
-  bodyBox(spot) {
-    const side = this.cell * 0.86;
-    return { x: spot.x - side / 2, y: spot.y - side / 2, w: side, h: side };
+  // A thick line within a platform, at its edge towards a sill.
+  drawLiftDoor(pen, spot, sill) {
+    const half = this.cell / 2, thick = Math.max(2, this.cell * 0.12);
+    const [x, y] = [sill.x - spot.x, sill.y - spot.y];
+    const level = Math.abs(x) > Math.abs(y);
+    const [dx, dy] = level ? [Math.sign(x), 0] : [0, Math.sign(y)];
+    const [cx, cy] = [spot.x + dx * (half - thick / 2), spot.y + dy * (half - thick / 2)];
+    const [w, h] = level ? [thick, 1.2 * half] : [1.2 * half, thick];
+    pen.fillStyle = css("--lift");
+    pen.fillRect(cx - w / 2, cy - h / 2, w, h);
+    this.hits.push({ x: cx - w / 2, y: cy - h / 2, w, h, what: "door", id: null });
+  }
+
+  // As long as a carrier is.
+  bodyBox(spot, track) {
+    const long = this.layout.carrier_mm * this.scale, wide = this.cell * 0.8;
+    const [w, h] = this.plan.lines[track] && this.heading(track).dx ? [long, wide] : [wide, long];
+    return { x: spot.x - w / 2, y: spot.y - h / 2, w, h };
   }
 
   // The shuttle on its way into a place or back.

@@ -1,10 +1,26 @@
-// Drawing the site as an elevation: floors above each other, lifts at the ends, everything to the millimetre that the
-// bus tells. Between two words of a machine it moves on at its last speed, never beyond the next segment's middle.
+// Drawing the site as an elevation: floors above each other, as far apart as they are high, lifts at the ends, everything
+// to the millimetre that the bus tells. Between two words of a machine it moves on at its last speed, never beyond the next segment's middle.
 
-import { cased, crossOut, css, hasFailed, load, ready } from "./paint.js";
+import { cased, crossOut, css, hasFailed, load, nameBeside, ready } from "./paint.js";
 
 // Smaller letters are not read, px; what has no room for them has no name in the picture.
 const LEAST_FONT = 7;
+// Of machines: what has no room for them has its name beside it.
+const LEAST_NAME = 9;
+
+// A sign for each class of places: what one can charge at, or as many of its name's letters as no other class begins with.
+export function marksOf(layout) {
+  const names = [...new Set(Object.values(layout.classes ?? {}))];
+  const plugs = new Set((layout.charging ?? []).map((place) => layout.classes[place]));
+  const found = new Map();
+  for (const name of names) {
+    const others = names.filter((other) => other !== name && !plugs.has(other));
+    let long = 1;
+    while (long < name.length && others.some((other) => other.startsWith(name.slice(0, long)))) long++;
+    found.set(name, plugs.has(name) ? "\u26a1" : name.slice(0, long));
+  }
+  return found;
+}
 
 export class Stage {
   constructor(canvas) {
@@ -20,7 +36,13 @@ export class Stage {
     this.alleys = layout.tracks.filter((track) => track.kind === "alley").sort((a, b) => b.number - a.number);
     this.lifts = layout.tracks.filter((track) => track.kind === "lift");
     this.spurs = layout.tracks.filter((track) => track.kind === "spur");
-    this.longest = Math.max(1, ...this.alleys.map((alley) => alley.length));
+    // Floors lie as their lifts join them: alleys of different lengths need not begin above each other.
+    this.shift = (track) => layout.shifts?.[track] ?? 0;
+    this.longest = Math.max(1, ...this.alleys.map((alley) => this.shift(alley.number) + alley.length));
+    const heights = Object.values(layout.heights_mm ?? {}).sort((a, b) => a - b);
+    this.lowest_mm = Math.min(...heights.slice(1).map((height, number) => height - heights[number]), Infinity);
+    this.highest_mm = heights.at(-1) ?? 0;
+    this.marks = marksOf(layout);
     this.places = new Set(layout.places);
     this.charging = new Set(layout.charging ?? []);
     this.bays = new Map(layout.machines.filter((one) => one.station !== null).map((one) => [one.station, one]));
@@ -35,7 +57,7 @@ export class Stage {
     if (!this.layout) return;
     const width = this.canvas.clientWidth || 600;
     const cell = width / (this.longest + 3.9);
-    const rows = Math.max(1, this.alleys.length);
+    const rows = 1 + (this.highest_mm ? this.highest_mm / this.lowest_mm : 0);
     const high = Math.max(26, Math.min(cell * 2.4, (window.innerHeight * 0.82) / rows));
     this.cell = cell;
     this.floor = high;
@@ -44,8 +66,9 @@ export class Stage {
 
   // Middle of an alley's position, in pixels; index 0 and length + 1 are the platforms.
   at(track, position) {
-    const row = this.alleys.findIndex((alley) => alley.number === track);
-    return { x: (position + 1.7) * this.cell, y: 8 + (row + 0.5) * this.floor, row };
+    const below_mm = this.highest_mm - (this.layout.heights_mm?.[track] ?? 0);
+    const down = below_mm ? below_mm / this.lowest_mm : 0;
+    return { x: (position + this.shift(track) + 1.7) * this.cell, y: 8 + (down + 0.5) * this.floor };
   }
 
   liftY(track, position) {
@@ -59,7 +82,7 @@ export class Stage {
 
   liftX(track) {
     const [alley, index] = this.tracks.get(track).joins[0];
-    return this.at(alley, index === 1 ? 0 : this.longest + 1).x;
+    return this.at(alley, index === 1 ? 0 : this.tracks.get(alley).length + 1).x;
   }
 
   // Where a machine is now, in positions of its track: it goes on as it said, as far as its plan's leg goes, or one position.
@@ -116,6 +139,8 @@ export class Stage {
     for (const machine of this.layout.machines) {
       if (machine.kind === "robot") this.drawRobot(pen, machine, snapshot, nowUs, chosen);
     }
+    const machines = this.hits.filter((hit) => hit.what === "machine"), cars = this.hits.filter((hit) => hit.what === "place" && hit.car);
+    nameBeside(pen, machines, cars, this.canvas.width / ratio, this.canvas.height / ratio);
     // For whoever asks what is drawn where, such as a test.
     this.canvas.drawn = this.hits;
     this.canvas.ways = this.ways;
@@ -139,12 +164,22 @@ export class Stage {
         for (const side of [0, 1]) this.drawStation(pen, snapshot, alley.number, index, side);
       }
     }
-    pen.strokeStyle = css("--line");
-    for (const spur of this.spurs) {
-      const [alley, index] = spur.joins[0];
-      const spot = this.at(alley, index);
-      pen.strokeRect(spot.x - cell * 0.46, spot.y - floor * 0.44, cell * 0.92, floor * 0.26);
-    }
+    for (const spur of this.spurs) this.dashed(pen, this.spurBox(spur));
+  }
+
+  spurBox(spur) {
+    const spot = this.at(...spur.joins[0]);
+    return { x: spot.x - this.cell * 0.46, y: spot.y - this.floor * 0.44, w: this.cell * 0.92, h: this.floor * 0.26 };
+  }
+
+  // Where a robot stands out of the way.
+  dashed(pen, box) {
+    pen.strokeStyle = css("--dim");
+    pen.lineWidth = 1.5;
+    pen.setLineDash([4, 3]);
+    pen.strokeRect(box.x, box.y, box.w, box.h);
+    pen.setLineDash([]);
+    pen.lineWidth = 1;
   }
 
   // A segment that nobody can pass, by somebody's word.
@@ -199,7 +234,8 @@ export class Stage {
         pen.fillRect(box.x, box.y, box.w, box.h);
       } else {
         pen.strokeRect(box.x, box.y, box.w, box.h);
-        if (this.charging.has(number)) this.text(pen, "\u26a1", box, css("--dim"));
+        const mark = this.marks.get(this.layout.classes?.[number]);
+        if (mark) this.text(pen, mark, { x: box.x + box.w / 4, y: box.y + box.h / 4, w: box.w / 2, h: box.h / 2 }, css("--dim"), 6);
       }
     } else {
       return;
@@ -217,9 +253,36 @@ export class Stage {
     pen.lineWidth = 1;
     const doors = machine.doors;
     if (doors) this.drawDoors(pen, box, bay, doors);
-    const name = this.text(pen, car ? this.carName(car) : bay.name, box, car ? css("--card") : css("--bay"));
+    const use = this.layout.bay_uses?.[bay.node] ?? "both";
+    const edge = use === "both" ? 0 : 2 * Math.min(5, box.w / 6, box.h / 6);
+    if (edge) this.drawUse(pen, box, bay, use === "entry" ? -1 : 1, car ? css("--card") : css("--bay"));
+    // A tall box has the tip below or above the name.
+    const aside = box.w > 0.8 * box.h ? edge : 0;
+    const within = { ...box, x: box.x + aside, w: box.w - 2 * aside };
+    const name = car ? this.text(pen, this.carName(car), within, css("--card")) : this.text(pen, bay.name, within, css("--bay"), LEAST_NAME);
     if (hasFailed(machine)) crossOut(pen, box);
-    this.hits.push({ ...box, what: "machine", id: bay.node, car, name, isCrossed: hasFailed(machine) });
+    this.hits.push({ ...box, what: "machine", id: bay.node, car, name, words: car ? null : bay.name, use, isCrossed: hasFailed(machine) });
+  }
+
+  // Towards the street, from a station's alley.
+  aside(track, side) {
+    return { x: 0, y: side === 1 ? -1 : 1 };
+  }
+
+  // A tip at the street's end of a bay that cars only leave, or only enter.
+  drawUse(pen, box, bay, outward, colour) {
+    const { x, y } = this.aside(bay.station >> 8, (bay.station >> 7) & 1);
+    const size = Math.min(5, box.w / 6, box.h / 6);
+    const [dx, dy] = [x * outward * size, y * outward * size];
+    // In the corner, beside the name.
+    const cx = box.x + (x > 0 || !x ? box.w - 1.8 * size : 1.8 * size);
+    const cy = box.y + (y > 0 ? box.h - 2 * size : 2 * size);
+    pen.fillStyle = colour;
+    pen.beginPath();
+    pen.moveTo(cx + dx, cy + dy);
+    pen.lineTo(cx - dx - dy, cy - dy + dx);
+    pen.lineTo(cx - dx + dy, cy - dy - dx);
+    pen.fill();
   }
 
   drawDoors(pen, box, bay, doors) {
@@ -254,8 +317,8 @@ export class Stage {
       pen.fillStyle = css("--hold");
       for (const [track, index] of told.holds) {
         const row = this.tracks.get(track);
-        if (!row || row.kind !== "alley") continue;
-        const box = this.slot(track, index);
+        if (!row || row.kind === "lift") continue;
+        const box = row.kind === "spur" ? this.spurSlot(row, index) : this.slot(track, index);
         pen.fillRect(box.x, box.y, box.w, box.h);
         // Its edge in full colour: what is held is told apart from what is free without hues.
         if (!strong) continue;
@@ -273,6 +336,10 @@ export class Stage {
       }
       pen.globalAlpha = 1;
     }
+  }
+
+  spurSlot(spur) {
+    return this.spurBox(spur);
   }
 
   // A plan as corners: along alleys, and up and down in shafts and before spurs; never across.
@@ -304,16 +371,19 @@ export class Stage {
       const bottom = this.at(joins[0][0], 0).y + floor * 0.4;
       pen.strokeStyle = css("--line");
       pen.strokeRect(x - cell * 0.55, top, cell * 1.1, bottom - top);
+      // Where it stops.
+      pen.strokeStyle = css("--lift");
+      for (const [alley] of joins) pen.strokeRect(x - cell * 0.5, this.at(alley, 0).y - floor * 0.2, cell, floor * 0.4);
       const spot = this.where(machine.node, snapshot, nowUs);
       const box = { x: x - cell * 0.5, y: spot.y - floor * 0.2, w: cell, h: floor * 0.4 };
       pen.strokeStyle = css("--lift");
       pen.lineWidth = 3;
       pen.strokeRect(box.x, box.y, box.w, box.h);
       pen.lineWidth = 1;
-      const name = this.text(pen, machine.name, { ...box, y: top, h: floor * 0.26 }, css("--dim"));
+      const name = this.text(pen, machine.name, { ...box, y: top, h: floor * 0.2 }, css("--dim"), LEAST_NAME);
       const isCrossed = hasFailed(snapshot.machines[machine.node]);
       if (isCrossed) crossOut(pen, box);
-      this.hits.push({ ...box, what: "machine", id: machine.node, name, isCrossed });
+      this.hits.push({ ...box, what: "machine", id: machine.node, name, words: machine.name, isCrossed });
     }
   }
 
@@ -321,18 +391,18 @@ export class Stage {
     const spot = this.where(machine.node, snapshot, nowUs);
     if (!spot) return;
     const told = snapshot.machines[machine.node];
-    const box = this.bodyBox(spot);
+    const box = this.bodyBox(spot, told.track);
     if (told.shuttle && told.shuttle.mm > 50) this.drawShuttle(pen, told, spot);
     pen.fillStyle = css("--robot");
     pen.fillRect(box.x, box.y, box.w, box.h);
-    if (told.car) load(pen, box);
+    const within = told.car ? load(pen, box) : box;
     pen.strokeStyle = told.wait ? css("--wait") : chosen === machine.node ? css("--ink") : css("--robot");
     pen.lineWidth = told.wait || chosen === machine.node ? 3 : 2;
     pen.strokeRect(box.x, box.y, box.w, box.h);
     pen.lineWidth = 1;
-    const name = this.text(pen, machine.name, box, css("--card"));
+    const name = this.text(pen, machine.name, within, css("--card"), LEAST_NAME);
     if (hasFailed(told)) crossOut(pen, box);
-    this.hits.push({ ...box, what: "machine", id: machine.node, name, isCrossed: hasFailed(told) });
+    this.hits.push({ ...box, what: "machine", id: machine.node, name, words: machine.name, isCrossed: hasFailed(told) });
   }
 
   bodyBox(spot) {
@@ -355,12 +425,12 @@ export class Stage {
   }
 
   // A whole name or none; gives what was written.
-  text(pen, words, box, colour) {
+  text(pen, words, box, colour, least = LEAST_FONT) {
     const font = (size) => { pen.font = `600 ${size}px system-ui`; };
     const high = box.h * 0.8;
     font(high);
     const size = Math.min(high, (high * 0.94 * box.w) / Math.max(pen.measureText(words).width, box.w * 0.5));
-    if (size < LEAST_FONT) return null;
+    if (size < least) return null;
     font(size);
     pen.fillStyle = colour;
     pen.fillText(words, box.x + box.w / 2, box.y + box.h / 2 + 0.5);

@@ -57,11 +57,48 @@ export function crossOut(pen, box) {
   pen.lineWidth = 1;
 }
 
-// A carried thing within its carrier: a gap of the page's colour keeps the two apart for those who see no hues.
+// A carried thing within its carrier: a gap of the page's colour keeps the two apart for those who see no hues. Gives the
+// box of the thing, on which something can be written.
 export function load(pen, box) {
   const edge = Math.max(2, Math.min(box.w, box.h) * 0.12);
+  const thing = { x: box.x + edge + 1.5, y: box.y + edge + 1.5, w: box.w - 2 * edge - 3, h: box.h - 2 * edge - 3 };
   pen.fillStyle = css("--card");
   pen.fillRect(box.x + edge, box.y + edge, box.w - 2 * edge, box.h - 2 * edge);
   pen.fillStyle = css("--car");
-  pen.fillRect(box.x + edge + 1.5, box.y + edge + 1.5, box.w - 2 * edge - 3, box.h - 2 * edge - 3);
+  pen.fillRect(thing.x, thing.y, thing.w, thing.h);
+  return thing;
+}
+
+const meets = (one, other) => one.x < other.x + other.w && other.x < one.x + one.w && one.y < other.y + other.h && other.y < one.y + one.h;
+
+// Names of bodies that have none within: beside them on a ground of their own, where they lie on no body, no other name
+// and, if there is such a spot, on none of the boxes ``spared``; a body gets its name, and the box of it.
+export function nameBeside(pen, bodies, spared, wide, high) {
+  const taken = [...bodies];
+  const size = 10;
+  pen.font = `600 ${size}px system-ui, sans-serif`;
+  for (const body of bodies) {
+    if (body.name || !body.words) continue;
+    const spots = spotsBeside(body, pen.measureText(body.words).width + 4, size + 2);
+    const isFree = (spot) => spot.x >= 0 && spot.y >= 0 && spot.x + spot.w <= wide && spot.y + spot.h <= high && !taken.some((other) => meets(spot, other));
+    const free = spots.filter(isFree);
+    const spot = free.find((one) => !spared.some((other) => meets(one, other))) ?? free[0];
+    if (!spot) continue;
+    taken.push(spot);
+    body.name = body.words;
+    body.beside = spot;
+    pen.fillStyle = css("--card");
+    pen.fillRect(spot.x, spot.y, spot.w, spot.h);
+    pen.fillStyle = css("--ink");
+    pen.fillText(body.words, spot.x + spot.w / 2, spot.y + spot.h / 2 + 0.5);
+  }
+}
+
+// Above and below: in the middle, to the right and to the left; then at both sides.
+function spotsBeside(body, w, h) {
+  const [right, bottom] = [body.x + body.w, body.y + body.h];
+  const columns = [body.x + (body.w - w) / 2, body.x, right - w];
+  const spots = [...columns.map((x) => [x, body.y - h - 1]), ...columns.map((x) => [x, bottom + 1])];
+  const level = body.y + (body.h - h) / 2;
+  return [...spots, [right + 1, level], [body.x - w - 1, level]].map(([x, y]) => ({ x, y, w, h }));
 }
