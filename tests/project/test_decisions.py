@@ -66,6 +66,12 @@ def test_every_decision_says_what_would_show_it_wrong() -> None:
     assert not without, 'add "Wrong if ...", what one would see, in docs/decisions.md to:\n' + "\n".join(without)
 
 
+def test_no_decision_stands_twice() -> None:
+    titles = [one.title for one in entries(DOCUMENT.read_text(encoding="utf-8").split("## Index", 1)[1])]
+    twice = sorted({one for one in titles if titles.count(one) > 1})
+    assert not twice, "docs/decisions.md has two entries of one name, or one twice:\n" + "\n".join(twice)
+
+
 def test_the_index_names_every_part_in_order() -> None:
     text = DOCUMENT.read_text(encoding="utf-8")
     listed = re.findall(r"^- \[(.+)\]\(#(.+)\): \S", text, re.MULTILINE)
