@@ -160,7 +160,17 @@ class AtWork:
             else:
                 mirror.admit(node, NOW_US)
         effects = tokens.wake(NOW_US) + self.rights.serve_petitions(NOW_US)
-        return self._deeds(effects + self._negotiated(self.fleet.negotiation.wake(NOW_US)))
+        effects += self._negotiated(self.fleet.negotiation.wake(NOW_US))
+        # By digests all come to have one another's plans.
+        plan = mirror.itineraries.get(self.node)
+        return self._deeds([*effects, *([] if plan is None else [Send(plan)])])
+
+    def sleeps(self) -> list[Deed]:
+        """It did nothing for a while, as whose process was stopped: it asks what it has missed, and plans anew."""
+        self.fleet.admissions += 1
+        self.fleet.winners.begin_anew(NOW_US)
+        asked = [Send(SyncRequest(self.node, node)) for node in self.site.machines if node != self.node]
+        return self._deeds([*asked, *self._statements(NOW_US)])
 
     def meets(self, event: Any) -> list[Deed]:
         """Its body goes on by itself, or its sensors see something."""
@@ -179,7 +189,8 @@ class AtWork:
         if word.whom not in (NOBODY, self.node):
             return []
         if word.whom == NOBODY:
-            # Its first word: it was started.
+            # Its first word: it was started, and what it planned before is forgotten.
+            self.fleet.mirror._forget_plan(word.sender)
             self.fleet.mirror.admit(word.sender, NOW_US)
             self.fleet.tokens.begin_anew(NOW_US)
             self.fleet.negotiation.begin_anew(NOW_US)
@@ -188,6 +199,8 @@ class AtWork:
     def _takes_up(self, word: Message) -> list[Effect]:
         mirror = self.fleet.mirror
         mirror.hear(word, NOW_US)
+        if isinstance(word, Itinerary):
+            mirror.on_itinerary(word, NOW_US)
         handler = self.rights.handlers().get(type(word)) or mirror.handlers().get(type(word))
         effects: list[Effect] = handler(word, NOW_US) if handler is not None else []
         if isinstance(word, CallForProposals | Bid | Award | TaskReport | LeftOut | Itinerary):

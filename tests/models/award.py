@@ -101,5 +101,8 @@ class AwardPart:
         return "two hold the car" if sum(one is not None and one.holds for one in views) > 1 else ""
 
     def is_over(self, views: tuple[View | None, ...]) -> bool:
-        """A robot that has the task holds the car."""
-        return any(one is not None and one.holds and one.in_hand for one in views[1:])
+        """A robot that has the task holds the car; no other believes to have it, nor the compartment that one has."""
+        bay, *robots = views
+        having = [node for node, one in zip(self.nodes[1:], robots, strict=True) if one is not None and one.in_hand]
+        holds = any(one is not None and one.holds and one.in_hand for one in robots)
+        return holds and len(having) == 1 and bay is not None and bay.winner == having[0]

@@ -54,6 +54,9 @@ class Explored(Protocol):
     def waits(self, down: Iterable[int]) -> list[Deed]:
         """A while has passed; who is ``down`` has been silent for long."""
 
+    def sleeps(self) -> list[Deed]:
+        """A while has passed in which it did nothing."""
+
 
 class Part(Protocol):
     """What is explored: which machines, how they begin, what must not be, and what is to come about."""
@@ -91,12 +94,16 @@ class Part(Protocol):
 
 @dataclass(frozen=True)
 class Limits:
-    """How much is explored: crashes, states, CPU s; whether to remember how each state was come to."""
+    """How much is explored: crashes, states, CPU s; whether to remember how each state was come to.
+
+    With ``sleeps`` a machine may do nothing for a while instead, and remember all: one of its crashes.
+    """
 
     crashes: int = 1
     most_states: int = 1 << 62
     most_s: float = 1e9
     remembers: bool = True
+    sleeps: bool = False
 
 
 @dataclass
@@ -168,6 +175,9 @@ class Engine:
             elif isinstance(event, frozenset):
                 machine = copied(self._machines[mind], WHILE_US)
                 deeds = machine.waits(event)
+            elif event == "sleeps":
+                machine = copied(self._machines[mind], WHILE_US)
+                deeds = machine.sleeps()
             else:
                 machine = copied(self._machines[mind])
                 deeds = machine.meets(event)
@@ -229,6 +239,8 @@ class Engine:
             for word, after, deeds in self._heard(i, mind, bus):
                 yield from self._outcomes(state, i, after, deeds, ("hears", i, word, -1))
         yield from self._while(state)
+        if self.limits.sleeps and may_crash:
+            yield from self._sleep(state)
 
     def _heard(self, i: int, mind: int, bus: int) -> list[tuple[int, int, int]]:
         """Each word on the bus by which anything changes with machine i: the word, its mind after it and its deeds."""
@@ -281,6 +293,19 @@ class Engine:
                     kept, said = self._carried_out(rest.lasting[i], deeds, most)
                     minds, lasting = _set(rest.minds, i, None), _set(rest.lasting, i, kept)
                     yield State(minds, lasting, rest.bus | said, state.crashes + 1), ("waits", i, down, most)
+
+    def _sleep(self, state: State) -> Iterator[tuple[State, Step]]:
+        """A while passes for all that are up but one, which sleeps through it, and is silent for the others."""
+        up = [(i, mind) for i, mind in enumerate(state.minds) if mind is not None]
+        down = {self.nodes[i] for i, mind in enumerate(state.minds) if mind is None}
+        for sleeper, _ in up:
+            after = state._replace(bus=state.bus & ~self._fresh, crashes=state.crashes + 1)
+            silent = frozenset(down | {self.nodes[sleeper]})
+            done = [(i, *self._does(i, mind, "sleeps" if i == sleeper else silent)) for i, mind in up]
+            if all(self._within[mind] for _, mind, _ in done):
+                for i, mind, deeds in done:
+                    after = self._all_done(after, i, mind, deeds)
+                yield after, ("sleeps", sleeper, silent, -1)
 
     def _all_done(self, state: State, i: int, after: int, deeds: int) -> State:
         kept, said = self._carried_out(state.lasting[i], deeds, len(self._deeds.things[deeds]))
@@ -367,9 +392,14 @@ class Engine:
             state = self._all_done(state, i, *self._does(i, mind, frozenset()))
         return state
 
-    def run(self) -> Found:
-        """Explore until all is seen, something is wrong or a trap, or the limit is reached."""
+    def run(self, late: Iterable[Message] = ()) -> Found:
+        """Explore until all is seen, something is wrong or a trap, or the limit is reached.
+
+        Words that are ``late`` are on the bus from the first.
+        """
         found, state = self.found, self.begin()
+        for word in late:
+            state = self.said(state, word)
         seen, waiting = {state}, deque([state])
         wrong, remembers, limits = self.part.wrong, self.limits.remembers, self.limits
         judged: dict[Any, str] = {}

@@ -29,6 +29,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Every interleaving of shipped code.")
     parser.add_argument("part", nargs="?", default="tokens", choices=["tokens", *PARTS])
     parser.add_argument("--crashes", type=int, default=1)
+    parser.add_argument("--sleeps", action="store_true", help="parts: or a machine sleeps for a while")
     parser.add_argument("--most-s", type=float, default=600.0, help="CPU seconds after which it ends")
     parser.add_argument("--nodes", type=int, default=3, help="of the book of rights, or of the part")
     parser.add_argument("--versions", type=int, default=2, help="tokens: the newest that is explored")
@@ -38,7 +39,7 @@ def main() -> None:
     parser.add_argument("--scenario", type=Path, help="a counterexample is written here, for `bus-sim run --scenario`")
     options = parser.parse_args()
     if options.part != "tokens":
-        limits = engine.Limits(options.crashes, most_s=options.most_s)
+        limits = engine.Limits(options.crashes, most_s=options.most_s, sleeps=options.sleeps)
         explore_part(PARTS[options.part](options.nodes, options.calls), limits, options.scenario)
         return
     explore_tokens(

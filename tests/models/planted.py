@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from onboard.contract.constants import NOBODY
 from onboard.core.authority import TokenBook
 from onboard.core.effects import Record, Send
 from onboard.core.records import TokenGivenRecord
@@ -16,7 +15,6 @@ from onboard.systems.car_park.records import AwardRecord, HandledRecord
 from onboard.systems.car_park.recovery import JournalRecovery
 from onboard.systems.car_park.riding import Riding
 from onboard.systems.car_park.robot import ParkingRobot
-from onboard.systems.car_park.stewardship import Stewardship
 from onboard.systems.car_park.travel import Carriage
 
 Method = Callable[..., Any]
@@ -82,13 +80,6 @@ def _without(*records: type) -> Callable[[Method], Method]:
     return made
 
 
-def _of_any_task(method: Method) -> Method:
-    def winner_of(stewardship: Stewardship, car: Any, task: Any) -> tuple[int, int]:
-        return stewardship.winners.get(car, NOBODY), 1
-
-    return winner_of
-
-
 def _keeps_given(method: Method) -> Method:
     def replay(book: TokenBook, entries: Any) -> None:
         method(book, [entry for entry in entries if entry.get("record") != TokenGivenRecord.NAME])
@@ -111,7 +102,6 @@ AWARD = {
     "a right is given under its old version": Planted(TokenBook, "own_version", _one_less, TRAP),
     "what was given away is held again after a restart": Planted(TokenBook, "replay", _keeps_given, TWO),
     "a grant is said once": Planted(TokenBook, "wake", _nothing, TRAP),
-    "the winner of the task before counts": Planted(Stewardship, "winner_of", _of_any_task, TRAP),
     "an award is told before it is written": Planted(ParkingRobot, "_take_on", _turned, TRAP),
     "a robot forgets what it has won": Planted(JournalRecovery, "_take", _without(AwardRecord), TRAP),
     "a restarted compartment does not call": Planted(Compartment, "_take_up_job", _never_again, TRAP),

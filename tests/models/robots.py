@@ -104,7 +104,7 @@ class _TimelessProgram(Program):
 
 
 @dataclass
-class _PricedGeneration(CarParkGeneration):
+class PricedGeneration(CarParkGeneration):
     """What a task costs is its price, by node; its program is its two handlings."""
 
     prices_ms: Mapping[int, int] = field(default_factory=dict)
@@ -159,7 +159,7 @@ class PricedFactory(ParkingRobotFactory):
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> CarParkGeneration:
         """What its bids come from."""
         park = car_park(site)
-        return _PricedGeneration(park, machine, way_mirror(mirror), _TimelessProgram(park), prices_ms=self.prices_ms)
+        return PricedGeneration(park, machine, way_mirror(mirror), _TimelessProgram(park), prices_ms=self.prices_ms)
 
 
 def stand_still(behaviour: Behaviour) -> None:

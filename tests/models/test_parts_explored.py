@@ -5,12 +5,17 @@ from collections.abc import Callable, Mapping
 import pytest
 
 from onboard.contract.codes import Reason, TaskPhase
-from onboard.contract.messages import TaskReport
-from tests.models import planted
-from tests.models.award import BAY, CAR, CHEAP, PLACE, TASK, AwardPart
+from onboard.contract.messages import CallForProposals, TaskReport
+from onboard.systems.car_park import bay_calls, stewardship
+from onboard.systems.car_park.bay_calls import BayCalls
+from onboard.systems.car_park.recovery import JournalRecovery
+from onboard.systems.car_park.robot import ParkingRobot
+from tests.models import late, planted, robots
+from tests.models.award import BAY, CAR, CHEAP, DEAR, PLACE, TASK, AwardPart
 from tests.models.custody import CustodyPart
-from tests.models.engine import Engine, Limits, Part
+from tests.models.engine import Engine, Found, Limits, Part
 from tests.models.gate import FIRST, LIFT, GatePart
+from tests.models.late import LatePart
 from tests.models.moving import engine_of
 
 #: The compartment and one robot: all that two robots add is who of them wins.
@@ -60,6 +65,76 @@ def test_a_winner_by_its_word_alone_is_asked_and_the_task_is_called_anew() -> No
     believing = [one for one in heard if engine.machine(one, 0).behaviour.stewardship.winner_of(CAR, TASK)[0] == CHEAP]
     assert believing
     assert all(engine.ends_well(one) for one in believing), "the robot has no such task, and never says so"
+
+
+def _late(*, forgot: bool, most_states: int) -> Found:
+    found = Engine(LatePart(forgot=forgot), Limits(crashes=0, most_states=most_states)).run(late.WORDS)
+    print(found)
+    return found
+
+
+def _twice_awarded(most_states: int) -> Found:
+    """One robot has won, its compartment failed before it noted that, and another may win."""
+    part = LatePart(nodes=(BAY, CHEAP, DEAR), noted=False)
+    found = Engine(part, Limits(crashes=0, most_states=most_states)).run()
+    print(found)
+    return found
+
+
+@pytest.mark.parametrize("forgot", [False, True], ids=["known", "forgotten"])
+def test_whatever_comes_late_both_agree_in_the_end_whose_the_task_is(forgot: bool) -> None:
+    found = _late(forgot=forgot, most_states=800)
+    assert not found.why
+    assert found.transitions > 1_200
+
+
+@pytest.mark.parametrize("forgot", [False, True], ids=["known", "forgotten"])
+def test_who_waits_and_says_nothing_waits_for_ever(forgot: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(BayCalls, "_ask", lambda *_: [])
+    assert _late(forgot=forgot, most_states=1_500).why == planted.TRAP
+
+
+def test_for_who_never_answers_for_a_task_that_it_does_not_know_is_waited_for_ever(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(JournalRecovery, "is_asked", lambda *_: False)
+    assert _late(forgot=True, most_states=1_500).why == planted.TRAP
+
+
+def test_no_robot_keeps_a_task_that_was_given_to_another_after_a_restart() -> None:
+    assert not _twice_awarded(800).why
+
+
+def test_an_award_after_a_restart_that_is_no_newer_leaves_two_with_the_task(monkeypatch: pytest.MonkeyPatch) -> None:
+    def same(version: int, bits: int) -> int:
+        return version
+
+    for module in (bay_calls, stewardship):
+        monkeypatch.setattr(module, "successor", same)
+    assert _twice_awarded(1_000).why == planted.TRAP
+
+
+def _asleep(monkeypatch: pytest.MonkeyPatch) -> Found:
+    """Nobody else can do the task, and who has it does not bid for it anew; any machine may sleep for a while."""
+    bound = robots.PricedGeneration.lower_bound
+
+    def not_again(generation: robots.PricedGeneration, call: CallForProposals, now_us: int) -> int | None:
+        has_it = any(work.call.task == call.task for work in generation.program.works())
+        return None if has_it else bound(generation, call, now_us)
+
+    monkeypatch.setattr(robots.PricedGeneration, "lower_bound", not_again)
+    found = Engine(AwardPart(nodes=PAIR), Limits(crashes=1, most_states=400, sleeps=True)).run()
+    print(found)
+    return found
+
+
+def test_who_slept_does_not_cling_to_a_task_that_was_called_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert not _asleep(monkeypatch).why
+
+
+def test_who_slept_and_heeds_no_newer_version_clings_to_its_task(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ParkingRobot, "_yield_task", lambda *_: [])
+    assert _asleep(monkeypatch).why == planted.TRAP
 
 
 @pytest.mark.parametrize(("part", "bug"), BUGS, ids=[f"{part}-{bug}".replace(" ", "-") for part, bug in BUGS])

@@ -6,7 +6,7 @@ from bus_sim.sites import find_site
 from onboard.core import authority, backoff, bus_time, mirror, site
 from onboard.core.negotiation import bidding, initiator, negotiation, participant, sub_calls, trust, winners
 from onboard.holon import fixed_times, holding, presence, regeneration, rights, witness
-from onboard.systems.car_park import bay_task, sill, stall, starting, stewardship, travel
+from onboard.systems.car_park import bay_calls, bay_task, sill, stall, starting, stewardship, travel
 from onboard.ways import all_or_none, left_behind, passing, retreats, standing
 from onboard.wire import decoder
 
@@ -105,6 +105,7 @@ TIMES: dict[str, tuple[Time, ...]] = {
     "queue": (
         Time("T_retry", bay_task.RETRY_US, _FIXED, "a task that nobody could do is called for again; doubled"),
         Time("T_retry_most", bay_task.LONGEST_RETRY_US, _FIXED, "it grows no longer"),
+        Time("T_ask", bay_calls.ASK_AGAIN_US, _FIXED, "an award is said again to a winner that shows nothing of it"),
         Time("T_claim", bay_task.SETTLING_US, _FIXED, "after a restart, time for a winner to say that it is one"),
     ),
     "restart": (

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from onboard.contract.codes import CallResult, KindCode, LegAction, Operation, Reason, TaskPhase
-from onboard.contract.constants import NOBODY, TASK_VERSION_BITS
-from onboard.contract.messages import Award, CallForProposals, Reference, TaskReport, TokenRefusal, TokenRequest
+from onboard.contract.constants import ANY_STATION, NOBODY, TASK_VERSION_BITS
+from onboard.contract.messages import Award, CallForProposals, Leg, Reference, TaskReport, TokenRefusal, TokenRequest
 from onboard.core.authority import TokenKey
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.negotiation import EVENT_TYPES
@@ -22,6 +22,10 @@ from onboard.systems.car_park.site import open_end
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.ways.mirror import WayFleet
 from onboard.ways.tokens import car_token
+
+#: A winner of whose task nothing shows is told after this that it has it, and again, us: a plan is told within a second
+#: of its award, and who finds no way for longer than this is asked once, or gives the task back.
+ASK_AGAIN_US = 10_000_000
 
 
 @dataclass
@@ -144,8 +148,7 @@ class BayCalls:
         """Who may fetch its car, in the journal; of a car that is not there yet it has nothing."""
         if task.is_coming:
             return []
-        by_word = bool(task.winner) and not task.call
-        return self.stewardship.won(task.car, task.winner, task.task, task.version, by_word=by_word)
+        return self.stewardship.won(task.car, task.winner, task.task, task.version)
 
     def call_again(self, task: BayTask, now_us: int) -> list[Effect]:
         """Its winner gave the task back, or is lost: it is called anew under a raised version, noted before said."""
@@ -199,13 +202,47 @@ class BayCalls:
             )
             if is_lost:
                 effects += self.call_again(task, now_us)
+            effects += self._ask(task, now_us)
         ahead = self.ahead
         if ahead is not None and not (ahead.winner or ahead.call or ahead.retry_at_us or self._is_open(ahead)):
-            # Taken up from the journal: whoever has it says so first.
-            ahead.retry_at_us = now_us + SETTLING_US
+            effects += self.settle(ahead, now_us)
         if ahead is not None and ahead.retry_at_us is not None and ahead.retry_at_us <= now_us:
             effects += self.call_for(ahead, now_us)
         return effects
+
+    def settle(self, task: BayTask, now_us: int) -> list[Effect]:
+        """Taken up from the journal without a winner: whoever has it says so first.
+
+        An award may have been said that was not noted: what is said from now on is newer.
+        """
+        task.retry_at_us, task.version = now_us + SETTLING_US, successor(task.version, TASK_VERSION_BITS)
+        return self._note(task)
+
+    def _ask(self, task: BayTask, now_us: int) -> list[Effect]:
+        """Say again whose a task is while its winner shows nothing of it: who does not know of it gives it back.
+
+        What either side remembers of the other may be of a late word, or of none: only plans, which all come to agree
+        on, prove for as long as I wait that somebody comes.
+        """
+        record = self.fleet.mirror.cars.get(task.car)
+        if record is not None and record.station == ANY_STATION and record.custodian != task.winner:
+            # Whoever brings it here has it, whomever a word was believed that came late.
+            return [] if self._work_here(record.custodian) is None else self.won_by(task, record.custodian, 0)
+        if self.is_shown(task):
+            task.asked_us = None
+            return []
+        asked_us = task.asked_us = now_us if task.asked_us is None else task.asked_us
+        if now_us < asked_us + ASK_AGAIN_US:
+            return []
+        task.asked_us = now_us
+        return [Send(task.award(self.fleet.node_id))]
+
+    def is_shown(self, task: BayTask) -> bool:
+        """Whether the winner has the task by its plan, or its car by its word; or nobody can be asked, or need be."""
+        record = self.fleet.mirror.cars.get(task.car)
+        is_its = record is not None and record.custodian == task.winner
+        is_no_question = not task.winner or task.was_granted or task.winner in self.fleet.mirror.obstacles.machines
+        return is_no_question or is_its or self._work_here(task.winner) is not None
 
     def _is_open(self, task: BayTask) -> bool:
         return any(one.terms.task == task.task for one in self.fleet.negotiation.initiators)
@@ -214,14 +251,17 @@ class BayCalls:
         """When a call is made again, or a winner counts as lost; the job's call only where its phase waits for it."""
         tasks = [self.ahead, self.job if is_job_asked else None]
         times = [task.retry_at_us for task in tasks if task is not None]
+        times += [task.asked_us + ASK_AGAIN_US for task in self.in_hand() if task.asked_us is not None]
         return min([one for one in (*times, self.stewardship.next_wake()) if one is not None], default=None)
 
     def taken_at_us(self, now_us: int) -> int | None:
         """When the winner of the job will have been at the bay, by its plan, bus us; None where it has told of none."""
-        job = self.job
-        plan = None if job is None else self.fleet.mirror.itineraries.get(job.winner)
-        here = self.station
-        for leg in () if plan is None else plan.legs:
-            if leg.action is LegAction.WORK and (leg.track, leg.to_index, leg.side) == tuple(here):
-                return from_bus_ms(leg.end_ms, now_us)
-        return None
+        leg = None if self.job is None else self._work_here(self.job.winner)
+        return None if leg is None else from_bus_ms(leg.end_ms, now_us)
+
+    def _work_here(self, node: int) -> Leg | None:
+        """What a machine does first at the bay by its plan."""
+        plan, here = self.fleet.mirror.itineraries.get(node), tuple(self.station)
+        legs = () if plan is None else plan.legs
+        at_bay = (leg for leg in legs if (leg.track, leg.to_index, leg.side) == here)
+        return next((leg for leg in at_bay if leg.action is LegAction.WORK), None)

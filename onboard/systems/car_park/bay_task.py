@@ -77,6 +77,8 @@ class BayTask:
     call: int = 0
     was_granted: bool = False
     retry_at_us: int | None = None
+    #: Since when nothing shows that its winner has it, or when that was last told so; None while something does.
+    asked_us: int | None = None
     reminders: int = 0
     #: How often nobody could, one after the other, and why the last time; its driver may leave before anybody is asked.
     refusals: int = 0
@@ -122,7 +124,7 @@ class BayTask:
         record, wanted = mirror.cars.get(self.car), TokenKey(refusal.token_kind, refusal.token)
         is_its_word = record is not None and record.custodian == refusal.sender and wanted == car_token(*self.car)
         knows_not = refusal.requester == self.winner and refusal.reason is Reason.TOKEN_NOT_GRANTABLE_YET
-        return is_its_word and knows_not and self.call != 0
+        return is_its_word and knows_not
 
     def award(self, sender: int) -> Award:
         """The newest award, to be said again."""
@@ -133,12 +135,11 @@ class BayTask:
 
         While it is called for, or awarded, what is said of that tells it by its version.
         """
-        if self.winner == node or not self.call or self.version == 1:
-            return []
         if self.winner:
-            return [Send(self.award(sender))]
-        lost = Award(sender, self.call, 0, self.task, self.version, CallResult.REJECTED, Reason.NODE_SILENT)
-        return [] if self.retry_at_us is None else [Send(lost)]
+            return [] if self.winner == node else [Send(self.award(sender))]
+        if not self.call or self.retry_at_us is None:
+            return []
+        return [Send(Award(sender, self.call, 0, self.task, self.version, CallResult.REJECTED, Reason.NODE_SILENT))]
 
 
 def queue_ticket(tickets: deque[Reference], car: Reference, *, urgent: bool) -> bool:

@@ -53,7 +53,6 @@ from onboard.systems.car_park.bay_memory import (
 )
 from onboard.systems.car_park.bay_task import (
     DESK_INPUT,
-    SETTLING_US,
     BayPhase,
     BayTask,
 )
@@ -229,8 +228,8 @@ class Compartment:
         return min((one for one in times if one is not None), default=None)
 
     def looks_from(self) -> int:
-        """It looks often whether an award of its own was never heard."""
-        return 0 if any(not task.winner for task in self.calls.in_hand()) else NEVER_US
+        """It looks often whether an award of its own was never heard, or nothing shows of its winner."""
+        return 0 if any(not (task.winner and self.calls.is_shown(task)) for task in self.calls.in_hand()) else NEVER_US
 
     def heeds(self, message: OverheardWord) -> bool:
         """Others' slots, cars and places are nothing to it."""
@@ -291,13 +290,12 @@ class Compartment:
         if self.job.was_granted:
             self._go(BayPhase.SERVING)
             return self._when_serving(now_us)
-        if not self.job.winner:
-            # Whoever won meanwhile says so when asked, which every machine does at power-up.
-            self.job.retry_at_us = now_us + SETTLING_US
+        # Whoever won meanwhile says so when asked, which every machine does at power-up.
+        settling = [] if self.job.winner else self.calls.settle(self.job, now_us)
         self._go(BayPhase.LOCKING)
         is_unsaid = operation is Operation.PARK and car not in self.fleet.mirror.cars
         said = custody.state(self.fleet, car, self.station.number, wheelbase_mm) if is_unsaid else []
-        return said + self._when_locking(now_us)
+        return settling + said + self._when_locking(now_us)
 
     def _to_free(self) -> list[Effect]:
         over: list[Effect] = [job_over_record()] if self.job is not None else []

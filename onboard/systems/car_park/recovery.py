@@ -5,13 +5,13 @@ ride begun and ended. The mirror, bids and plans are not in the journal; the way
 say that the carrier stands (design, section 5).
 """
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import CallResult, Criterion, KindCode, LegAction, ShuttleMode
 from onboard.contract.constants import TASK_VERSION_BITS
 from onboard.contract.messages import Award, CallForProposals, CarAt, Reference, ShuttleState
-from onboard.core.effects import Effect, Record
+from onboard.core.effects import Record
 from onboard.core.journal_records import Entry, JournalRecord, records_in
 from onboard.core.records import BootRecord
 from onboard.core.serial import is_newer
@@ -28,7 +28,6 @@ from onboard.systems.car_park.records import (
     StepRecord,
 )
 from onboard.ways.mirror import WayFleet
-from onboard.work.undertaking import gives_back
 
 
 def award_record(call: CallForProposals, source: Station, sink: Station, version: int) -> Record:
@@ -195,16 +194,11 @@ class JournalRecovery:
         begun = self.works[0].call.task if self.works and self.phase is not None else None
         return [one.call.task for one in self.works if one.handling is CarHandling.TAKE and one.call.task != begun]
 
-    def forfeit_unknown(
-        self, fleet: WayFleet, award: Award, known: Iterable[StationWork], done: Collection[Reference]
-    ) -> list[Effect]:
-        """An award for a bid of my life before: the bid is not in the journal, so the task is given back at once."""
-        mine = award.winner == fleet.node_id and award.result is CallResult.AWARDED
-        if not mine or not self.is_restart:
-            return []
-        if any(work.call.task == award.task for work in known) or award.task in done:
-            return []
-        return gives_back(fleet, award)
+    @staticmethod
+    def is_asked(fleet: WayFleet, award: Award) -> bool:
+        """Whether an award to me asks how its task stands: by a call of a life before, of mine or of its initiator."""
+        is_mine = award.winner == fleet.node_id and award.result is CallResult.AWARDED
+        return is_mine and not fleet.negotiation.knows(award.sender, award.call)
 
     def is_newer(self, award: Award) -> bool:
         """Whether an award for a task of mine is of a later version than that under which I took it on."""

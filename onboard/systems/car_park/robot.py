@@ -161,8 +161,8 @@ class ParkingRobot:
         """Another machine's plan may mean that mine has to come later, or to take another way."""
         self.going_around.hear(message)
         if isinstance(message, Award):
-            forfeited = self.recovery.forfeit_unknown(self.fleet, message, self._works(), self._done)
-            return forfeited + self._yield_task(message, now_us)
+            again = [self._tell_again(message.task)] if self.recovery.is_asked(self.fleet, message) else []
+            return again + self._yield_task(message, now_us)
         if isinstance(message, ManualOrder) and message.machine == self.fleet.node_id:
             return self.holding.ordered(message)
         lost = self.holding.loses(message)
@@ -277,11 +277,11 @@ class ParkingRobot:
     def _tell_again(self, task: Reference) -> Effect:
         """What became of a task whose award is said again."""
         handlings = [work.handling for work in self._works() if work.call.task == task]
-        if CarHandling.TAKE in handlings or CarHandling.LEAVE in handlings:
-            return self._report(task, TaskPhase.AWARDED if CarHandling.TAKE in handlings else TaskPhase.LOADED, 0)
-        if task in self._done:
-            return self._report(task, TaskPhase.DONE, 0)
-        return Send(TaskReport(self.fleet.node_id, task, TaskPhase.FORFEITED, 0, Reason.CANCELLED))
+        if handlings or task in self._done:
+            phase = TaskPhase.AWARDED if CarHandling.TAKE in handlings else TaskPhase.LOADED
+            return self._report(task, phase if handlings else TaskPhase.DONE, 0)
+        why = Reason.JOURNAL_LOST if self.recovery.is_restart else Reason.CANCELLED
+        return Send(TaskReport(self.fleet.node_id, task, TaskPhase.FORFEITED, 0, why))
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """All goes back to the stewards by itself, and is refused until then; a slot that was left goes on at once."""

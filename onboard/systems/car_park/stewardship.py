@@ -16,7 +16,6 @@ from onboard.contract.messages import (
     Itinerary,
     Message,
     Reference,
-    SyncRequest,
     TaskReport,
     TokenGrant,
 )
@@ -24,7 +23,7 @@ from onboard.core.authority import TokenKey, station_token
 from onboard.core.effects import Effect, Send
 from onboard.core.mirror import Obstacle
 from onboard.core.negotiation.winners import patience_us
-from onboard.core.serial import is_newer
+from onboard.core.serial import is_newer, successor
 from onboard.core.site import Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.bay_memory import BayMemory, winner_record
@@ -40,9 +39,6 @@ MOST_GONE = 4
 UNHEARD_AFTER_US = 6_000_000
 #: FORFEITED is said again this often until the task is awarded anew, us: a lost word would leave a customer waiting.
 SAY_AGAIN_US = 2_000_000
-#: A winner that is known by its own word alone is asked again after this, and once it has answered after that, us:
-#: three questions within ``UNHEARD_AFTER_US``, and a late word is believed for half a minute at most.
-ASK_AGAIN_US, ASK_LATER_US = 2_000_000, 20_000_000
 
 
 @dataclass
@@ -59,8 +55,6 @@ class Stewardship:
     _say_at_us: dict[Reference, int] = field(default_factory=dict)
     #: Since when the winner of each car has said nothing that shows that it knows of its award.
     _unheard_us: dict[Reference, int] = field(default_factory=dict)
-    #: Cars whose winner is known by its own word alone, and when it is asked next.
-    _ask_at_us: dict[Reference, int] = field(default_factory=dict)
     #: How often I was admitted, and since when I take part: what others did not do before is no sign of theirs.
     _admissions: int = 0
     _since_us: int = 0
@@ -87,7 +81,9 @@ class Stewardship:
         match message:
             case TaskReport() | Itinerary():
                 for won in [won for won in self._unheard_us if self.winners.get(won) == message.sender]:
-                    self._heard_of(won, message, now_us)
+                    # Of a task that its winner has, or had; its plan is told anew with each that it takes on.
+                    if isinstance(message, Itinerary) or self.tasks[won][0] == message.task:
+                        del self._unheard_us[won]
             case CallForProposals() if self._is_for_a_car(message):
                 self._cars_of_calls[message.sender, message.call] = message.car
                 while len(self._cars_of_calls) > MAX_CALLS:
@@ -101,36 +97,20 @@ class Stewardship:
                 return self._state_anew(custody.car_of(message), message.version)
         return []
 
-    def _heard_of(self, car: Reference, word: TaskReport | Itinerary, now_us: int) -> None:
-        """A car's winner speaks: of the task, or of its plan, which shows nothing of a task that it had before."""
-        is_about_it = isinstance(word, TaskReport) and self.tasks[car][0] == word.task
-        if car in self._ask_at_us:
-            if not is_about_it:
-                return
-            self._ask_at_us[car] = now_us + ASK_LATER_US
-        if is_about_it or isinstance(word, Itinerary):
-            del self._unheard_us[car]
-
     def _is_for_a_car(self, call: CallForProposals) -> bool:
         """Whether its winner may fetch a stored car: only a compartment, or a person's station, calls for that."""
         machine = self.fleet.site.machines.get(call.sender)
         is_from_whom = machine is None or call.sender in self.fleet.site.compartments
         return is_from_whom and call.operation in (Operation.PARK, Operation.RETRIEVE)
 
-    def won(self, car: Reference, winner: int, task: Reference, version: int, *, by_word: bool = False) -> list[Effect]:
-        """``winner`` may fetch a car, or with 0 nobody may, for ``task`` under ``version``.
-
-        By its word alone, which may be late, it is asked whether it has the task until it has the right to the car.
-        """
+    def won(self, car: Reference, winner: int, task: Reference, version: int) -> list[Effect]:
+        """``winner`` may fetch a car, or with 0 nobody may, for ``task`` under ``version``."""
         if winner:
             self.winners[car] = winner
             self._say_at_us.pop(car, None)
         else:
             self.winners.pop(car, None)
             self._unheard_us.pop(car, None)
-        self._ask_at_us.pop(car, None)
-        if by_word:
-            self._ask_at_us[car] = 0
         self.tasks[car] = task, version
         return [winner_record(car, winner, task, version)]
 
@@ -145,25 +125,7 @@ class Stewardship:
         winner, version = self.winner_of(car, task)
         if report.task != task or report.phase is not TaskPhase.AWARDED or winner:
             return []
-        return self.won(car, report.sender, task, version, by_word=True)
-
-    def _ask(self, now_us: int) -> list[Effect]:
-        """Ask winners that are known by their word alone whether they have the task still."""
-        effects: list[Effect] = []
-        for car in [car for car, due_us in self._ask_at_us.items() if due_us <= now_us]:
-            winner = self.winners.get(car, NOBODY)
-            if winner == NOBODY or not self.fleet.tokens.holds(car_token(*car)):
-                # It has come for the car. The right to the station alone comes back from who does not want it.
-                del self._ask_at_us[car]
-                continue
-            self._ask_at_us[car] = now_us + ASK_AGAIN_US
-            if winner in self.fleet.mirror.obstacles.machines:
-                # It cannot answer; whether it is lost is another question.
-                self._unheard_us.pop(car, None)
-                continue
-            self._unheard_us.setdefault(car, now_us)
-            effects.append(Send(SyncRequest(self.fleet.node_id, winner)))
-        return effects
+        return self.won(car, report.sender, task, successor(version, TASK_VERSION_BITS))
 
     def winner_of(self, car: Reference, task: Reference) -> tuple[int, int]:
         """Who may fetch a car for ``task``, 0 for nobody, and its version; what was won for another does not count."""
@@ -179,13 +141,13 @@ class Stewardship:
 
     def review(self, now_us: int) -> list[Effect]:
         """Take the right to fetch a car from winners that are lost, and say so until it is awarded anew."""
-        effects = self._ask(now_us) if self._ask_at_us else []
         if self.fleet.admissions != self._admissions:
             self._admissions, self._since_us = self.fleet.admissions, now_us
             self._unheard_us = dict.fromkeys(self._unheard_us, now_us)
         obstacles, forgetful = self.fleet.mirror.obstacles.machines, self.fleet.forgetful
         if not (obstacles or forgetful or self._unheard_us or self.fleet.mirror.taken_over or self._say_at_us):
-            return effects
+            return []
+        effects: list[Effect] = []
         lost = {winner for winner in obstacles if self._is_lost(winner, now_us)} | (forgetful - set(obstacles))
         deaf = {car for car, since_us in self._unheard_us.items() if now_us - since_us >= UNHEARD_AFTER_US}
         of_lost = [car for car, winner in self.winners.items() if winner in lost or car in deaf]
@@ -221,7 +183,7 @@ class Stewardship:
     def next_wake(self) -> int | None:
         """When ``review`` has something to do, bus time in us; None where nobody is lost."""
         obstacles = self.fleet.mirror.obstacles.machines
-        times = [*self._say_at_us.values(), *self._ask_at_us.values()]
+        times = [*self._say_at_us.values()]
         waited = [car for car in self._unheard_us if car in self.tasks and self._is_untouched(car)]
         times += [self._unheard_us[car] + UNHEARD_AFTER_US for car in waited]
         for car, winner in self.winners.items() if obstacles else ():
@@ -285,7 +247,7 @@ class Stewardship:
         return effects
 
     def _forget(self, car: Reference) -> None:
-        for table in (self.winners, self.tasks, self._say_at_us, self._unheard_us, self._ask_at_us):
+        for table in (self.winners, self.tasks, self._say_at_us, self._unheard_us):
             table.pop(car, None)
 
     def _state_anew(self, car: Reference, version: int) -> list[Effect]:

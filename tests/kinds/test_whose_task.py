@@ -1,0 +1,94 @@
+"""Compartment and robot come to agree whose a task is, whatever either of them missed, forgot or believed too late."""
+
+from onboard.contract.codes import CallResult, Grade, LegAction, Reason, TaskPhase
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import (
+    Award,
+    CallForProposals,
+    CarAt,
+    Itinerary,
+    Leg,
+    Stamp,
+    TaskReport,
+    TokenRefusal,
+    TokenRequest,
+)
+from onboard.core.records import TokenGivenRecord, TokenGoneRecord
+from onboard.systems.car_park.bay_memory import winner_record
+from onboard.systems.car_park.bay_task import REMINDERS
+from onboard.systems.car_park.recovery import award_record
+from tests.models.at_work import AtWork, Deed, Entry
+from tests.models.award import BAY, CAR, CHEAP, DEAR, KEY, PLACE, TASK, WHEELBASE_MM, AwardPart
+from tests.models.custody import CALL, HERE
+from tests.models.snapshot import WHILE_US, copied
+
+PART = AwardPart()
+AGAIN = Award(BAY, 0, CHEAP, TASK, 1, CallResult.AWARDED, Reason.NONE)
+GIVEN_BACK = TaskReport(CHEAP, TASK, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST)
+
+
+def started(node: int, *more: Entry) -> AtWork:
+    """A machine that was started again with more in its journal, and takes part."""
+    machine: AtWork = PART.made(node, (*PART.journal(node), *more), PART.body(node))
+    machine.starts()
+    for _ in range(2):
+        machine.waits(())
+    return machine
+
+
+def after_a_while(machine: AtWork) -> tuple[AtWork, list[Deed]]:
+    older: AtWork = copied(machine, WHILE_US)
+    return older, older.waits(())
+
+
+def waiting() -> AtWork:
+    """The compartment, whose task the cheap robot has won by its journal."""
+    return started(BAY, winner_record(CAR, CHEAP, TASK, 1).entry)
+
+
+def coming(node: int) -> Itinerary:
+    """A plan that leads to the bay."""
+    leg = Leg(LegAction.WORK, HERE.track, HERE.index, HERE.index, HERE.side, 60_000)
+    return Itinerary(node, 1, Grade.FIRM, Stamp(1_000, BAY, 1), (leg,))
+
+
+def test_a_winner_of_which_nothing_shows_is_told_again_that_it_has_the_task() -> None:
+    bay, deeds = after_a_while(waiting())
+    assert AGAIN in deeds
+    bay.hears(coming(CHEAP))
+    bay, deeds = after_a_while(bay)
+    assert not [word for word in deeds if isinstance(word, Award)], "its plan leads here"
+
+
+def test_what_a_robot_does_not_know_it_gives_back_and_it_is_called_for_anew() -> None:
+    assert started(CHEAP).hears(AGAIN) == [GIVEN_BACK]
+    deeds = waiting().hears(GIVEN_BACK)
+    assert [word.task for word in deeds if isinstance(word, CallForProposals)] == [TASK]
+
+
+def test_a_robot_that_has_the_task_says_so() -> None:
+    robot = started(CHEAP, award_record(CALL, PLACE, HERE, 1).entry)
+    said = [word.phase for word in robot.hears(AGAIN) if isinstance(word, TaskReport)]
+    assert said == [TaskPhase.AWARDED]
+
+
+def elsewhere() -> AtWork:
+    """The compartment has given the car to the dear robot, and by its journal the cheap one has won the task."""
+    given = [made(KEY.kind, KEY.number, 2, DEAR).entry for made in (TokenGivenRecord, TokenGoneRecord)]
+    return started(BAY, winner_record(CAR, CHEAP, TASK, 1).entry, *given)
+
+
+def test_a_winner_whom_the_cars_custodian_does_not_know_is_not_waited_for_after_a_restart() -> None:
+    bay = elsewhere()
+    bay.hears(CarAt(DEAR, CAR, PLACE.number, 2, WHEELBASE_MM))
+    refusal = TokenRefusal(DEAR, *KEY, 2, CHEAP, Reason.TOKEN_NOT_GRANTABLE_YET)
+    deeds = [deed for _ in range(REMINDERS) for deed in bay.hears(refusal)]
+    assert [word.task for word in deeds if isinstance(word, CallForProposals)] == [TASK]
+
+
+def test_whoever_brings_the_car_has_its_task_whomever_the_compartment_believed() -> None:
+    bay = elsewhere()
+    bay.hears(CarAt(DEAR, CAR, ANY_STATION, 2, WHEELBASE_MM))
+    bay.hears(coming(DEAR))
+    told = [word.winner for word in bay.hears(TokenRequest(CHEAP, *KEY, 1, 1, 0)) if isinstance(word, Award)]
+    assert told == [DEAR]
