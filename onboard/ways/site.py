@@ -236,8 +236,8 @@ _TAPE_GAP = 8
 def charted(tracks: dict[int, Track]) -> dict[int, Track]:
     """The same tracks, each with its own stretch of tape unless the building is straight.
 
-    Straight are alleys of which each is a floor, with lifts at ends and spurs of one segment: there a drive's word
-    whether it is turned tells the rest.
+    Straight are alleys of which each is a floor, with lifts at ends, on all floors at one position, and spurs of one
+    segment: there a drive's word whether it is turned tells the rest.
     """
     if all(_is_straight(track, tracks) for track in tracks.values()):
         return tracks
@@ -258,7 +258,9 @@ def _is_straight(track: Track, tracks: dict[int, Track]) -> bool:
         is_off_alley = at is not None and at.kind is TrackKind.ALLEY
         return is_off_alley and track.length == 1 and track.high is None and mouths.count(track.low) == 1
     if track.kind is TrackKind.LIFT:
-        return len(set(track.heights_mm)) == len(track.heights_mm)
+        # One position of the tape is that of the platform on all floors.
+        places = {0 if at.index == 1 else at.index + 1 for at in track.joins}
+        return len(places) == 1 and len(set(track.heights_mm)) == len(track.heights_mm)
     return not (track.ends or track.level or track.one_way)
 
 

@@ -246,6 +246,10 @@ def areas(root: ElementTree.Element, fill: str) -> list[tuple[float, float, floa
     return found
 
 
+def meet(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+
+
 def is_within(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
     return one[0] >= other[0] and one[1] >= other[1] and one[2] <= other[2] and one[3] <= other[3]
 
@@ -288,6 +292,10 @@ places = ["p(2,20-40)"]
 name = "Robot_number_one"
 node = 11
 home = "p(192,1)"
+[[robots]]
+name = "R2"
+node = 12
+home = "p(2,15)"
 """
 
 
@@ -303,14 +311,12 @@ def test_what_is_written_can_be_read(name: str) -> None:
         (one.words, other.words)
         for number, one in enumerate(words)
         for other in words[number + 1 :]
-        if one.box[0] < other.box[2]
-        and other.box[0] < one.box[2]
-        and one.box[1] < other.box[3]
-        and other.box[1] < one.box[3]
+        if meet(one.box, other.box)
     ]
     assert met == []
     white = [one for one in words if one.fill == "#ffffff"]
     assert all(any(is_within(one.box, body) for body in bodies) for one in white)
+    assert not [one for one in words if one not in white and any(meet(one.box, body) for body in bodies)]
     assert {machine.name for machine in site.machines.values()} <= {one.words for one in words}
 
 

@@ -2,6 +2,7 @@
 
 import pytest
 
+from onboard.config.site import parse_site
 from onboard.contract.codes import DriveMode, KindCode, MachineState, Reason, TokenKind
 from onboard.contract.messages import (
     BusTime,
@@ -14,6 +15,7 @@ from onboard.contract.messages import (
     TokenHeld,
 )
 from onboard.core.site import Segment
+from onboard.ways.site import way_site
 from tests.trace.checking import (
     ER1,
     GATE,
@@ -21,6 +23,7 @@ from tests.trace.checking import (
     MR1,
     MR2,
     PLATFORM,
+    TWO_FLOORS,
     Tape,
     at,
     grant,
@@ -250,3 +253,56 @@ def test_an_order_repeated_to_a_robot_that_came_off_the_sill_is_none_over_it(
     state = DriveState(MR2, 1, sensed_mm, 1500, DriveMode.MOVING, at_mark=False)
     tape.say(3, state, at(ER1, LIFT, 1, 300, 500)).say(4, DriveOrder(MR2, 1, 2500, 1500))
     assert {rule: count for rule, count in tape.broken().items() if rule == "platform-there"} == broken
+
+
+#: Two floors of three alleys in line, and lifts between them that one drives through.
+IN_LINE = """
+[site]
+name = "in-line"
+[floors]
+count = 2
+positions = 6
+[[alleys]]
+name = "B"
+positions = 6
+[[alleys]]
+name = "C"
+positions = 6
+[[lifts]]
+name = "L1"
+node = 5
+doors = ["p(*,6)", "p(*,B,1)"]
+[[lifts]]
+name = "L2"
+node = 6
+doors = ["p(*,B,6)", "p(*,C,1)"]
+[[compartments]]
+name = "In"
+node = 1
+at = "p(1,3)"
+[[robots]]
+name = "MR1"
+node = 11
+home = "p(2,3)"
+"""
+
+
+@pytest.mark.parametrize(("stop", "broken"), [(1, {}), (3, {"platform-there": 1})])
+def test_an_order_through_one_lift_to_another_is_judged_by_the_floor_of_that(stop: int, broken: dict[str, int]) -> None:
+    """It leads from an alley to which the second lift has no door."""
+    site = way_site(parse_site(IN_LINE, "in-line.toml"))
+    tape = Tape(site).say(1, at(5, LIFT, 1), at(6, LIFT + 1, stop), at(MR1, 1, 7))
+    tape.say(2, DriveOrder(MR1, 1, site.tracks[3].origin_mm + 6 * 2_400, 1500))
+    assert {rule: count for rule, count in tape.broken().items() if rule == "platform-there"} == broken
+
+
+def test_where_platforms_lie_at_different_positions_of_a_straight_buildings_alleys_the_tape_tells_the_alley() -> None:
+    """At a right shaft, of alleys of different lengths: a drive's position of one is not taken for one of the other."""
+    text = TWO_FLOORS.replace('end = "left"', 'end = "right"').replace(
+        "[floors]", "[floors.2]\npositions = 8\n[floors]"
+    )
+    site = way_site(parse_site(text, "right.toml", crowded=True))
+    below, above = (site.tracks[floor].origin_mm + length * 2_400 for floor, length in ((1, 10), (2, 8)))
+    assert [site.on_tape(place) for place in (below, above)] == [(1, 24_000), (2, 19_200)]
+    # And where they lie at one position of all, it is one tape for all, as drives of such buildings have always had it.
+    assert not any(track.origin_mm for track in way_site(two_floors()).tracks.values())

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import onboard.web
+from onboard.trace.chart.svg import COLOURS, SvgDrawing
 
 PAGE = Path(onboard.web.__file__).parent / "page"
 #: On these grounds everything is drawn: cards, the page itself, ways and floors.
@@ -60,3 +61,15 @@ def test_every_colour_that_is_drawn_is_one_that_is_judged() -> None:
         for name in re.findall(r"--(\w+)", (PAGE / file).read_text(encoding="utf-8"))
     }
     assert used <= {*SHAPES, *TEXTS, *FILLS}
+
+
+@pytest.mark.parametrize("number", range(len(COLOURS)))
+def test_the_line_of_each_machine_in_a_chart_stands_out_from_its_panel(number: int) -> None:
+    """By itself, or by a rim of the same dashes below it; the rim stands out from the line, too."""
+    drawing = SvgDrawing(100, 100, "chart")
+    drawing.way([(0, 0), (90, 90)], number + len(COLOURS), width=2)
+    lines = re.findall(r'stroke="(#\w+)" stroke-width="([\d.]+)" stroke-dasharray="6 3"', str(drawing))
+    assert max(contrast(stroke, "#f3f3f3") for stroke, _ in lines) >= 3
+    assert [stroke for stroke, _ in lines][-1] == COLOURS[number]
+    assert [float(width) for _, width in lines] == sorted((float(width) for _, width in lines), reverse=True)
+    assert len(lines) == 1 or contrast(lines[0][0], COLOURS[number]) >= 2.5

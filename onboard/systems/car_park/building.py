@@ -197,12 +197,14 @@ class _Building:
         if track.kind is TrackKind.SPUR:
             self._spur_name(number, track.length)
             return
-        for index in range(1, track.length + 1):
+        # A robot at home would lie on what is written in its slot.
+        free = [index for index in range(1, track.length + 1) if Segment(number, index) not in self.homes]
+        for index in free:
             x, y, _, high = self._rectangle(self.outlines.slot(Segment(number, index)))
-            if index == 1 or index % _NUMBERED == 0:
-                words = f"p({number},1)" if index == 1 else str(index)
+            if index == free[0] or index % _NUMBERED == 0:
+                words = f"p({number},{index})" if index == free[0] else str(index)
                 self.drawing.text(x + 2, y + high - 3, words, fill=_ON_WAY, size=10)
-            if index == 1 and number in self.site.alley_names:
+            if index == free[0] and number in self.site.alley_names:
                 self.drawing.text(x + 2, y + 11, self.site.alley_names[number], fill="#000000", halo=_WAY)
 
     def _spur_name(self, number: int, length: int) -> None:

@@ -20,7 +20,7 @@ from onboard.history.plans import PlanTold
 from onboard.history.rights import RightTold
 from onboard.systems.car_park.site import CarPark
 from onboard.trace.chart.over_time import BOTTOM, GAP, LEFT, RIGHT, TOP, WIDTH, name_machines, time_axis
-from onboard.trace.chart.svg import SvgDrawing, colour, dashes
+from onboard.trace.chart.svg import SvgDrawing, colour
 from onboard.trace.listener import LoggedMessage
 from onboard.ways.lifts import stop_mm
 from onboard.ways.site import Track, TrackKind, WaySite, way_site
@@ -321,7 +321,7 @@ class _Panel:
                 line = [
                     (self.x(time_us), self.y(place)) for time_us, place in _line(points, self.pitch_mm, self.speed_mm_s)
                 ]
-                self.drawing.line(line, colour(numbers[node]), width=2, dash=dashes(numbers[node]))
+                self.drawing.way(line, numbers[node], width=2)
 
 
 def _line(points: list[TrackPoint], pitch_mm: int, speed_mm_s: int) -> list[tuple[float, float]]:

@@ -13,7 +13,7 @@ from onboard.contract.messages import Message
 from onboard.core.site import Site
 from onboard.history.history import Fact, History
 from onboard.systems.words import words_of
-from onboard.trace.chart.svg import SvgDrawing, colour, dashes
+from onboard.trace.chart.svg import SvgDrawing, colour
 from onboard.trace.listener import LoggedMessage
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM, GAP = 1200, 90, 20, 46, 30, 14
@@ -187,8 +187,10 @@ class _PanelSheet:
         if before and points:
             points.insert(0, (self.x(self.first_us), self.y(before[-1])))
         if len(points) > 1:
-            dash = dashes(self.numbers.get(line.node, 0))
-            self.drawing.line(points, self._colour(line.node), width=line.width, dash=dash)
+            if line.node in self.numbers:
+                self.drawing.way(points, self.numbers[line.node], width=line.width)
+            else:
+                self.drawing.line(points, NOBODYS, width=line.width)
 
 
 def by_distance(far: Sequence[Sequence[float]]) -> list[int]:
@@ -202,7 +204,7 @@ def name_machines(drawing: SvgDrawing, machines: list[tuple[str, int]], legend: 
     """Machines by name and number, in their colours, and what bands or bars mean behind them."""
     x = float(LEFT)
     for name, number in machines:
-        drawing.line([(x, 14), (x + 24, 14)], colour(number), width=2.5, dash=dashes(number))
+        drawing.way([(x, 14), (x + 24, 14)], number, width=2.5)
         drawing.text(x + 28, 18, name)
         x += 44 + 8 * len(name)
     drawing.text(x + 10, 18, legend)

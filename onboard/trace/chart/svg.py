@@ -7,6 +7,8 @@ their dashes as well.
 from xml.sax.saxutils import escape
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D1F")
+#: These have less than 3:1 on the ground of a panel (WCAG 2.2, 1.4.11): a line of theirs has a dark rim.
+PALE, RIM = frozenset({"#CC79A7", "#E69F00", "#56B4E9"}), "#4d4d4d"
 DASHES = ("", "6 3", "2 2", "8 3 2 3")
 
 
@@ -37,6 +39,12 @@ class SvgDrawing:
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
         dashed = f' stroke-dasharray="{dash}"' if dash else ""
         self._parts.append(f'<polyline points="{path}" fill="none" stroke="{stroke}" stroke-width="{width}"{dashed}/>')
+
+    def way(self, points: list[tuple[float, float]], number: int, *, width: float) -> None:
+        """The line of the n-th machine through points in px, by its colour and its dashes."""
+        if colour(number) in PALE:
+            self.line(points, RIM, width=width + 1.6, dash=dashes(number))
+        self.line(points, colour(number), width=width, dash=dashes(number))
 
     def area(self, points: list[tuple[float, float]], fill: str, *, opacity: float, note: str = "") -> None:
         """A filled shape; ``note`` is shown where a browser's pointer rests on it."""

@@ -170,11 +170,6 @@ def token_of(slot: Segment) -> Token:
     return Token(TokenKind.SEGMENT, slot.number)
 
 
-def floor_of(site: Site, lift: ReportedPosition) -> int:
-    """The alley at which a lift's platform is, by the nearest mark; the first of those to which it has doors."""
-    return floors_of(site, lift)[0]
-
-
 def floors_of(site: Site, lift: ReportedPosition) -> list[int]:
     """The tracks to which a lift has doors where its platform is, by the nearest mark."""
     ways = way_site(site)

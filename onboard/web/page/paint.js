@@ -94,11 +94,12 @@ export function nameBeside(pen, bodies, spared, wide, high) {
   }
 }
 
-// Above and below: in the middle, to the right and to the left; then at both sides.
+// Above and below: in the middle, to the right and to the left; then at both sides, and further away.
 function spotsBeside(body, w, h) {
   const [right, bottom] = [body.x + body.w, body.y + body.h];
   const columns = [body.x + (body.w - w) / 2, body.x, right - w];
   const spots = [...columns.map((x) => [x, body.y - h - 1]), ...columns.map((x) => [x, bottom + 1])];
   const level = body.y + (body.h - h) / 2;
-  return [...spots, [right + 1, level], [body.x - w - 1, level]].map(([x, y]) => ({ x, y, w, h }));
+  const far = columns.flatMap((x) => [[x, body.y - 2 * h - 2], [x, bottom + h + 2]]);
+  return [...spots, [right + 1, level], [body.x - w - 1, level], ...far].map(([x, y]) => ({ x, y, w, h }));
 }

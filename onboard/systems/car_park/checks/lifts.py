@@ -14,7 +14,6 @@ from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.geometry import (
     GATE_INDEX,
     ReportedPosition,
-    floor_of,
     floors_of,
     lifts_under,
     occupied,
@@ -23,6 +22,7 @@ from onboard.trace.check.geometry import (
 )
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
+from onboard.ways.site import way_site
 
 
 class _LiftRule(Rule):
@@ -151,15 +151,18 @@ class PlatformThere(Rule):
         self._judge(event, body, slots, "is sent over")
 
     def _judge(self, event: LogEvent[Message], body: ReportedPosition, slots: Sequence[Segment], how: str) -> None:
-        site, wrong = self.picture.site, False
+        site, wrong = way_site(self.picture.site), False
+        # By floors: an order may lead through one lift to another, and so to a door of another alley.
+        level = site.level(body.track)
         for slot in slots:
             lift = self.picture.bodies.get(site.stewards.get(slot.track, 0))
             if slot.index != GATE_INDEX or lift is None or lift.track != slot.track:
                 continue
-            if lift.speed_mm_s or body.track not in floors_of(site, lift):
+            there = {site.level(track) for track in floors_of(site, lift)}
+            if lift.speed_mm_s or level not in there:
                 wrong = True
-                where = "moves" if lift.speed_mm_s else f"is at floor {floor_of(site, lift)}"
+                where = "moves" if lift.speed_mm_s else f"is at floor {min(there)}"
                 if body.node not in self._told:
-                    what = f"{how} the sill of floor {body.track} while the lift {where}"
+                    what = f"{how} the sill of floor {level} while the lift {where}"
                     self.find(event, (body.node, lift.node), what)
         (self._told.add if wrong else self._told.discard)(body.node)
