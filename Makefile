@@ -58,10 +58,11 @@ bench: $(VENV)/.test ## all figures of bench/, one table each
 		echo "== $$script"; $(BIN)/python "$$script"; \
 	done
 
-docs: $(VENV)/.test ## write onboard/contract and docs/network.md anew from the DBC files, docs/systems.md from docs/systems/
+docs: $(VENV)/.test ## write onboard/contract and docs/network.md anew from the DBC files, docs/systems.md from docs/systems/, charts and times of docs/protocol.md
 	$(BIN)/python -m onboard.contract.generate
 	$(BIN)/python -m onboard.wire.network_doc
 	$(BIN)/python -m tests.systems_page
+	$(BIN)/python -m tests.protocol
 
 clean: ## remove the environment and everything generated
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage htmlcov runs

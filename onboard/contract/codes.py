@@ -8,7 +8,7 @@ from enum import IntEnum
 #: The contract of dbc/fleet.dbc.
 CONTRACT = 2
 #: What heartbeats say of it; a machine with another number joins as an obstacle and never bids. While the
-#: contract is open: 128 plus the low 7 bits of a CRC-32 over the DBC (docs/contract-2.md), so that builds
+#: contract is open: 128 plus the low 7 bits of a CRC-32 over the DBC (docs/protocol.md), so that builds
 #: of different days are strangers.
 CONTRACT_VERSION = 0xFE
 
@@ -192,7 +192,7 @@ class MachineState(IntEnum):
 
 
 class RegenerationPhase(IntEnum):
-    """How far the regeneration of a lost machine's tokens is (docs/contract-2.md)."""
+    """How far the regeneration of a lost machine's tokens is (docs/protocol.md)."""
 
     NONE = 0
     FREEZE = 1

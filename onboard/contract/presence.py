@@ -147,8 +147,9 @@ class Heartbeat(Message):
     contract: int
     #: Digest of the site's meaning; never 0. 1 to 65535.
     site_digest: int
-    #: CRC-16/CCITT-FALSE over the sender's firm itineraries (node << 8 | version, by node) and cars (origin << 16 |
-    #: number, station, by car), as 32-bit big-endian words. 0 to 65535.
+    #: CRC-16/CCITT-FALSE over the sender's firm itineraries (node << 8 | version, by node), cars (origin << 16 |
+    #: number, station, by car) and blocked segments (1 << 31 | track << 8 | index), as 32-bit big-endian words. 0 to
+    #: 65535.
     mirror_digest: int
     #: Boot counter; another value means that the sender was restarted. 1 to 255.
     boot: int

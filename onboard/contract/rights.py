@@ -181,7 +181,8 @@ class Regeneration(Message):
     absent: int
     #: How many TokenAssigned belong to it. 0 to 65535.
     tokens: int
-    #: CRC-16/CCITT-FALSE over the assignments, by token. 0 to 65535.
+    #: Low 16 bits of the CRC-32 over kind, token, version and holder of each assignment, by kind and token, as 32-bit
+    #: big-endian words. 0 to 65535.
     digest: int
 
 
@@ -195,7 +196,8 @@ class RegenerationState(Message):
     epoch: int
     #: How many TokenAssigned it has, or has told. 0 to 65535.
     tokens: int
-    #: CRC-16/CCITT-FALSE over the assignments, by token. 0 to 65535.
+    #: Low 16 bits of the CRC-32 over kind, token, version and holder of each assignment, by kind and token, as 32-bit
+    #: big-endian words. 0 to 65535.
     digest: int
     #: Why it refuses, where it does.
     reason: Reason

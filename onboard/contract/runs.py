@@ -1,4 +1,4 @@
-"""Runs: one word about the tokens of segments in line, which is as good as one for each of them (docs/contract-2.md).
+"""Runs: one word about the tokens of segments in line, which is as good as one for each of them (docs/protocol.md).
 
 Nobody behind the wire knows runs: who hears one takes it apart, and who says several words joins what can be one.
 Whatever is proved of words about one token holds of runs: the bus loses, doubles or delays these words together.

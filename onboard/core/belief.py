@@ -1,4 +1,4 @@
-"""Whom one node believes to hold each token: what a grant to it is judged by (docs/contract-2.md).
+"""Whom one node believes to hold each token: what a grant to it is judged by (docs/protocol.md).
 
 A belief moves only along a chain: by a grant or an answer of the node that was believed until then, or by what a
 machine vouches for when it is asked. All else that is overheard is a hint: good for a picture, never a reason to refuse

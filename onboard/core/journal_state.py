@@ -8,7 +8,7 @@ from onboard.contract.codes import Reason
 from onboard.core.journal_records import Entry, RecordTypes, records_in
 from onboard.core.records import BlockedRecord, BootRecord, ClearRecord, EpochRecord, ManualRecord
 
-#: Why a machine holds whose rights nobody knows any more; only regeneration gives it any (docs/contract-2.md).
+#: Why a machine holds whose rights nobody knows any more; only regeneration gives it any (docs/protocol.md).
 RIGHTS_LOST = (Reason.JOURNAL_LOST, Reason.JOURNAL_SHORT, Reason.JOURNAL_FOREIGN)
 #: Of a short journal these records still mean something: which lives there were, and what a person has decided. What
 #: it says of rights, tasks and places may be long over: nobody knows how much is missing.

@@ -45,7 +45,7 @@ class TokenHeldRecord(TokenRecord):
 
 
 # The last give of a token, and that it has come, are kept beside what came after: "I gave it to X under v" outlives
-# everything (docs/contract-2.md).
+# everything (docs/protocol.md).
 @dataclass(frozen=True, slots=True)
 class TokenGivenRecord(TokenRecord):
     """This node gives it to ``holder``; whether it has come is not known."""

@@ -1,4 +1,4 @@
-"""A machine that does nothing any more, and why: who brought it about, and what lets it go on (contract 2, Halted).
+"""A machine that does nothing any more, and why: who brought it about, and what lets it go on (docs/protocol.md, 13).
 
 A held machine lives: it says ``Halted`` in each heartbeat period, stands, uses no right and gives none away, and comes
 back. A halted one says why once and is silent: its process ends. Frames under one's own number are the case of rule 2
@@ -17,9 +17,9 @@ from onboard.contract.messages import Halted
 from onboard.core.journal_records import Entry, records_in
 from onboard.core.records import HeldRecord, ReleasedRecord
 
-#: An emergency stop holds so long after it was last heard, us (docs/contract-2.md).
+#: An emergency stop holds so long after it was last heard, us (docs/protocol.md).
 STOP_LASTS_US = 30_000_000
-#: Heartbeat periods without a frame under my number after which I go on (docs/contract-2.md).
+#: Heartbeat periods without a frame under my number after which I go on (docs/protocol.md).
 QUIET_BEATS = 3
 #: A frame under my number this many heartbeat periods after the first of one hold is a twin that lives, not a log that
 #: somebody plays or a slip of a tool: ten minutes at the default.

@@ -1,7 +1,7 @@
 """Frames that somebody else sends under this machine's number: which of them made or moved a right.
 
 What is word for word an old statement of mine, such as a log that is played on the live bus, moves nothing: everybody
-goes by versions. What is news under my number somebody may have believed (docs/contract-2.md, Halted).
+goes by versions. What is news under my number somebody may have believed (docs/protocol.md, Halting).
 """
 
 from collections import deque

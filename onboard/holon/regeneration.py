@@ -1,6 +1,6 @@
 """One machine's part in making lost rights anew: it stands, says what it knows, and keeps the list before it counts.
 
-A person's tool leads (docs/contract-2.md, Regeneration). Two things hold whatever is lost on the way: nothing of the
+A person's tool leads (docs/protocol.md, Regeneration). Two things hold whatever is lost on the way: nothing of the
 list counts before everybody has it in the journal, and who has it there waits, also over its own restart, until it
 hears that it counts (somebody lives in the new epoch) or that it does not (somebody of the old one works).
 """

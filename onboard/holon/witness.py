@@ -2,7 +2,7 @@
 
 A journal may be an old copy of itself, and no medium knows that (``journal_state.py``). The bus does: who took a token
 from me says so, and so does who saw it taken. What is known better elsewhere takes the right to move from this machine
-until a person has decided (docs/contract-2.md, Restart).
+until a person has decided (docs/protocol.md, Restart).
 """
 
 from collections.abc import Callable, Mapping

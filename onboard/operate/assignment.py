@@ -1,4 +1,4 @@
-"""Which rights are nobody's after a machine lost its own, and whom they go to (rule 3 of docs/contract-2.md).
+"""Which rights are nobody's after a machine lost its own, and whom they go to (rule 3 of docs/protocol.md).
 
 Only statements made while all stand frozen count: who lives says what it holds, and the newest that it has seen of all
 else. What nobody says to hold, and nobody but the lost machine can have, is made anew above every version that anybody

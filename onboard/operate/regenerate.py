@@ -1,4 +1,4 @@
-"""``regenerate``: the rights of a machine whose journal is lost are made anew (rule 3 of docs/contract-2.md).
+"""``regenerate``: the rights of a machine whose journal is lost are made anew (rule 3 of docs/protocol.md).
 
 The sequence is a table: FREEZE until all have said what they hold, the person's yes, READ_BACK until all have the same
 list in their journals, COMMIT until all live in the new epoch. Whatever speaks against it before COMMIT aborts it, and

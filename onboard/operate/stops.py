@@ -1,4 +1,4 @@
-"""``stop`` and ``go``: all machines stand, and go on again (docs/contract-2.md).
+"""``stop`` and ``go``: all machines stand, and go on again (docs/protocol.md).
 
 A stop counts until 30 s after it was last heard, so it is said as long as it shall hold. This bus is no safety channel.
 """
@@ -11,7 +11,7 @@ from onboard.operate.order import AGAIN_US, DONE, NOT_CONFIRMED, OperatorCommand
 from onboard.operate.park import Park
 from onboard.operate.words import halted_words, state_words
 
-#: How long a stop that is no longer said still holds, us (docs/contract-2.md).
+#: How long a stop that is no longer said still holds, us (docs/protocol.md).
 LASTS_US = 30_000_000
 
 
@@ -158,7 +158,7 @@ class GoAgain(OperatorCommand):
 
 
 class LetGo(GoAgain):
-    """Lets one machine go on that holds until a person says so: Go under its own number (docs/contract-2.md)."""
+    """Lets one machine go on that holds until a person says so: Go under its own number (docs/protocol.md)."""
 
     def __init__(self, park: Park, node: int, machine: Machine) -> None:
         super().__init__(park, node, machine.node_id)

@@ -181,8 +181,8 @@ def test_a_table_that_two_systems_name_alike_is_one_and_must_be_alike(monkeypatc
 
 
 def test_words_that_are_kept_for_later_are_free_and_fit_a_frame() -> None:
-    """``docs/contract-2.md`` promises identifiers that nothing else takes, to words of at most 64 bits."""
-    page = (FOLDER.parents[1] / "docs" / "contract-2.md").read_text(encoding="utf-8")
+    """``docs/protocol.md`` promises identifiers that nothing else takes, to words of at most 64 bits."""
+    page = (FOLDER.parents[1] / "docs" / "protocol.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(\w+)` \| `([0-9A-F]{6})nn` \| [^|]+ \| ([^|]+) \|", page, re.MULTILINE)
     assert len(rows) == 9
     taken = {layout.frame_id >> 8 for layout in LAYOUTS.values()}

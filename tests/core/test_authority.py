@@ -167,7 +167,7 @@ def test_a_new_car_has_one_custodian() -> None:
         steward.create(key)
 
 
-# --- what ends a grant, and from whom one counts (docs/contract-2.md) --------------------------------------------
+# --- what ends a grant, and from whom one counts (docs/protocol.md) --------------------------------------------
 
 
 def entries(effects: list[Effect]) -> list[dict[str, str | int]]:

@@ -33,7 +33,7 @@ COMMIT, ABORT = RegenerationPhase.COMMIT, RegenerationPhase.ABORT
 
 
 class Machines:
-    """All machines of the site but ``without``, as docs/contract-2.md lets them answer."""
+    """All machines of the site but ``without``, as docs/protocol.md lets them answer."""
 
     def __init__(self, hand: Hand, *words: Message, without: tuple[int, ...] = ()) -> None:
         self.hand, self.words = hand, words

@@ -1,7 +1,7 @@
 """Every frame of fixed runs, fleet and device buses: who only moves code about changes none of them.
 
 A change that means to change what is said writes the table anew: `python -m tests.system.test_same_traces`, and says so
-in docs/decisions.md.
+in docs/decisions.md. The examples of docs/protocol.md are of one of these runs, and are taken anew with it.
 """
 
 import hashlib
@@ -11,6 +11,8 @@ from tempfile import TemporaryDirectory
 import pytest
 
 from bus_sim.cli import main
+from tests.protocol import page
+from tests.protocol.examples import EXAMPLES, RUN, lines_of
 
 #: Options of `bus-sim run`, and the first 64 bits of SHA-256 over the log that it writes.
 RUNS = {
@@ -23,16 +25,20 @@ RUNS = {
 }
 
 
-def played(options: str, folder: Path) -> str:
+def played(options: str, log: Path) -> str:
     """What the log of a run comes to."""
-    log = folder / "run.log"
     main(["run", *options.split(), "--seed", "1", "--speed", "max", "--no-web", "--devices", "--trace", str(log)])
     return hashlib.sha256(log.read_bytes()).hexdigest()[:16]
 
 
 @pytest.mark.parametrize("options", RUNS)
 def test_a_run_says_what_it_always_said(options: str, tmp_path: Path) -> None:
-    assert played(options, tmp_path) == RUNS[options]
+    log = tmp_path / "run.log"
+    assert played(options, log) == RUNS[options]
+    if options == RUN:
+        shown, said = page.parts(page.PAGE.read_text(encoding="utf-8")), log.read_text(encoding="utf-8").splitlines()
+        examples = [line for name in EXAMPLES for line in lines_of(shown["example", name])]
+        assert not set(examples) - set(said), "docs/protocol.md: take its examples anew (at the top of this file)"
 
 
 def renew(source: Path) -> None:
@@ -40,7 +46,10 @@ def renew(source: Path) -> None:
     text = source.read_text(encoding="utf-8")
     with TemporaryDirectory() as folder:
         for options, known in RUNS.items():
-            text = text.replace(f'"{options}": "{known}"', f'"{options}": "{played(options, Path(folder))}"')
+            log = Path(folder) / "run.log"
+            text = text.replace(f'"{options}": "{known}"', f'"{options}": "{played(options, log)}"')
+            if options == RUN:
+                page.write(log)
     source.write_text(text, encoding="utf-8")
 
 

@@ -55,7 +55,7 @@ def test_periods_and_version_are_those_of_a_site_that_sets_none() -> None:
     for text in TEXTS.values():
         assert f'BA_ "ContractVersion" {CONTRACT};' in text
     lines = [line for line in TEXTS["fleet"].splitlines() if line.startswith(("BO_ ", " SG_ "))]
-    assert zlib.crc32("\n".join(lines).encode()) & 0x7F | 0x80 == CONTRACT_VERSION, "as docs/contract-2.md says"
+    assert zlib.crc32("\n".join(lines).encode()) & 0x7F | 0x80 == CONTRACT_VERSION, "as docs/protocol.md says"
 
 
 def test_the_sites_dbc_has_one_message_for_each_machine() -> None:

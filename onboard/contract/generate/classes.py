@@ -29,7 +29,7 @@ def version(contract: DbcFile) -> str:
     return (
         f"#: The contract of dbc/{contract.name}.dbc.\nCONTRACT = {contract.version}\n"
         "#: What heartbeats say of it; a machine with another number joins as an obstacle and never bids. While the\n"
-        "#: contract is open: 128 plus the low 7 bits of a CRC-32 over the DBC (docs/contract-2.md), so that builds\n"
+        "#: contract is open: 128 plus the low 7 bits of a CRC-32 over the DBC (docs/protocol.md), so that builds\n"
         f"#: of different days are strangers.\nCONTRACT_VERSION = 0x{digest:02X}\n"
     )
 

@@ -1,4 +1,4 @@
-"""Whether the winners of one initiator's calls are at work: the rule that all initiators share (contract 2, Left out).
+"""Whether the winners of one initiator's calls are at work: the rule that all initiators share (docs/protocol.md, A7).
 
 A winner has lost its task that has said nothing of its award, that has been an obstacle for long, or of which nobody
 has heard any change for long. Whether the task may go to another then is for the initiator to know: it may be begun, or

@@ -54,7 +54,7 @@ class Stall:
 
 @dataclass
 class PlaceWords(Generic[Place]):
-    """What one machine said last of its place, which tells what is news (contract 2, Places). Bus time in us."""
+    """What one machine said last of its place, which tells what is news (docs/protocol.md, P10). Bus time in us."""
 
     #: Where it was by that, whether it moved, and when it said so; whoever says a place, on whatever occasion, sets it.
     last: tuple[Place | None, bool, int] = (None, False, 0)
