@@ -2,6 +2,7 @@
 
 import json
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,8 @@ from onboard.ports.broker import Publication
 #: than people press, less than a fleet bus feels. Instant actions of each machine have as many of their own: whoever
 #: floods one topic takes nobody else's pause away.
 BURST, RATE_US = 20, 1_000_000
+#: Objects and lists within each other: an order of VDA 5050 has 7, and what stands in a parameter of an action.
+MOST_DEPTH = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +92,9 @@ class Inbox:
         if len(publication.payload) > MOST_BYTES:
             return Incoming(kind, serial, {}, "OVERSIZED", "$", f"at most {MOST_BYTES} bytes are taken")
         try:
-            body = json.loads(publication.payload, parse_constant=_no_constant)
+            body = _parsed(publication.payload)
         except (ValueError, RecursionError) as error:
-            return Incoming(kind, serial, {}, "MALFORMED", "$", f"no JSON: {str(error)[:100]}")
+            return Incoming(kind, serial, {}, "MALFORMED", "$", f"no JSON to be taken: {str(error)[:100]}")
         named = body if isinstance(body, dict) else {}
         name = TRANSPORT if kind == TRANSPORT else f"{self._dialect.number}/{kind}"
         wrong = schema(name).first_error(body)
@@ -132,6 +135,22 @@ def _too_long(body: dict[str, Any]) -> tuple[str, str] | None:
         if max(len(action["actionId"]), len(action["actionType"])) > MOST_ID:
             return f"$.actions[{number}].actionId", f"must have at most {MOST_ID} characters"
     return None
+
+
+def _parsed(payload: bytes) -> Any:
+    """Raises ``ValueError`` for no JSON, and for more than ``MOST_DEPTH``; ``RecursionError`` where it is far more."""
+    found = json.loads(payload, parse_constant=_no_constant)
+    # Level by level: whoever goes into a value by itself is lost where it is deep.
+    level = _containers([found])
+    for _ in range(MOST_DEPTH):
+        level = _containers(one for each in level for one in (each.values() if isinstance(each, dict) else each))
+    if level:
+        raise ValueError(f"nested deeper than {MOST_DEPTH}")
+    return found
+
+
+def _containers(values: Iterable[Any]) -> list[dict[str, Any] | list[Any]]:
+    return [one for one in values if isinstance(one, dict | list)]
 
 
 def _no_constant(name: str) -> None:
