@@ -2,13 +2,13 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from onboard.gateway.dialect import Dialect
 from onboard.gateway.factsheet import MOST_ACTIONS, MOST_BYTES, MOST_ID
 from onboard.gateway.schema import TRANSPORT, schema
+from onboard.nesting import is_deeper
 from onboard.ports.broker import Publication
 
 #: Orders taken up at once, and how fast the allowance grows again, us an order: a burst of 20, then one a second: more
@@ -140,17 +140,9 @@ def _too_long(body: dict[str, Any]) -> tuple[str, str] | None:
 def _parsed(payload: bytes) -> Any:
     """Raises ``ValueError`` for no JSON, and for more than ``MOST_DEPTH``; ``RecursionError`` where it is far more."""
     found = json.loads(payload, parse_constant=_no_constant)
-    # Level by level: whoever goes into a value by itself is lost where it is deep.
-    level = _containers([found])
-    for _ in range(MOST_DEPTH):
-        level = _containers(one for each in level for one in (each.values() if isinstance(each, dict) else each))
-    if level:
+    if is_deeper(found, MOST_DEPTH):
         raise ValueError(f"nested deeper than {MOST_DEPTH}")
     return found
-
-
-def _containers(values: Iterable[Any]) -> list[dict[str, Any] | list[Any]]:
-    return [one for one in values if isinstance(one, dict | list)]
 
 
 def _no_constant(name: str) -> None:
