@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from onboard.config.problems import Problems, quoted
+from onboard.nesting import is_deeper
 
 #: Where a value is: keys of tables and, from 0, numbers in arrays.
 KeyPath = tuple[str | int, ...]
@@ -24,6 +25,8 @@ _STRING = re.compile(
 _OTHER_VALUE = re.compile(r"[^,\]}#\n]*")
 #: Parts of a key joined by dots: deeper than any file of ours by a factor of ten.
 _MOST_PARTS = 32
+#: Tables and arrays within each other: the parser takes some hundreds, whoever shows a value does not.
+_MOST_DEPTH = 64
 #: The largest site has some hundreds.
 _MOST_TABLES = 10_000
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
@@ -68,7 +71,10 @@ def parse(text: str, file: str, problems: Problems) -> Document:
         problems.add(0, "", None, f"more than {_MOST_TABLES} tables", "write the file in the documented form")
         return Document(file)
     try:
-        return Document(file, tomllib.loads(text), _Scanner(text.replace("\r\n", "\n")).scan())
+        values = tomllib.loads(text)
+        if is_deeper(values, _MOST_DEPTH):
+            raise RecursionError
+        return Document(file, values, _Scanner(text.replace("\r\n", "\n")).scan())
     except RecursionError:
         problems.add(0, "", None, "arrays or tables nested too deeply", "write the file in the documented form")
     except ValueError as error:

@@ -8,12 +8,15 @@ from typing import Any
 from onboard.gateway.dialect import Dialect
 from onboard.gateway.factsheet import MOST_ACTIONS, MOST_BYTES, MOST_ID
 from onboard.gateway.schema import TRANSPORT, schema
+from onboard.nesting import is_deeper
 from onboard.ports.broker import Publication
 
 #: Orders taken up at once, and how fast the allowance grows again, us an order: a burst of 20, then one a second: more
 #: than people press, less than a fleet bus feels. Instant actions of each machine have as many of their own: whoever
 #: floods one topic takes nobody else's pause away.
 BURST, RATE_US = 20, 1_000_000
+#: Objects and lists within each other: an order of VDA 5050 has 7, and what stands in a parameter of an action.
+MOST_DEPTH = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +92,9 @@ class Inbox:
         if len(publication.payload) > MOST_BYTES:
             return Incoming(kind, serial, {}, "OVERSIZED", "$", f"at most {MOST_BYTES} bytes are taken")
         try:
-            body = json.loads(publication.payload, parse_constant=_no_constant)
+            body = _parsed(publication.payload)
         except (ValueError, RecursionError) as error:
-            return Incoming(kind, serial, {}, "MALFORMED", "$", f"no JSON: {str(error)[:100]}")
+            return Incoming(kind, serial, {}, "MALFORMED", "$", f"no JSON to be taken: {str(error)[:100]}")
         named = body if isinstance(body, dict) else {}
         name = TRANSPORT if kind == TRANSPORT else f"{self._dialect.number}/{kind}"
         wrong = schema(name).first_error(body)
@@ -132,6 +135,14 @@ def _too_long(body: dict[str, Any]) -> tuple[str, str] | None:
         if max(len(action["actionId"]), len(action["actionType"])) > MOST_ID:
             return f"$.actions[{number}].actionId", f"must have at most {MOST_ID} characters"
     return None
+
+
+def _parsed(payload: bytes) -> Any:
+    """Raises ``ValueError`` for no JSON, and for more than ``MOST_DEPTH``; ``RecursionError`` where it is far more."""
+    found = json.loads(payload, parse_constant=_no_constant)
+    if is_deeper(found, MOST_DEPTH):
+        raise ValueError(f"nested deeper than {MOST_DEPTH}")
+    return found
 
 
 def _no_constant(name: str) -> None:

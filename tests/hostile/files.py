@@ -69,6 +69,10 @@ def hostile() -> Iterator[Hostile]:
     yield Hostile("site: a pipe that never ends", _SITE, None)
     yield Hostile("site: 40 MB of comments", _SITE, b"# nothing\n" * 4_000_000, ".toml")
     yield Hostile("site: 100,000 tables", _SITE, small + b"[[lifts]]\n" * 100_000, ".toml")
+    # What the parser takes, and who shows the value does not.
+    nested = b"[" * 450 + b"]" * 450
+    yield Hostile("site: nested 450 times", _SITE, small.replace(b'name = "small"', b"name = " + nested, 1), ".toml")
+    yield Hostile("scenario: nested 450 times", _SCENARIO, b'[scenario]\nsite = "small"\nseed = ' + nested, ".toml")
     # Machine files, keys, journals.
     yield Hostile("machine file: nested", _ONBOARD, b"x = " + DEEP, ".toml")
     yield Hostile("machine file: endless", _ONBOARD, ZERO)

@@ -1,5 +1,6 @@
 """startPause and stopPause: a machine is held by a word on the bus, and what its state tells is its own word."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -18,9 +19,12 @@ from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, Man
 from onboard.contract.graph import RobotAt
 from onboard.contract.messages import Heartbeat, ManualOrder, ManualState
 from onboard.core.site import Site
+from onboard.gateway.dialect import DIALECTS
+from onboard.gateway.inbox import MOST_DEPTH, Inbox
 from onboard.gateway.machines import Machines
 from onboard.gateway.pauses import Pauses
 from onboard.history.history import History
+from onboard.ports.broker import Publication
 from tests.graph.sites import hall, made
 from tests.graph.test_named_orders import header, order, topic
 from tests.mapd.sites import made as made_floor
@@ -193,6 +197,22 @@ def test_a_pause_waits_behind_no_flood_of_orders() -> None:
     _, ordered = park_and_order(one_floor(), 0, [*flood, pause], extra_s=60.0)
     assert actions(ordered, "MR1") == [("p", ["RUNNING", "FINISHED"])]
     assert any(state["paused"] for state in ordered.states("MR1"))
+
+
+@pytest.mark.parametrize("version", sorted(DIALECTS))
+def test_a_parameter_that_is_nested_beyond_any_order_is_refused(version: str) -> None:
+    """A parser that takes it says nothing of what comes after: it may be gone into and written again."""
+    inbox = Inbox(DIALECTS[version], "onboard/small", "acme")
+    name = next(one for one in inbox.subscriptions if one.endswith("/instantActions")).replace("+", "MR1")
+    parameter = {"key": "a", "value": "DEEP"}
+    action = {"actionType": "x", "actionId": "1", "blockingType": "NONE", "actionParameters": [parameter]}
+    head = {"headerId": 0, "timestamp": "2026-11-23T00:00:00.000Z", "version": DIALECTS[version].number}
+    body = json.dumps({**head, "manufacturer": "acme", "serialNumber": "MR1", "actions": [action]})
+    # Five are around the value.
+    for deep, reason in ((MOST_DEPTH - 5, ""), (MOST_DEPTH - 4, "MALFORMED"), (900, "MALFORMED")):
+        text = body.replace('"DEEP"', "[" * deep + "]" * deep)
+        found = inbox.judge(Publication(name, text.encode(), 1, retain=False), 0)
+        assert found is not None and found.reason == reason, (deep, found)
 
 
 def test_whoever_floods_one_machine_with_actions_takes_no_other_machines_pause_away() -> None:

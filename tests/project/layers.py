@@ -124,6 +124,7 @@ LAYERS: dict[str, Layer] = {
     "onboard.contract": Layer(only_stdlib=PURE_STDLIB),
     # Whoever reads a file of others.
     "onboard.bounded_file": Layer(not_stdlib=frozenset({"asyncio", "random", "socket", "threading"})),
+    "onboard.nesting": Layer(only_stdlib=PURE_STDLIB),
     # Writes the rest of it; runs where somebody changes a DBC, never on a board.
     "onboard.contract.generate": Layer(("onboard.wire.dbc_file", "dbc")),
     "onboard.core": Layer(only_stdlib=PURE_STDLIB, pure=True),
@@ -144,7 +145,10 @@ LAYERS: dict[str, Layer] = {
     ),
     "onboard.ports": Layer(CORE_TYPES, not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.config": Layer(
-        ("onboard.bounded_file", "onboard.core", "onboard.systems", "onboard.ways", "onboard.work.timing"),
+        (
+            *("onboard.bounded_file", "onboard.core", "onboard.nesting", "onboard.systems", "onboard.ways"),
+            "onboard.work.timing",
+        ),
         not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"},
     ),
     "onboard.controller": Layer(
@@ -183,6 +187,7 @@ LAYERS: dict[str, Layer] = {
             *CORE_TYPES,
             *REGISTRY,
             "onboard.history",
+            "onboard.nesting",
             "onboard.ports",
             "onboard.trace",
             "onboard.web.picture",
