@@ -2,6 +2,7 @@
 
 import re
 from datetime import UTC, datetime
+from functools import cache
 from typing import NamedTuple
 from xml.etree import ElementTree
 
@@ -28,6 +29,12 @@ from onboard.trace.view import SiteView
 from tests.web.test_contrast import contrast
 
 
+@cache
+def site_of(name: str) -> CarPark:
+    """A shipped site, read and proved once for all tests here."""
+    return car_park(find_site(name))
+
+
 def shown(site: CarPark, width: int, height: int | None = None) -> list[str]:
     """The terminal's picture of a site before anything has happened."""
     clock = DayClock(datetime(2026, 1, 1, tzinfo=UTC))
@@ -36,7 +43,7 @@ def shown(site: CarPark, width: int, height: int | None = None) -> list[str]:
 
 
 def test_the_terminal_shows_each_floor_with_who_is_there() -> None:
-    site = car_park(find_site("twin"))
+    site = site_of("twin")
     lines = [row.plain for row in draw_plans(site, SiteView(site), 112)]
     starts = [number for number, line in enumerate(lines) if line[:2].strip()]
     assert [lines[number][:2].strip() for number in starts] == ["3", "2", "1"]
@@ -53,11 +60,11 @@ def test_the_terminal_shows_each_floor_with_who_is_there() -> None:
 
 
 def test_the_terminal_puts_a_shaft_in_one_column_and_tells_which_way_an_alley_goes() -> None:
-    lines = [row.plain for row in draw_plans(car_park(find_site("inline")), SiteView(find_site("inline")), 112)]
+    lines = [row.plain for row in draw_plans(site_of("inline"), SiteView(site_of("inline")), 112)]
     alleys = [line for line in lines if line.count(".") > 12]
     middle = alleys[-1].rindex("=")
     assert [line[middle] for line in alleys] == [":", ":", ":", "="]
-    ring = "".join(row.plain for row in draw_plans(car_park(find_site("ring")), SiteView(find_site("ring")), 112))
+    ring = "".join(row.plain for row in draw_plans(site_of("ring"), SiteView(site_of("ring")), 112))
     assert [ring.count(tip) for tip in ">^<v"] == [2 * 12, 2 * 8, 2 * 11, 2 * 7]
 
 
@@ -65,7 +72,7 @@ def test_the_terminal_puts_a_shaft_in_one_column_and_tells_which_way_an_alley_go
 def test_floors_are_beside_each_other_where_that_shows_more_and_who_is_cut_has_its_number(
     name: str, width: int, height: int
 ) -> None:
-    site = car_park(find_site(name))
+    site = site_of(name)
     lines = shown(site, width, height)
     assert len(lines) == height
     assert all(len(line) <= width for line in lines[1:-3])
@@ -77,7 +84,7 @@ def test_floors_are_beside_each_other_where_that_shows_more_and_who_is_cut_has_i
 
 
 def test_a_branch_goes_off_to_the_side_on_which_it_is_written() -> None:
-    outlines = Outlines(car_park(find_site("branch")))
+    outlines = Outlines(site_of("branch"))
     stem, way = outlines.track(3), outlines.track(1)
     assert stem.low == way.high, "it begins at the alley's edge"
     assert stem.high - stem.low == 10 * 2_400
@@ -87,7 +94,7 @@ def test_a_branch_goes_off_to_the_side_on_which_it_is_written() -> None:
 
 @pytest.mark.parametrize("name", layout_names())
 def test_nothing_lies_on_anything(name: str) -> None:
-    outlines = Outlines(car_park(find_site(name)))
+    outlines = Outlines(site_of(name))
     site = outlines.site
     for level in outlines.levels:
         stations = [one for one in (*site.places, *site.compartments.values()) if site.level(one.track) == level]
@@ -98,7 +105,7 @@ def test_nothing_lies_on_anything(name: str) -> None:
 
 
 def test_the_page_is_told_where_everything_is() -> None:
-    site = car_park(find_site("ring"))
+    site = site_of("ring")
     building = CarParkScene(site, SiteView(site)).layout()["building"]
     assert [level for level, _, _ in building["floors"]] == [2, 1]
     right, up, left, down = (building["lines"][number][2:] for number in (1, 3, 5, 7))
@@ -106,7 +113,7 @@ def test_the_page_is_told_where_everything_is() -> None:
     # On each of two floors three more alleys, one with mouths at both ends, two lobbies and a spur.
     assert len(building["links"]) == 2 * (4 + 2 + 1)
     assert [7, 8, 1, 1] in building["links"], "D ends at the first position"
-    small = car_park(find_site("small"))
+    small = site_of("small")
     layout = CarParkScene(small, SiteView(small)).layout()
     assert layout["building"] is None
     assert (layout["heights_mm"], set(layout["shifts"].values())) == ({1: 0, 2: 2_500, 3: 5_000}, {0})
@@ -154,7 +161,7 @@ def test_alleys_of_different_lengths_meet_at_the_shaft_that_joins_them() -> None
 
 
 def test_a_place_is_told_by_the_lift_or_the_mouth_and_by_no_position_beyond_an_end() -> None:
-    site = car_park(find_site("twin"))
+    site = site_of("twin")
     view = SiteView(site)
     scene = CarParkScene(site, view)
     for at, where in ((Segment(7, 2), "in ER1"), (Segment(7, 0), "p(1,3)"), (Segment(1, 3), "p(1,3)")):
@@ -302,7 +309,7 @@ home = "p(2,15)"
 @pytest.mark.parametrize("name", [*layout_names(), "level1", "small", "standard", "large", "narrow"])
 def test_what_is_written_can_be_read(name: str) -> None:
     """Nothing is clipped or lies on other words; white names lie wholly on dark bodies."""
-    site = parse_site(NARROW, "n.toml") if name == "narrow" else find_site(name)
+    site = parse_site(NARROW, "n.toml") if name == "narrow" else site_of(name)
     root = ElementTree.fromstring(str(draw(car_park(site))))
     whole = (0.0, 0.0, float(root.get("width", "0")), float(root.get("height", "0")))
     words, bodies = written(root), areas(root, "#404040")
@@ -323,7 +330,7 @@ def test_what_is_written_can_be_read(name: str) -> None:
 def test_a_drawing_has_the_contrast_that_its_readers_need() -> None:
     """Lines 3:1 on paper and on ways, words 4.5:1 (WCAG 2.2); thin ones only part what other lines bound."""
     for name in ("ring", "sizes"):
-        root = ElementTree.fromstring(str(draw(car_park(find_site(name)))))
+        root = ElementTree.fromstring(str(draw(site_of(name))))
         lines = {one.get("stroke", "") for one in root.iter() if float(one.get("stroke-width", "0")) >= 1} - {None}
         weak = {line for line in lines - {"#ffffff", "#e4e4e4", ""} if contrast(line, "#ffffff") < 3}
         inside = {"#7a7a7a", "#00835F", "#0072B2", "#000000"}
@@ -335,7 +342,7 @@ def test_a_drawing_has_the_contrast_that_its_readers_need() -> None:
 
 
 def test_a_drawing_tells_alleys_doors_turns_uses_and_classes() -> None:
-    twin, sizes = (str(draw(car_park(find_site(name)))) for name in ("twin", "sizes"))
+    twin, sizes = (str(draw(site_of(name))) for name in ("twin", "sizes"))
     # On three floors two lifts with a door to each alley, and a sign of it in the head.
     assert twin.count('stroke="#0072B2" stroke-width="6"') == 3 * 2 * 2
     assert twin.count(">B<") == 3, "the alley by the name that the file gives it"
@@ -347,7 +354,7 @@ def test_a_drawing_tells_alleys_doors_turns_uses_and_classes() -> None:
 
 
 def test_the_page_is_told_classes_places_to_charge_and_what_desks_show() -> None:
-    site = car_park(find_site("sizes"))
+    site = site_of("sizes")
     scene = CarParkScene(site, SiteView(site))
     layout = scene.layout()
     (plug,) = [number for number, one in enumerate(site.classes, start=1) if one.charging]
@@ -360,7 +367,7 @@ def test_the_page_is_told_classes_places_to_charge_and_what_desks_show() -> None
 
 
 def test_a_diagram_names_its_panels_as_the_site_file_does() -> None:
-    svg = str(draw_diagram(car_park(find_site("ring")), TrackDiagram(last_us=1_000_000), 0))
+    svg = str(draw_diagram(site_of("ring"), TrackDiagram(last_us=1_000_000), 0))
     floor = ["", ", alley B", ", alley C", ", alley D", ", lobby", ", lobby"]
     # Behind the panels of the floors come the lifts', which name their floors again.
     assert re.findall(r">((?:floor|lift) [^<]*)<", svg)[:15] == [

@@ -224,8 +224,8 @@ export class Building extends Stage {
         pen.strokeRect(box.x + 1, box.y + 1, box.w - 2, box.h - 2);
         pen.lineWidth = 1;
         if (!isHere) continue;
-        const name = this.text(pen, machine.name, { ...box, x: box.x + 3, w: box.w - 6 }, css("--ink"), 9);
         const isCrossed = hasFailed(snapshot.machines[machine.node]);
+        const name = isCrossed ? null : this.text(pen, machine.name, { ...box, x: box.x + 3, w: box.w - 6 }, css("--ink"), 9);
         if (isCrossed) crossOut(pen, box);
         this.hits.push({ ...box, what: "machine", id: machine.node, name, words: machine.name, isCrossed });
       }

@@ -259,9 +259,12 @@ export class Stage {
     // A tall box has the tip below or above the name.
     const aside = box.w > 0.8 * box.h ? edge : 0;
     const within = { ...box, x: box.x + aside, w: box.w - 2 * aside };
-    const name = car ? this.text(pen, this.carName(car), within, css("--card")) : this.text(pen, bay.name, within, css("--bay"), LEAST_NAME);
-    if (hasFailed(machine)) crossOut(pen, box);
-    this.hits.push({ ...box, what: "machine", id: bay.node, car, name, words: car ? null : bay.name, use, isCrossed: hasFailed(machine) });
+    const failed = hasFailed(machine);
+    const words = car && !failed ? null : bay.name;
+    const write = () => (car ? this.text(pen, this.carName(car), within, css("--card")) : this.text(pen, bay.name, within, css("--bay"), LEAST_NAME));
+    const name = failed ? null : write();
+    if (failed) crossOut(pen, box);
+    this.hits.push({ ...box, what: "machine", id: bay.node, car, name, words, use, isCrossed: failed });
   }
 
   // Towards the street, from a station's alley.
@@ -400,7 +403,8 @@ export class Stage {
     pen.lineWidth = told.wait || chosen === machine.node ? 3 : 2;
     pen.strokeRect(box.x, box.y, box.w, box.h);
     pen.lineWidth = 1;
-    const name = this.text(pen, machine.name, within, css("--card"), LEAST_NAME);
+    // Beside a cross it can be read.
+    const name = hasFailed(told) ? null : this.text(pen, machine.name, within, css("--card"), LEAST_NAME);
     if (hasFailed(told)) crossOut(pen, box);
     this.hits.push({ ...box, what: "machine", id: machine.node, name, words: machine.name, isCrossed: hasFailed(told) });
   }

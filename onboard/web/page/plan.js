@@ -319,8 +319,9 @@ export class Plan {
     pen.strokeStyle = css(told.wait ? "--wait" : chosen === machine.node ? "--ink" : "--card");
     pen.lineWidth = told.wait || chosen === machine.node ? 3 : 1.5;
     pen.strokeRect(box.x, box.y, box.w, box.h);
-    pen.fillStyle = css("--card");
-    pen.fillText(machine.name, box.x + wide / 2, box.y + high / 2 + 0.5);
+    // Below a cross it can be read.
+    pen.fillStyle = css(hasFailed(told) ? "--ink" : "--card");
+    pen.fillText(machine.name, box.x + wide / 2, hasFailed(told) ? box.y + high + size * 0.6 : box.y + high / 2 + 0.5);
     if (told.car) {
       pen.fillStyle = css("--ink");
       pen.fillText(told.car, box.x + wide / 2, box.y - size * 0.6);
