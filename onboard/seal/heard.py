@@ -68,13 +68,14 @@ class HeardNode:
 
 
 def readings(waiting: Sequence[WaitingFrame]) -> Iterator[Sequence[WaitingFrame]]:
-    """What a seal may be over: all that waits; then without one that somebody else put in; then only the later ones.
+    """What a seal may be over: all that waits; the earlier ones, where others spoke before the seal; the later ones.
 
-    At most ``2 * MOST_WAITING`` sequences.
+    Then all but one in between. At most ``3 * MOST_WAITING`` sequences.
     """
     if waiting:
         yield waiting
-    for start in range(1, len(waiting)):
-        yield waiting[start:]
-    for left_out in range(1, len(waiting)):
+    for at in range(1, len(waiting)):
+        yield waiting[:at]
+        yield waiting[at:]
+    for left_out in range(1, len(waiting) - 1):
         yield [*waiting[:left_out], *waiting[left_out + 1 :]]

@@ -50,8 +50,9 @@ class SealingSender:
             said.append(frame_of(SealTo(self._keys.node, *self._next(self._keys.pairs[taker], covered, taker))))
         self._places.note(word, frame)
         self._unsealed.append(frame)
-        is_urgent = isinstance(word, BusTime | EmergencyStop) or len(self._unsealed) >= MOST_SEALED
-        return said + (self.seal(now_us) if is_urgent else [])
+        # The fewer frames under one seal, the less does who speaks in between; and a clock does not wait.
+        is_urgent = taker in self._keys.pairs or isinstance(word, BusTime | EmergencyStop)
+        return said + (self.seal(now_us) if is_urgent or len(self._unsealed) >= MOST_SEALED else [])
 
     def seal(self, now_us: int) -> list[Frame]:
         """The seal of all that was said since the last one; nothing where that is nothing."""

@@ -106,12 +106,12 @@ def test_somebody_who_speaks_in_between_does_not_spoil_a_seal() -> None:
     wire = wire_of()
     frames = wire.gates[1].say(CODEC.encode(HELD)[0], wire.now_us)
     seal = wire.gates[1].seal(wire.now_us)
-    forged = CODEC.encode(TokenHeld(1, TokenKind.SEGMENT, 999, 9))
+    forged = [frame for token in (997, 998) for frame in CODEC.encode(TokenHeld(1, TokenKind.SEGMENT, token, 9))]
     wire.put(frames, 1)
     wire.put(forged)
     wire.put(seal, 1)
     assert wire.heard[5] == [HELD]
-    assert faults(wire, 5) == {(1, SealWord.UNSEALED): 1}
+    assert faults(wire, 5) == {(1, SealWord.UNSEALED): 2}
 
 
 def test_signs_of_life_that_say_nothing_new_go_without_a_seal_for_a_while() -> None:
