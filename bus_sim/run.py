@@ -15,6 +15,7 @@ from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import Timers
 from bus_sim.journal import SimulatedJournal
 from bus_sim.options import RunOptions
+from bus_sim.seals import SimulatedSeals, begin, cut_off, plain_bus
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.contract.codes import KindCode
 from onboard.contract.messages import Message
@@ -107,6 +108,7 @@ class BusRun(Generic[PlantT]):
 
     def __post_init__(self) -> None:
         self.codecs = codecs_for(self.site)
+        self.seals = SimulatedSeals(self.site, self.options.seed, self.codecs.fleet.decode_part)
 
     def start(self) -> None:
         """Switch on the plant, then every controller, in the order of their node-IDs. On the running loop."""
@@ -129,7 +131,7 @@ class BusRun(Generic[PlantT]):
             journal=condition_for(self.site, journal.condition, entries, journal.name),
         )
         ports = Ports(
-            self.fleet.attach(machine.name, machine.node_id),
+            self.seals.behind_gate(self.fleet.attach(machine.name, machine.node_id), machine.node_id),
             self.devices[machine.node_id].attach(machine.name, machine.node_id),
             journal,
             self.log,
@@ -140,7 +142,7 @@ class BusRun(Generic[PlantT]):
         self.controllers[machine.node_id] = controller
         for prepare in self.before_start:
             prepare(controller)
-        controller.start()
+        begin(ports.fleet_bus, controller.start)
 
     def crash(self, machine: Machine) -> None:
         """Cut one controller's power at once; its devices go on by themselves. Harmless where it is off already.
@@ -153,8 +155,7 @@ class BusRun(Generic[PlantT]):
         controller.holon.halted = "power cut"
         controller.power_off()
         for bus in (controller.ports.fleet_bus, controller.ports.device_bus):
-            assert isinstance(bus, SimulatedBus)
-            bus.power_off()
+            cut_off(bus)
         self.journals[machine.node_id] = self.journals[machine.node_id].after_power_cut()
         for tell in self.after_crash:
             tell(machine)
@@ -162,10 +163,15 @@ class BusRun(Generic[PlantT]):
     def fleet_node(self, name: str) -> SimulatedBus | None:
         """A running controller's node on the fleet bus, by its machine's name; None while it is off."""
         for controller in self.controllers.values():
-            bus = controller.ports.fleet_bus
-            if controller.holon.machine.name == name and isinstance(bus, SimulatedBus):
-                return bus
+            if controller.holon.machine.name == name:
+                return plain_bus(controller.ports.fleet_bus)
         return None
+
+    def tool_bus(self, name: str, node_id: int) -> Bus:
+        """The bus of a person's tool that speaks under ``node_id``, ready to be spoken on."""
+        bus = self.seals.behind_gate(self.fleet.attach(name, node_id), node_id)
+        begin(bus, lambda: None)
+        return bus
 
     def join(self, channel: str, name: str) -> Bus | None:
         """A further node on a bus, for a client from outside: the fleet bus, or a machine's device bus by its name."""
@@ -191,15 +197,19 @@ class BusRun(Generic[PlantT]):
             self.writer = CandumpWriter(self.options.trace)
         decoder = Decoder(self.codecs.fleet)
 
+        def write(frame: Frame, time_us: int, _: str) -> None:
+            assert self.writer is not None
+            self.writer.write(self.options.epoch_us + time_us, FLEET, frame)
+
         def on_fleet(frame: Frame, time_us: int, _: str) -> None:
-            if self.writer is not None:
-                self.writer.write(self.options.epoch_us + time_us, FLEET, frame)
             message: Message | None = decoder.feed(frame, time_us)
             for word in singles(message) if message is not None else ():
                 for observer in self.observers:
                     observer(word, time_us)
 
-        self.fleet.tap(on_fleet, errors=self.writer is not None)
+        if self.writer is not None:
+            self.fleet.tap(write, errors=True)
+        self.fleet.tap(self.seals.proved(on_fleet), errors=False)
         if self.writer is not None and self.options.devices:
             for node_id, medium in self.devices.items():
                 medium.tap(self._device_tap(self.site.machines[node_id].name))

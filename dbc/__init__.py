@@ -1,4 +1,4 @@
-"""The wire contract as data: ``fleet.dbc``, ``device.dbc`` and what single systems add. This only finds the files."""
+"""The wire contract as data: three files of all systems, and what single systems add. This only finds the files."""
 
 from importlib.resources import files
 
@@ -13,10 +13,15 @@ def device_dbc_text() -> str:
     return files(__name__).joinpath("device.dbc").read_text(encoding="utf-8")
 
 
+def seal_dbc_text() -> str:
+    """Text of what proves on the fleet bus who said a frame; only sites with seals have it said."""
+    return files(__name__).joinpath("seal.dbc").read_text(encoding="utf-8")
+
+
 def systems() -> list[str]:
     """Names of the systems that have a file of their own."""
     names = (entry.name for entry in files(__name__).iterdir() if entry.name.endswith(".dbc"))
-    return sorted(name.removesuffix(".dbc") for name in names if name not in ("fleet.dbc", "device.dbc"))
+    return sorted(name.removesuffix(".dbc") for name in names if name not in ("fleet.dbc", "device.dbc", "seal.dbc"))
 
 
 def system_dbc_text(system: str) -> str | None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from onboard import __version__
 from onboard.config.arguments import Parser
+from onboard.config.keys import machine_keys
 from onboard.config.machine import MachineConfig, load_machine
 from onboard.config.problems import ConfigError
 from onboard.controller.shell import Controller, Ports
@@ -24,10 +25,14 @@ from onboard.io.endings import ExitStatus
 from onboard.io.journal import FileJournal
 from onboard.io.networkd import write_network_files
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings
+from onboard.io.seal_lives import SealLivesError
+from onboard.io.sealed_bus import sealed_bus
 from onboard.io.signals import terminated_as_interrupted
 from onboard.life import ControllerLife
 from onboard.ports.broker import BrokerError
+from onboard.ports.bus import Bus
 from onboard.ports.telemetry import Telemetry
+from onboard.seal.keys import Keys
 from onboard.systems.contract import codecs_for
 from onboard.systems.registry import compaction_for, condition_for, factory_for, system_of
 from onboard.ways.effort import SLICE_STEPS, Searching
@@ -68,6 +73,8 @@ examples:
       a live picture on a page of this computer; see onboard web --help
   onboard operate status -i socketcan -c can0 --site site.toml
       who stands and why; stop, go, block, clear, hold, release; see onboard operate --help
+  onboard keys make site.toml
+      keys for a site with seals (docs/seals.md); see onboard keys --help
 """
 
 
@@ -122,15 +129,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     if args.networkd is not None:
         return _networkd(config, fleet_settings, args.networkd)
+    journal = args.journal or config.journal
     try:
+        keys = machine_keys(journal, config.site, config.machine.node_id)
         gateway = _beside(args, config) if args.mqtt is not None else None
-        return asyncio.run(run(config, fleet_settings, args.journal or config.journal, gateway))
-    except (BusOpenError, BrokerError, GatewayError) as error:
-        print(f"onboard: {error}", file=sys.stderr)
+        return asyncio.run(run(config, fleet_settings, journal, gateway, keys))
+    except (ConfigError, BusOpenError, BrokerError, GatewayError, SealLivesError) as error:
+        print(error if isinstance(error, ConfigError) else f"onboard: {error}", file=sys.stderr)
         return 2
     except OSError as error:
-        where, remedy = args.journal or config.journal, "name another folder with --journal, or mend this one"
-        print(f"onboard: journal {where}: {error.strerror or error}; {remedy}", file=sys.stderr)
+        remedy = "name another folder with --journal, or mend this one"
+        print(f"onboard: journal {journal}: {error.strerror or error}; {remedy}", file=sys.stderr)
         return ExitStatus.MISTAKE if error.errno in _MISTAKES else ExitStatus.COMES_BACK
 
 
@@ -184,19 +193,30 @@ def _operate(words: list[str]) -> int:
     return operate(words)
 
 
+def _keys(words: list[str]) -> int:
+    from onboard.keys.cli import main as keys  # noqa: PLC0415  # a controller must not carry it
+
+    return keys(words)
+
+
 #: What is not a controller; each takes the words behind its own and returns the exit status.
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "trace": _trace,
     "web": _web,
     "gateway": _gateway,
     "operate": _operate,
+    "keys": _keys,
 }
 
 
 async def run(
-    config: MachineConfig, fleet_settings: BusSettings, journal_directory: Path, gateway: GatewayMaker | None = None
+    config: MachineConfig,
+    fleet_settings: BusSettings,
+    journal_directory: Path,
+    gateway: GatewayMaker | None = None,
+    keys: Keys | None = None,
 ) -> int:
-    """Run until stopped; the exit status (``ExitStatus``)."""
+    """Run until stopped; the exit status (``ExitStatus``). ``keys`` where the site has seals."""
     life = ControllerLife(config.machine.name, journal_directory)
     with life.ended_by_signals():
         journal = FileJournal(journal_directory, journal_owner(config.site, config.machine))
@@ -226,7 +246,11 @@ async def run(
             telemetry = ManyTelemetry(telemetry, beside)
             published = asyncio.get_running_loop().create_task(beside.run())
             published.add_done_callback(_tell_ended)
-        ports = Ports(*buses, journal, telemetry, life.watchdog, compaction_for(config.site))
+        fleet_bus: Bus = buses[0]
+        if keys is not None:
+            reading = codec.fleet.decode_part
+            fleet_bus = await sealed_bus(buses[0], config.site, keys, journal_directory, reading)
+        ports = Ports(fleet_bus, buses[1], journal, telemetry, life.watchdog, compaction_for(config.site))
         controller = Controller(holon, ports, codec.fleet, codec.device)
         controller.start()
         life.follow(controller)

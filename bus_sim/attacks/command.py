@@ -53,7 +53,11 @@ def add_attack(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument("--attacks", metavar="A,B", help="only these (default: all)")
     parser.add_argument("--seeds", default="1-3", metavar="A-B", help="from the first to the last (default: 1-3)")
     parser.add_argument(
-        "--node", type=int, default=240, metavar="N", help="the attacker's node-ID, none of the site's (default: 240)"
+        "--node",
+        type=int,
+        default=240,
+        metavar="N",
+        help="the attacker's node-ID (default: 240); one of the site's where it requires seals",
     )
     parser.add_argument("--cars", type=int, metavar="N", help="to a car park (default: a few)")
     parser.add_argument("--orders", type=int, metavar="N", help="to any other site (default: a few, by the system)")
@@ -84,9 +88,10 @@ def _plan(args: argparse.Namespace) -> TrialSettings:
     site = find_site(args.site)
     if not 1 <= args.node <= 255:
         raise DemandError(f"--node {args.node}: must be from 1 to 255")
-    if args.node in site.machines:
+    if args.node in site.machines and site.seals != "required":
         name = site.machines[args.node].name
-        raise DemandError(f"--node {args.node}: that is {name} of {site.name}; give a number that no machine there has")
+        remedy = 'give a number that no machine there has, or a site with seals = "required"'
+        raise DemandError(f"--node {args.node}: that is {name} of {site.name}; {remedy}")
     for option, value in (("cars", args.cars), ("limit", args.limit)):
         if value is not None and value <= 0:
             raise DemandError(f"--{option} {value:g}: must be above 0")

@@ -7,7 +7,7 @@ neither finds anything.
 from functools import partial
 from typing import Any
 
-from bus_sim.can.medium import Medium
+from bus_sim.can.medium import Medium, Tap
 from bus_sim.run import FLEET, BusRun
 from onboard.core.frame import Frame
 from onboard.trace.check.checks import Checks
@@ -18,7 +18,7 @@ class Judges:
     """Listens to every bus of a run from before its start. ``disturbed``: frames are lost or doubled on purpose."""
 
     def __init__(self, run: BusRun[Any], *, disturbed: bool) -> None:
-        self._site = run.site
+        self._site, self._seals = run.site, run.seals
         #: Rules that say that something must happen in time; all others are rules of safety.
         self._liveness = frozenset(rule.name for rule in rules_for(run.site) if rule.liveness)
         self._checks = Checks(run.site, disturbed=disturbed)
@@ -27,7 +27,8 @@ class Judges:
             self._listen(run.site.machines[node_id].name, medium)
 
     def _listen(self, channel: str, medium: Medium) -> None:
-        medium.tap(partial(self._hear, channel), errors=False)
+        hear: Tap = partial(self._hear, channel)
+        medium.tap(self._seals.proved(hear) if channel == FLEET else hear, errors=False)
 
     def _hear(self, channel: str, frame: Frame, time_us: int, _: str) -> None:
         self._checks.feed(time_us, channel, frame)

@@ -41,7 +41,8 @@ def operate(simulation: BusRun[Any], injection: Injection) -> None:
 async def _operate(simulation: BusRun[Any], injection: Injection) -> None:
     loop, site = simulation.loop, simulation.site
     who = f"operator {injection.text('do')} {loop.now_us()}"
-    bus = simulation.fleet.attach(who, None)
+    seals = simulation.seals.are_used
+    bus = simulation.tool_bus(who, STATION) if seals else simulation.fleet.attach(who, None)
 
     def tell(line: str) -> None:
         simulation.log.event(loop.now_us(), "operator", line)
@@ -49,7 +50,7 @@ async def _operate(simulation: BusRun[Any], injection: Injection) -> None:
     station = OperatorStation(site, simulation.codecs.fleet, bus, tell)
     try:
         make = maker_of(site, wish_of(injection), seed=loop.now_us() // 1_000_000)
-        await station.operate(make, None, _agrees)
+        await station.operate(make, STATION if seals else None, _agrees)
     except OperateError as error:
         tell(str(error))
     finally:
@@ -77,6 +78,6 @@ def wish_of(injection: Injection) -> CommandRequest:
 
 
 def _say(simulation: BusRun[Any], message: Message) -> None:
-    bus = simulation.fleet.attach(f"operator {simulation.loop.now_us()}", STATION)
+    bus = simulation.tool_bus(f"operator {simulation.loop.now_us()}", STATION)
     for frame in simulation.codecs.fleet.encode(message):
         bus.send(frame)

@@ -17,6 +17,8 @@ from onboard.core.site import Site
 from onboard.systems.registry import FIRST_SYSTEM, own_names, part, system_names
 
 _ZONE = re.compile(r"[A-Za-z][A-Za-z0-9_+-]*(/[A-Za-z0-9_+-]+){0,2}")
+#: What a site does with proof of who said a frame (docs/seals.md).
+SEALS = ("off", "watch", "required")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 
 
@@ -39,6 +41,7 @@ def parse_site(text: str, file: str, *, crowded: bool = False) -> Site:
     head = root.table("site", required=True)
     common = Common(_read_name(head), head.integer("bitrate", 10_000, 1_000_000, 500_000), crowded)
     zone = _read_time_zone(head)
+    seals = head.choice("seals", SEALS, "off")
     own = own_names()
     # Packages of other people are asked for where the word is none of ours: that takes a board long.
     known = own if head.values.get("system", FIRST_SYSTEM) in own else system_names()
@@ -46,7 +49,8 @@ def parse_site(text: str, file: str, *, crowded: bool = False) -> Site:
     site = _read_system(root, common, system)
     root.check_unknown()
     problems.raise_if_any()
-    return replace(site, digest=site_digest(site), time_zone=zone)
+    site = replace(site, seals=seals or "off", time_zone=zone)
+    return replace(site, digest=site_digest(site))
 
 
 def _read_system(root: TomlTable, common: Common, system: str) -> Site:

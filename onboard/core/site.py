@@ -52,8 +52,7 @@ class Station(NamedTuple):
         return f"p({self.track},{self.index}){'NF'[self.side]}"
 
 
-#: A sign of life that is given early comes so long after the last at the least, us: what a bus may be asked for stays
-#: bounded.
+#: A sign of life that is given early comes so long after the last at the least, us: what a bus is asked for is bounded.
 BEATS_APART_US = 300_000
 
 
@@ -109,8 +108,7 @@ class Site:
     has_regeneration: ClassVar[bool] = False
     #: Why a person cannot hold one machine by itself; empty where that can be.
     no_hold: ClassVar[str] = ""
-    #: Names of the fields that say what comes to the site in a run of the simulator. No machine knows them, so they are
-    #: not in the digest.
+    #: Fields that say what comes to the site in a run of the simulator. No machine knows them: not in the digest.
     demand: ClassVar[frozenset[str]] = frozenset()
     #: The messages of the device bus by which something moves: no other does, and these only as ``authorised`` lets.
     moved_by: ClassVar[Mapping[str, MotionNeeds]] = {}
@@ -123,6 +121,8 @@ class Site:
     stewards: dict[int, int] = field(default_factory=dict)
     #: IANA name of the site's local time, for people who look at it; empty where the file has none. Not in the digest.
     time_zone: str = ""
+    #: Proof of who says what: "off", "watch" (wrong words are told), "required" (and dropped). Never negotiated.
+    seals: str = "off"
 
     def machine(self, name: str) -> Machine:
         """The machine so named. Raises ``KeyError`` where there is none."""

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from onboard.config.arguments import Parser
+from onboard.config.keys import tool_keys
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Machine, Site
@@ -27,8 +28,12 @@ from onboard.io.open_bus import (
     open_bus,
     parse_with_bus,
 )
+from onboard.io.seal_lives import SealLivesError
+from onboard.io.sealed_bus import sealed_bus
 from onboard.io.signals import ended_by
 from onboard.ports.broker import BrokerError
+from onboard.ports.bus import Bus
+from onboard.seal.keys import Keys
 from onboard.systems.contract import codecs_for
 from onboard.wire.codec import Codec
 
@@ -69,6 +74,7 @@ def build_parser() -> argparse.ArgumentParser:
         metavar="NODE",
         help="take orders too, and speak on the bus under this node-ID, 251 to 255, that nobody else there has",
     )
+    parser.add_argument("--keys", type=Path, metavar="FILE", help="with --orders: its keys, where the site has seals")
     add_mqtt_arguments(parser, required=True)
     return parser
 
@@ -81,8 +87,9 @@ def main(argv: Sequence[str]) -> int:
         settings = gateway_settings(args, node_id=args.orders)
         address = _broker(args)
         bus = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
-        return asyncio.run(_run(site, settings, address, bus, args.spool))
-    except (ConfigError, BusOpenError, GatewayError, BrokerError) as error:
+        keys = None if args.orders is None else tool_keys(args.keys, site, args.orders)
+        return asyncio.run(_run(site, settings, address, bus, args.spool, None if keys is None else (keys, args.keys)))
+    except (ConfigError, BusOpenError, GatewayError, BrokerError, SealLivesError) as error:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"onboard gateway: {line}", file=sys.stderr)
         return 1 if isinstance(error, BusOpenError) and error.may_come else 2
@@ -114,7 +121,15 @@ def _broker(args: argparse.Namespace) -> BrokerAddress:
     return address
 
 
-async def _run(site: Site, settings: GatewaySettings, address: BrokerAddress, bus: BusSettings, spool: Path) -> int:
+async def _run(
+    site: Site,
+    settings: GatewaySettings,
+    address: BrokerAddress,
+    bus: BusSettings,
+    spool: Path,
+    seals: tuple[Keys, Path] | None,
+) -> int:
+    """``seals``: what it seals with where the site has seals, and the file of that."""
     broker = MqttBroker(address)
     journal = FileJournal(spool, f"{site.name} gateway")
     try:
@@ -125,10 +140,13 @@ async def _run(site: Site, settings: GatewaySettings, address: BrokerAddress, bu
         try:
             codec = codecs_for(site).fleet
             client = f"{settings.prefix}-{level(site.name)}"
-            send = opened.send if settings.node_id is not None else None
+            spoken: Bus = opened
+            if seals is not None:
+                spoken = await sealed_bus(opened, site, *seals, codecs_for(site).fleet.decode_part)
+            send = spoken.send if settings.node_id is not None else None
             gateway = Gateway(site, codec, broker, settings, reports=reports, wall_us=wall_us, client=client, send=send)
             # What a node of this computer sends on the same interface is heard as well.
-            opened.subscribe(gateway.on_frame, gateway.on_frame)
+            spoken.subscribe(gateway.on_frame, gateway.on_frame)
             print("\n".join(watch_lines(address, site, settings)), flush=True)
             return await _until_ended(gateway, opened)
         finally:

@@ -6,17 +6,23 @@ import signal
 import sys
 import time
 from collections.abc import Awaitable, Callable, Sequence
+from pathlib import Path
 
 from onboard.config.arguments import Parser
+from onboard.config.keys import tool_keys
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError, BusSettings, add_site_arguments, bus_settings, open_bus, parse_with_bus
+from onboard.io.seal_lives import SealLivesError
+from onboard.io.sealed_bus import sealed_bus
 from onboard.operate.asking import Asker
 from onboard.operate.commands import CommandRequest, Maker, maker_of
 from onboard.operate.names import OperateError, tool_of
 from onboard.operate.order import MISTAKE
 from onboard.operate.station import OperatorStation
+from onboard.ports.bus import Bus
+from onboard.seal.keys import Keys
 from onboard.systems.contract import codecs_for
 
 EXAMPLES = """\
@@ -52,6 +58,7 @@ def build_parser() -> argparse.ArgumentParser:
         metavar="NODE",
         help="speak under this node-ID, 251 to 255, that nobody else there has (default: the lowest that is not heard)",
     )
+    common.add_argument("--keys", type=Path, metavar="FILE", help="this tool's keys, where the site has seals")
     common.add_argument("--yes", action="store_true", help="do not ask")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
@@ -102,8 +109,9 @@ def main(argv: Sequence[str]) -> int:
         # Another life of this station begins elsewhere in the numbers of orders.
         make = maker_of(site, request_of(args), seed=time.time_ns() // 1_000_000_000)
         settings = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
-        return asyncio.run(_run(args, site, settings, make))
-    except (ConfigError, BusOpenError, OperateError) as error:
+        keys = None if args.command == "status" else tool_keys(args.keys, site, args.node)
+        return asyncio.run(_run(args, site, settings, make, keys))
+    except (ConfigError, BusOpenError, OperateError, SealLivesError) as error:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"onboard operate: {line}", file=sys.stderr)
         return MISTAKE
@@ -125,16 +133,21 @@ def request_of(args: argparse.Namespace) -> CommandRequest:
     )
 
 
-async def _run(args: argparse.Namespace, site: Site, settings: BusSettings, make: Maker) -> int:
-    bus = await open_bus(settings)
-    station = OperatorStation(site, codecs_for(site).fleet, bus, _tell)
+async def _run(args: argparse.Namespace, site: Site, settings: BusSettings, make: Maker, keys: Keys | None) -> int:
+    plain = await open_bus(settings)
+    bus: Bus = plain
+    codec, node = codecs_for(site).fleet, args.node
+    if keys is not None:
+        node = keys.node
+        bus = await sealed_bus(plain, site, keys, args.keys, codec.decode_part)
+    station = OperatorStation(site, codec, bus, _tell)
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, station.interrupt)
-    lost = loop.create_task(_watch(bus.wait_lost, station))
+    lost = loop.create_task(_watch(plain.wait_lost, station))
     try:
         asker = Asker(station, _tell, is_agreed=args.yes, typed=getattr(args, "locked_off", ""))
-        return await station.operate(make, args.node, asker.agrees)
+        return await station.operate(make, node, asker.agrees)
     finally:
         lost.cancel()
         await bus.close()

@@ -5,14 +5,16 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
-from dbc import device_dbc_text, fleet_dbc_text, system_dbc_text, systems
+from dbc import device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text, systems
 from onboard.wire.dbc_file import (
     MessageLayout,
     SignalLayout,
     device_layouts,
     fleet_layouts,
     read_annotations,
+    read_layouts,
     read_nodes,
+    seal_layouts,
     system_layouts,
 )
 
@@ -60,7 +62,7 @@ def _link(name: str) -> str:
 def _value_tables() -> dict[tuple[tuple[int, str], ...], str]:
     """Name of each value table of the two contracts of all (``VAL_TABLE_``), by its content."""
     named: dict[tuple[tuple[int, str], ...], str] = {}
-    for text in (fleet_dbc_text(), device_dbc_text()):
+    for text in (fleet_dbc_text(), device_dbc_text(), seal_dbc_text()):
         named |= {choices: name for name, choices in read_annotations(text).tables.items()}
     return {**named, ((0, "NO"), (1, "YES")): "Answer"}
 
@@ -135,7 +137,8 @@ def network_page() -> str:
     """The whole page as Markdown."""
     lines = [
         _HEAD,
-        *_bus("Fleet bus", fleet_dbc_text(), fleet_layouts()),
+        *_bus("Fleet bus", fleet_dbc_text(), read_layouts(fleet_dbc_text())),
+        *_bus("Seals on the fleet bus", seal_dbc_text(), seal_layouts()),
         *_bus("Device bus", device_dbc_text(), device_layouts()),
     ]
     layouts = [*fleet_layouts(), *device_layouts()]

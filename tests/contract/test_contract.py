@@ -8,7 +8,7 @@ import pytest
 from cantools.database.can import Message as DbcMessage
 
 import dbc
-from dbc import device_dbc_text, fleet_dbc_text, system_dbc_text, systems
+from dbc import device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text, systems
 from onboard.contract import constants
 from onboard.contract.base import OutOfRangeError
 from onboard.contract.codes import Reason
@@ -20,7 +20,8 @@ from onboard.wire.dbc_file import SignalLayout, read_annotations, read_layouts
 from tests.wire.samples import CODES, judge_of, message_of, random_value, signal_values
 
 FOLDER = Path(__file__).parents[2] / "onboard" / "contract"
-TEXTS = {"fleet": fleet_dbc_text(), "device": device_dbc_text()}
+TEXTS = {"fleet": fleet_dbc_text(), "device": device_dbc_text(), "seal": seal_dbc_text()}
+OF_ALL = tuple(TEXTS)
 TEXTS |= {name: text for name in systems() if (text := system_dbc_text(name)) is not None}
 LAYOUTS = {(file, layout.name): layout for file, text in TEXTS.items() for layout in read_layouts(text)}
 JUDGES = {file: judge_of(text) for file, text in TEXTS.items()}
@@ -64,9 +65,9 @@ def _unit_in(name: str) -> str:
     return next((unit for ending, unit in endings.items() if name.endswith(ending)), "")
 
 
-@pytest.mark.parametrize("system", [file for file in TEXTS if file not in ("fleet", "device")])
+@pytest.mark.parametrize("system", [file for file in TEXTS if file not in OF_ALL])
 def test_no_two_messages_of_a_site_have_one_identifier(system: str) -> None:
-    found = [layout.frame_id for (file, _), layout in LAYOUTS.items() if file in ("fleet", "device", system)]
+    found = [layout.frame_id for (file, _), layout in LAYOUTS.items() if file in (*OF_ALL, system)]
     assert all(identifier & 0xFFFF == 0 for identifier in found)
     assert len(set(found)) == len(found), "fleet and device bus may share one wire"
 
@@ -184,7 +185,7 @@ def test_words_that_are_kept_for_later_are_free_and_fit_a_frame() -> None:
     """``docs/protocol.md`` promises identifiers that nothing else takes, to words of at most 64 bits."""
     page = (FOLDER.parents[1] / "docs" / "protocol.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(\w+)` \| `([0-9A-F]{6})nn` \| [^|]+ \| ([^|]+) \|", page, re.MULTILINE)
-    assert len(rows) == 9
+    assert len(rows) == 6
     taken = {layout.frame_id >> 8 for layout in LAYOUTS.values()}
     assert not {name for name, _, _ in rows} & {name for _, name in LAYOUTS}
     assert len({number for _, number, _ in rows}) == len(rows)

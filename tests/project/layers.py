@@ -61,6 +61,7 @@ ALL_OF_ONBOARD = (
     "onboard.holon",
     "onboard.io",
     "onboard.ports",
+    "onboard.seal",
     "onboard.systems",
     "onboard.ways",
     "onboard.wire",
@@ -130,6 +131,8 @@ LAYERS: dict[str, Layer] = {
     "onboard.core": Layer(only_stdlib=PURE_STDLIB, pure=True),
     # One machine put together of the core's parts; the core does not know it.
     "onboard.holon": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
+    # Proof of who said a frame, between the bus and whoever listens: no machine's decision knows of it.
+    "onboard.seal": Layer(("onboard.core.frame",), only_stdlib=PURE_STDLIB | {"hashlib"}, pure=True),
     "onboard.ways": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
     "onboard.work": Layer(("onboard.core", "onboard.ways"), only_stdlib=PURE_STDLIB, pure=True),
     # It knows no system by name; a system's parts are found by the name of their folder.
@@ -146,8 +149,8 @@ LAYERS: dict[str, Layer] = {
     "onboard.ports": Layer(CORE_TYPES, not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.config": Layer(
         (
-            *("onboard.bounded_file", "onboard.core", "onboard.nesting", "onboard.systems", "onboard.ways"),
-            "onboard.work.timing",
+            *("onboard.bounded_file", "onboard.core", "onboard.nesting", "onboard.seal.keys", "onboard.systems"),
+            *("onboard.ways", "onboard.work.timing"),
         ),
         not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"},
     ),
@@ -155,7 +158,11 @@ LAYERS: dict[str, Layer] = {
         ("onboard.core", "onboard.holon", "onboard.wire", "onboard.ports"),
         not_stdlib=CLOCK_AND_CHANCE | {"socket", "os", "pathlib"},
     ),
-    "onboard.io": Layer(("onboard.bounded_file", "onboard.ports", "onboard.core", "onboard.wire"), ("can", "aiomqtt")),
+    "onboard.io": Layer(
+        ("onboard.bounded_file", "onboard.ports", "onboard.core", "onboard.seal", "onboard.wire"), ("can", "aiomqtt")
+    ),
+    # Runs where somebody commissions a site, never on a board.
+    "onboard.keys": Layer(("onboard.config", "onboard.core.site", "onboard.seal.keys", "onboard.systems.registry")),
     "onboard.trace": Layer(
         (*CORE_TYPES, *REGISTRY, "onboard.history", "onboard.wire"),
         not_stdlib=frozenset({"asyncio", "random", "threading"}),
@@ -204,6 +211,7 @@ LAYERS: dict[str, Layer] = {
             "onboard.io",
             "onboard.systems",
             "onboard.ports",
+            "onboard.seal.keys",
             "onboard.wire",
         )
     ),
@@ -228,13 +236,18 @@ LAYERS: dict[str, Layer] = {
     ),
     # Its command line is a composition root: it opens the bus and the site file.
     "onboard.operate.cli": Layer(
-        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.systems", "onboard.operate", "onboard.wire")
+        (
+            *CORE_TYPES,
+            *("onboard.config", "onboard.io", "onboard.systems", "onboard.operate", "onboard.ports.bus"),
+            *("onboard.seal.keys", "onboard.wire"),
+        )
     ),
     "onboard.gateway.options": Layer((*CORE_TYPES, "onboard.bounded_file", "onboard.gateway", "onboard.io")),
     "onboard": Layer(
         (
             *ALL_OF_ONBOARD,
-            *("onboard.cli", "onboard.entry", "onboard.life", "onboard.operate.cli", "onboard.trace.cli"),
+            *("onboard.cli", "onboard.entry", "onboard.keys.cli", "onboard.life", "onboard.operate.cli"),
+            "onboard.trace.cli",
             *("onboard.web.address", "onboard.web.cli"),
             *(f"onboard.gateway.{name}" for name in ("cli", "gateway", "options", "settings")),
         ),

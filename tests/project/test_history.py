@@ -27,6 +27,8 @@ LOOK = {
     "bus_sim/campaign/*.py": "a judge of a trial, or what strikes at a moment that was heard",
     # What it is about decides when a word may go, and which one makes another needless.
     "onboard/controller/outgoing.py": "the words of its own machine on their way out",
+    # Before any machine hears it: whether it needs a seal, and under whose key.
+    "onboard/seal/*.py": "what is sealed, and to whom",
     # Who asked something on the bus waits for the answer, and remembers nothing of it.
     "onboard/gateway/own_words.py": "what a gateway may say",
     "onboard/gateway/pauses.py": "a conversation",

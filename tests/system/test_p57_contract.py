@@ -14,7 +14,7 @@ from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, T
 from onboard.contract.messages import Award, Bid, CallForProposals, TaskReport
 from onboard.core.frame import Frame
 from onboard.systems.car_park.site import RideCalls, car_park
-from onboard.wire.dbc_file import fleet_layouts
+from onboard.wire.dbc_file import read_layouts
 from onboard.wire.site_dbc import site_dbc
 from tests.system.scene import Scene, play, stays
 from tests.wire.samples import judge_of
@@ -77,7 +77,7 @@ def test_p57_every_frame_used_is_in_the_dbc_and_in_the_sites_dbc_with_the_same_m
 def test_p57_the_run_used_most_of_the_contract(run: Heard) -> None:
     """Else the test above would say little."""
     used = {frame.arbitration_id & ~0xFF for bus, frame in run.frames if bus == FLEET}
-    unused = {layout.name for layout in fleet_layouts() if layout.frame_id not in used}
+    unused = {layout.name for layout in read_layouts(fleet_dbc_text()) if layout.frame_id not in used}
     assert unused <= {
         "Blocked",
         "Clear",

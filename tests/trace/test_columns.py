@@ -12,7 +12,7 @@ from dbc import systems
 from onboard.contract.base import FrameCode, Message
 from onboard.contract.codes import Reason
 from onboard.contract.messages import Reference, Stamp
-from onboard.contract.packing import calls, device, plans, presence, rights
+from onboard.contract.packing import calls, device, plans, presence, rights, seal
 from onboard.systems.registry import part
 from onboard.trace.columns.block import FrameBlock, block_of, joined
 from onboard.trace.columns.candump_text import read_block
@@ -27,7 +27,7 @@ from onboard.trace.readers.open_log import Log
 from tests.trace.runs import run_log
 
 GOLDEN = Path(__file__).parents[1] / "golden"
-SHARED = (*presence.FRAMES, *rights.FRAMES, *calls.FRAMES, *plans.FRAMES, *device.FRAMES)
+SHARED = (*presence.FRAMES, *rights.FRAMES, *calls.FRAMES, *plans.FRAMES, *seal.FRAMES, *device.FRAMES)
 #: Lines of which some are frames and some are not: what the reader of many lines must leave to the reader of one.
 ODD_LINES = (
     *("", "   ", "\r", "hello", "#", "####", "(5.2) a 123#01", "(1.000000) can0 123##101 T", "(1.000000) can0 123#R"),

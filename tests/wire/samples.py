@@ -10,13 +10,13 @@ import cantools
 from cantools.database.can import Database
 
 from onboard.contract.base import FrameCode, Message, Reference, Stamp
-from onboard.contract.packing import calls, device, plans, presence, rights
+from onboard.contract.packing import calls, device, plans, presence, rights, seal
 from onboard.systems.registry import own_names, part
 from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts
 
 #: Frames that every system has.
 SHARED: tuple[FrameCode, ...] = (
-    *presence.FRAMES, *rights.FRAMES, *calls.FRAMES, *plans.FRAMES, *device.FRAMES,
+    *presence.FRAMES, *rights.FRAMES, *calls.FRAMES, *plans.FRAMES, *seal.FRAMES, *device.FRAMES,
 )  # fmt: skip
 
 
@@ -36,10 +36,12 @@ def layouts() -> tuple[MessageLayout, ...]:
     return (*fleet_layouts(), *device_layouts())
 
 
-def judge_of(text: str) -> Database:
-    """A DBC text as cantools reads it, with its checks."""
+def judge_of(text: str, *more: str) -> Database:
+    """DBC texts as cantools reads them into one, with its checks."""
     database = cantools.database.load_string(text, "dbc", strict=True)
     assert isinstance(database, Database)
+    for one in more:
+        database.add_dbc_string(one)
     return database
 
 

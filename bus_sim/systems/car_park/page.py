@@ -96,6 +96,6 @@ class CarParkSource(RunSource):
     def _say(self, word: Blocked | Clear) -> None:
         """An operator's station is a node of its own on the fleet bus, above all machines."""
         if self._station is None:
-            self._station = self._simulation.fleet.attach("operator at the page", STATION)
+            self._station = self._simulation.tool_bus("operator at the page", STATION)
         for frame in fleet_codec().encode(word):
             self._station.send(frame)

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from dbc import device_dbc_text, fleet_dbc_text, system_dbc_text, systems
+from dbc import device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text, systems
 from onboard.contract.generate.classes import HEAD, enumerations, message_class, set_classes, uses, version
 from onboard.contract.generate.decoding import function_name, reader, table_name, unpack_function
 from onboard.contract.generate.encoding import pack_function, tools
@@ -23,16 +23,17 @@ _ABOUT = {
     "plans": "Plans, places, and where cars and machines are",
     "presence": "Who lives, who stands and why, and what people order",
     "rights": "Tokens: who asks for them, who gives and who holds them",
+    "seal": "Seals: proof of who said what on the fleet bus",
     "device": "What a machine says to its own drives, doors and sensors, and they to it",
 }
 
 
 def contracts() -> tuple[DbcFile, ...]:
-    """Every DBC in ``dbc/``, the two of all first. ``ContractError`` for one that is not fit for code."""
+    """Every DBC in ``dbc/``, those of all first. ``ContractError`` for one that is not fit for code."""
     fleet = read_contract("fleet", fleet_dbc_text(), CODES, ())
     device = read_contract("device", device_dbc_text(), CODES, fleet.tables)
     shared = (*fleet.tables, *device.tables)
-    found = [fleet, device]
+    found = [fleet, device, read_contract("seal", seal_dbc_text(), "seal", shared)]
     for name in systems():
         text = system_dbc_text(name)
         assert text is not None

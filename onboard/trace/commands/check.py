@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from onboard.bounded_file import read_bounded
+from onboard.config.keys import load_keys
 from onboard.core.site import Site
 from onboard.systems.contract import codecs_for
 from onboard.trace.check.checks import Checks, LogVerdict
@@ -19,6 +20,7 @@ from onboard.trace.commands.common import (
     site_of,
     write_text,
 )
+from onboard.trace.commands.proof import LogProof
 from onboard.trace.words import Words
 
 HELP = """\
@@ -43,6 +45,12 @@ def register(commands: Commands) -> None:
         "--dbc", type=Path, metavar="FILE", help="DBC that the log was made by: must be the contract of this program"
     )
     check.add_argument(
+        "--keys",
+        type=Path,
+        metavar="FILE",
+        help="a key file of a site that requires seals: judge only what counts on its bus, and tell what did not",
+    )
+    check.add_argument(
         "--faults", action="store_true", help="frames were lost on purpose: leave out rules that need every frame"
     )
     check.add_argument("--json", type=Path, metavar="FILE", help="write the verdict as JSON too")
@@ -55,10 +63,11 @@ def run(args: argparse.Namespace) -> int:
     if args.dbc is not None:
         _check_contract(args.dbc)
     checks = Checks(site, disturbed=args.faults, fleet=contracts.fleet, device=contracts.device)
-    verdict = _check(args, checks)
+    proof = _proof_of(args, site)
+    verdict = _check(args, checks, proof)
     if args.json is not None:
         write_text(args.json, json.dumps(verdict.to_json(), indent=2) + "\n")
-    print("\n".join(_report(verdict, site)))
+    print("\n".join(_report(verdict, site) + (proof.lines(Words(site).machine) if proof is not None else [])))
     sys.stdout.flush()
     return 0 if verdict.is_good else 1
 
@@ -67,14 +76,24 @@ def _report(verdict: LogVerdict, site: Site | None) -> list[str]:
     return verdict.lines(Words(site).machine)
 
 
-def _check(args: argparse.Namespace, checks: Checks) -> LogVerdict:
+def _proof_of(args: argparse.Namespace, site: Site | None) -> LogProof | None:
+    """What tells by the seals of a log what counted; None without ``--keys``. ``ConfigError`` for a bad file."""
+    if args.keys is None:
+        return None
+    if site is None or site.seals == "off":
+        raise TraceError(f"--keys {args.keys}: needs --site with the file of a site that has seals")
+    return LogProof(load_keys(args.keys, site), codecs_for(site).fleet.decode_part)
+
+
+def _check(args: argparse.Namespace, checks: Checks, proof: LogProof | None) -> LogVerdict:
     with open_log(args) as log:
         for portion in log.portions():
-            if portion.block is not None:
+            if portion.block is not None and proof is None:
                 checks.feed_block(portion.block)
             else:
-                for frame in portion.ones:
-                    checks.feed_raw(frame)
+                for frame in portion.frames:
+                    for one in (frame,) if proof is None else proof.counting(frame):
+                        checks.feed_raw(one)
         verdict = checks.finish()
     for fault, count in log.faults.counts.items():
         verdict.unknown[fault.value] += count
@@ -85,7 +104,7 @@ def _check(args: argparse.Namespace, checks: Checks) -> LogVerdict:
 
 def _check_contract(path: Path) -> None:
     """Refuse a DBC that is not the contract that this program speaks: it could not judge by it. ``TraceError``."""
-    from onboard.wire.dbc_file import fleet_layouts, read_layouts  # noqa: PLC0415  # takes a third of the start
+    from onboard.wire.dbc_file import fleet_layouts, read_layouts, seal_layouts  # noqa: PLC0415  # takes a third of the start
 
     try:
         said = {layout.name: layout for layout in read_layouts(read_bounded(path).decode("utf-8-sig"))}
@@ -95,6 +114,9 @@ def _check_contract(path: Path) -> None:
         why = " ".join(str(error).split())[:200]
         raise TraceError(f"{path}: not a DBC of this contract ({why}); a site's DBC is for other tools") from error
     for ours in fleet_layouts():
+        if ours in seal_layouts():
+            # In a file of their own; no rule is about them.
+            continue
         theirs = said.get(ours.name)
         if theirs is None or (theirs.frame_id, theirs.length, theirs.signals) != (
             ours.frame_id,

@@ -1,0 +1,81 @@
+"""What was heard of one node: its number, and the frames that wait for their seal."""
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from onboard.contract.messages import Heartbeat
+from onboard.core.frame import Frame
+from onboard.seal.sender import MOST_SEALED
+from onboard.seal.subjects import UNSEALED_FOR_US, CarPlaces, life_told
+
+#: Most frames of one node that wait for a seal: those of one, and what others may say between them in its name.
+MOST_WAITING = MOST_SEALED + 4
+#: So long a frame waits for its seal, us; they are said together, but a bus can be busy.
+WAITS_US = 500_000
+#: After so long without any seal of a node its signs of life do not count unsealed: two seals may be lost, us.
+UNHEARD_US = 5 * UNSEALED_FOR_US // 2
+#: Challenges of mine that a node may still answer.
+_NONCES = 3
+
+
+@dataclass(slots=True)
+class WaitingFrame:
+    """A frame that waits for its seal. ``is_done`` where it was handed on already, and only counts for the tag.
+
+    ``needs_my_key`` until the seal under the key of its sender and me is there: I act on it.
+    """
+
+    frame: Frame
+    since_us: int
+    is_done: bool
+    needs_my_key: bool = False
+
+
+@dataclass(slots=True)
+class HeardNode:
+    """One node as a receiver knows it. ``last`` is the newest number that it proved, None before the first."""
+
+    last: int | None = None
+    #: The newest that it proved under the key of us two, which nobody else of the group could have pushed up.
+    own_last: int = 0
+    waiting: deque[WaitingFrame] = field(default_factory=deque)
+    nonces: deque[int] = field(default_factory=lambda: deque(maxlen=_NONCES))
+    answer: Frame | None = None
+    #: Its last sign of life that counted without a seal.
+    free: WaitingFrame | None = None
+    places: CarPlaces = field(default_factory=CarPlaces)
+    #: Seals in a row that did not fit, and when it may be challenged next, us.
+    misfits: int = 0
+    ask_us: int = 0
+    patience_us: int = 0
+    _told: tuple[int, ...] = ()
+    _sealed_us: int = 0
+
+    def proved(self, number: int, now_us: int) -> None:
+        """A seal under ``number`` was good."""
+        if self.last is not None and self.last >> 32 != number >> 32:
+            self.places.forget()
+        self.last, self.misfits, self._sealed_us = number, 0, now_us
+
+    def told(self, beat: Heartbeat) -> None:
+        """A sealed sign of life: the next ones that say the same count without a seal."""
+        self._told = life_told(beat)
+
+    def needs_no_seal(self, beat: Heartbeat, now_us: int) -> bool:
+        """Whether a sign of life says what the last sealed one did, of a node that has sealed something of late."""
+        return self.last is not None and life_told(beat) == self._told and now_us - self._sealed_us <= UNHEARD_US
+
+
+def readings(waiting: Sequence[WaitingFrame]) -> Iterator[Sequence[WaitingFrame]]:
+    """What a seal may be over: all that waits; the earlier ones, where others spoke before the seal; the later ones.
+
+    Then all but one in between. At most ``3 * MOST_WAITING`` sequences.
+    """
+    if waiting:
+        yield waiting
+    for at in range(1, len(waiting)):
+        yield waiting[:at]
+        yield waiting[at:]
+    for left_out in range(1, len(waiting) - 1):
+        yield [*waiting[:left_out], *waiting[left_out + 1 :]]

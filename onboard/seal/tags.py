@@ -1,0 +1,41 @@
+"""The tag of a seal: 48 bits of BLAKE2s (RFC 7693) under a key, over number, taker, nonce and the frames sealed.
+
+48 bits, as MAVLink 2 signs with: at 1,760 seals a second, a full bus of 500 kbit/s, a guess succeeds in 2,500 years.
+"""
+
+import struct
+from collections.abc import Iterable
+from functools import lru_cache
+from hashlib import blake2s
+
+from onboard.core.frame import Frame
+
+#: Bytes of a tag.
+TAG_BYTES = 6
+#: Only these tags are made with these keys; other uses of BLAKE2s under the same key give others.
+_PERSON = b"fleetbus"
+_HEAD = struct.Struct(">QBQ").pack
+_FRAME = struct.Struct(">IB").pack
+#: Most keys whose first block is kept hashed: those of a site of 250 machines.
+_KEYS_KEPT = 512
+
+
+@lru_cache(maxsize=_KEYS_KEPT)
+def _begun(key: bytes) -> blake2s:
+    return blake2s(key=key, digest_size=TAG_BYTES, person=_PERSON)
+
+
+def tag_of(key: bytes, number: int, frames: Iterable[Frame], taker: int = 0, nonce: int = 0) -> int:
+    """The tag under ``number``, 64 bits; ``taker`` 0 under a group key, ``nonce`` 0 but in answers."""
+    said = _HEAD(number, taker, nonce)
+    for arbitration_id, data, *_ in frames:
+        said += _FRAME(arbitration_id, len(data)) + data
+    begun = _begun(key).copy()
+    begun.update(said)
+    return int.from_bytes(begun.digest(), "little")
+
+
+def following(last: int, low: int) -> int:
+    """The least number above ``last`` that ends in the 16 bits ``low``."""
+    number = last & ~0xFFFF | low
+    return number if number > last else number + 0x10000
