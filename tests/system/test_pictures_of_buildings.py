@@ -11,12 +11,12 @@ from rich.text import Text
 
 from bus_sim.cli import main
 from bus_sim.sites import find_site, layout_names
-from bus_sim.systems.car_park.show import DayClock
+from bus_sim.systems.car_park.show import DayClock, draw_floor
 from bus_sim.systems.car_park.show import draw as draw_picture
 from bus_sim.systems.car_park.show_plan import draw_plans
 from onboard.config.site import parse_site
-from onboard.contract.codes import DeskText, KindCode, Side
-from onboard.contract.messages import DeskOrder, Reference
+from onboard.contract.codes import DeskText, Grade, KindCode, LegAction, Side
+from onboard.contract.messages import DeskOrder, Itinerary, Leg, Progress, Reference, Stamp
 from onboard.core.site import Segment, Station
 from onboard.history.places import Place
 from onboard.systems.car_park.building import draw
@@ -35,10 +35,10 @@ def site_of(name: str) -> CarPark:
     return car_park(find_site(name))
 
 
-def shown(site: CarPark, width: int, height: int | None = None) -> list[str]:
-    """The terminal's picture of a site before anything has happened."""
+def shown(site: CarPark, width: int, height: int | None = None, view: SiteView | None = None) -> list[str]:
+    """The terminal's picture of a site, before anything has happened unless a view is given."""
     clock = DayClock(datetime(2026, 1, 1, tzinfo=UTC))
-    rows = draw_picture(site, SiteView(site), clock, "figures", width, height).renderables
+    rows = draw_picture(site, view or SiteView(site), clock, "figures", width, height).renderables
     return [row.plain for row in rows if isinstance(row, Text)]
 
 
@@ -66,6 +66,27 @@ def test_the_terminal_puts_a_shaft_in_one_column_and_tells_which_way_an_alley_go
     assert [line[middle] for line in alleys] == [":", ":", ":", "="]
     ring = "".join(row.plain for row in draw_plans(site_of("ring"), SiteView(site_of("ring")), 112))
     assert [ring.count(tip) for tip in ">^<v"] == [2 * 12, 2 * 8, 2 * 11, 2 * 7]
+
+
+def planned(name: str, leg: tuple[int, int, int], at: int) -> SiteView:
+    """A site whose MR1 said that it is at an index of the leg in hand: track, from, to."""
+    site = site_of(name)
+    robot = next(one.node_id for one in site.machines.values() if one.name == "MR1")
+    view = SiteView(site)
+    drive = Leg(LegAction.TRAVEL, *leg, Side.NEAR, 60_000)
+    view.feed(Itinerary(robot, 1, Grade.FIRM, Stamp(0, robot, 1), (drive,)), 0)
+    view.feed(Progress(robot, 1, 0, leg[0], at, 0, 1_500), 1)
+    return view
+
+
+def test_the_terminal_shows_a_plan_along_its_way_from_where_the_robot_is() -> None:
+    _, alley, _ = draw_floor(site_of("small"), planned("small", (2, 1, 6), 3), 2)
+    assert alley.plain.split() == [":", ".", ".", "MR1", "*", "*", "*", ".", ".", ".", ".", ":"]
+    lines = [row.plain for row in draw_plans(site_of("ring"), planned("ring", (1, 2, 6), 4), 112)]
+    (line,) = [line for line in lines if "*" in line]
+    assert line.split()[:6] == [">", ">", ">", "MR1", "*", "*"], "on a one-way alley too"
+    (line,) = [line for line in shown(site_of("small"), 80, 9, planned("small", (2, 1, 6), 3)) if "*" in line]
+    assert line.split()[4:8] == ["MR1", "*", "*", "*"], "where a floor has one line too"
 
 
 @pytest.mark.parametrize(("name", "width", "height"), [("twin", 200, 40), ("vtc", 160, 50), ("hoboken", 80, 24)])

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from bus_sim.systems.car_park.car_labels import bay_letters, car_labels
 from bus_sim.systems.car_park.show_plan import draw_plans
-from bus_sim.systems.car_park.slots import boxed, named, style, text_columns
+from bus_sim.systems.car_park.slots import AHEAD, AHEAD_STYLE, ahead, boxed, named, style, text_columns
 from bus_sim.systems.picture import LiveOutput
 from onboard.contract.codes import KindCode, MachineState, Side
 from onboard.core.site import Segment, Station
@@ -79,7 +79,7 @@ def cell_width(site: WaySite, width: int) -> int:
 
 
 def draw_floor(site: WaySite, view: SiteView, track: int, cell: int = CELLS[0]) -> list[Text]:
-    """Three lines: far places, alley with machines, near places and compartments; ``cell`` columns a position.
+    """Three lines: far places, alley with machines and plans, near places and bays; ``cell`` columns a position.
 
     A spur is drawn in round brackets beside its mouth, with whoever stands in it. Cars have short names
     (``car_labels``), the same on every floor.
@@ -133,9 +133,12 @@ def _alley(site: WaySite, view: SiteView, track: int, cell: int) -> Text:
         at = site.tracks[segment.track].joins[0] if _is_turning(site, segment) else segment
         if at.track == track:
             here.setdefault(at.index, []).append(node)
+    planned = ahead(view)
     for index in range(1, site.tracks[track].length + 1):
         nodes = here.get(index)
-        if nodes is None:
+        if nodes is None and Segment(track, index) in planned:
+            row.append(f"{AHEAD:^{cell}}", style=AHEAD_STYLE)
+        elif nodes is None:
             row.append(f"{'.':^{cell}}", style="dim")
         else:
             row.append(named(view, nodes[0], cell), style=style(view, nodes))
@@ -176,9 +179,9 @@ def _alley_line(site: WaySite, view: SiteView, track: int, cell: int) -> Text:
     for index in range(1, site.tracks[track].length + 1):
         far, near = Station(track, index, Side.FAR), Station(track, index, Side.NEAR)
         at = first + (index - 1) * cell + (cell - 1) // 2
-        if plain[at] == ".":
+        if plain[at] in {".", AHEAD}:
             has = (far.number in taken, near.number in taken)
-            plain[at] = "C" if {far, near} & desks else _MARKS[has]
+            plain[at] = "C" if {far, near} & desks else _MARKS[has] if any(has) else plain[at]
     label = f"{track:>2}".ljust(_LABEL)
     line = Text(label + "".join(plain[_LABEL:]), no_wrap=True, overflow="crop")
     line.spans = list(row.spans)

@@ -3,7 +3,7 @@
 from rich.text import Text
 
 from bus_sim.systems.car_park.car_labels import bay_letters, car_labels
-from bus_sim.systems.car_park.slots import boxed, named, style, text_columns
+from bus_sim.systems.car_park.slots import AHEAD, AHEAD_STYLE, ahead, boxed, named, style, text_columns
 from onboard.contract.codes import KindCode, Side
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.outlines import Outlines
@@ -104,13 +104,16 @@ class _FloorPicture:
 
     def _ways(self, cell: int) -> dict[Spot, tuple[str, str]]:
         found = {}
+        planned = ahead(self.view)
         for number in self.outlines.tracks_on(self.level):
             track, line = self.site.tracks[number], self.outlines.plan.lines[number]
             mark = ":" if track.kind is TrackKind.SPUR else "."
             if track.one_way:
                 mark = _TIPS[line.dx * track.one_way, line.dy * track.one_way]
             for index in range(1, self.site.tracks[number].length + 1):
-                found[self._at(Segment(number, index))] = f"{mark:^{cell}}", "dim"
+                slot = Segment(number, index)
+                words = (f"{AHEAD:^{cell}}", AHEAD_STYLE) if slot in planned else (f"{mark:^{cell}}", "dim")
+                found[self._at(slot)] = words
         return found
 
     def _places(self, cell: int) -> dict[Spot, tuple[str, str]]:
