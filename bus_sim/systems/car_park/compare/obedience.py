@@ -90,6 +90,14 @@ class ObedientNegotiation(Negotiation):
     """A robot's side. ``orders`` holds the dispatcher's plan for each call that it is about to award to this robot."""
 
     orders: dict[CallKey, tuple[CallForProposals, Proposal]] = field(default_factory=dict)
+    #: Calls whose awards it has obeyed: it took part in none, and yet knows of these.
+    obeyed: set[CallKey] = field(default_factory=set)
+
+    def knows(self, initiator: int, call: int) -> bool:
+        """Whether it has its order for a call, or had; what the dispatcher says is for who called."""
+        key = CallKey(initiator, call)
+        is_ordered = initiator == DISPATCHER or key in self.orders or key in self.obeyed
+        return is_ordered or super().knows(initiator, call)
 
     def receive(self, message: Message, now_us: int) -> Outcome:
         """A task is told and left alone; an award is obeyed, once."""
@@ -100,6 +108,7 @@ class ObedientNegotiation(Negotiation):
             key = CallKey(message.sender, message.call)
             order = self.orders.pop(key, None)
             if order is not None:
+                self.obeyed.add(key)
                 outcome = [*outcome, Awarded(key, *order, message)]
         return outcome
 
