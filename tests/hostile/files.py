@@ -42,6 +42,7 @@ _COUNTS = "bus-sim run small --counts {}"
 _MAPPING = "bus-sim run small --sessions sessions.csv --mapping {}"
 _CHECK = "onboard trace check {} --site small"
 _DUMP = "onboard trace dump {} --decode --site small"
+_KEYS = "onboard trace check log --site small --keys {}"
 _DBC = "onboard trace dump log --decode --dbc {}"
 _IMPORT = "bus-sim import {} -o site.toml"
 _SPOOL = "onboard gateway -i virtual -c f --site small --mqtt mqtt://127.0.0.1:9 --spool {}"
@@ -73,6 +74,8 @@ def hostile() -> Iterator[Hostile]:
     nested = b"[" * 450 + b"]" * 450
     yield Hostile("site: nested 450 times", _SITE, small.replace(b'name = "small"', b"name = " + nested, 1), ".toml")
     yield Hostile("scenario: nested 450 times", _SCENARIO, b'[scenario]\nsite = "small"\nseed = ' + nested, ".toml")
+    yield Hostile("keys: nested arrays", _KEYS, b"x = " + DEEP, ".keys")
+    yield Hostile("keys: zeros without end", _KEYS, ZERO)
     # Machine files, keys, journals.
     yield Hostile("machine file: nested", _ONBOARD, b"x = " + DEEP, ".toml")
     yield Hostile("machine file: endless", _ONBOARD, ZERO)

@@ -29,6 +29,7 @@ READ = {
     "--dbc": "DBC",
     "--journal": "old journal",
     "--key": "key of updates",
+    "--keys": "keys",
     "--machine": "machine file",
     "--mapping": "mapping",
     "--mqtt-ca": "authority",
@@ -46,11 +47,12 @@ READ = {
     "log": "log",
     "site": "site",
 }
-#: What is written, handed to a tool of others (openssl, dpkg-deb), or read on a board only: an update
+#: What is written, handed to a tool of others (openssl, dpkg-deb), the folder of it, or read on a board only: an update
 #: (tests/deploy/test_update.py).
 WRITTEN = {
     "--counterexample",
     "--draw",
+    "--folder",
     "--json",
     "--networkd",
     "--out",

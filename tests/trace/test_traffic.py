@@ -16,9 +16,11 @@ from onboard.systems.car_park.traffic import excess, operation, power_up, reason
 from onboard.trace.response import ANYBODY, Stream, fifo_bounds
 from onboard.wire.dbc_file import fleet_layouts
 
-#: Sent by gateways, to those who ask for everything again, or while rights are disputed, regenerated or stood still.
+#: Sent by gateways, to those who ask for everything again, or while rights are disputed, regenerated or stood still;
+#: and seals, which only sites that ask for them have.
 NOT_IN_OPERATION = {
     "Go", "Halted", "LeftOut", "OperatorOrder", "Regeneration", "RegenerationState", "SyncDone", "SyncRequest",
+    "Seal", "SealAnswer", "SealChallenge", "SealFault", "SealTo",
     "TokenAssigned", "TokenDispute", "TokenGiven", "TokenSeen",
 }  # fmt: skip
 
