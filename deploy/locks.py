@@ -7,7 +7,6 @@ Whoever installs from a lock gets what was looked at when it was written, or not
 import json
 import platform
 import re
-import subprocess
 import sys
 import tempfile
 import tomllib
@@ -15,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from deploy.wheels import DeployError
+from deploy.wheels import DeployError, pip
 
 LOCKS = Path(__file__).with_name("locks")
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
@@ -97,16 +96,6 @@ def _reports(wanted: list[str]) -> Iterable[Mapping[str, Any]]:
 
 
 def _report(words: list[str]) -> Mapping[str, Any]:
-    always = ["--quiet", "--dry-run", "--ignore-installed", "--report", "-"]
-    done = subprocess.run(
-        [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", *always, *words],
-        capture_output=True,
-        text=True,
-        timeout=_RESOLVE_S,
-        check=False,
-    )
-    if done.returncode:
-        errors = [line for line in done.stderr.splitlines() if line.startswith("ERROR")] or ["pip said nothing"]
-        raise DeployError(f"pip install {' '.join(words)}: {errors[-1]}; is the package index there?")
-    found: Mapping[str, Any] = json.loads(done.stdout)
+    asked = ["install", "--quiet", "--dry-run", "--ignore-installed", "--report", "-", *words]
+    found: Mapping[str, Any] = json.loads(pip(asked, f"pip install {' '.join(words)}", _RESOLVE_S))
     return found

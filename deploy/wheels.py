@@ -44,13 +44,19 @@ def _there(store: Path) -> dict[str, Path]:
 
 def _fetch(pins: Path, store: Path) -> None:
     words = ["download", "--quiet", "--no-deps", "--only-binary=:all:", "--require-hashes", *_PLATFORM]
+    pip([*words, "-d", str(store), "-r", str(pins)], pins.name, _FETCH_S)
+
+
+def pip(words: list[str], what: str, limit_s: float) -> str:
+    """What pip prints. Raises ``DeployError`` with its last reason, after ``what``; it may take ``limit_s``."""
     done = subprocess.run(
-        [sys.executable, "-m", "pip", *words, "--disable-pip-version-check", "-d", str(store), "-r", str(pins)],
+        [sys.executable, "-m", "pip", "--disable-pip-version-check", *words],
         capture_output=True,
         text=True,
-        timeout=_FETCH_S,
+        timeout=limit_s,
         check=False,
     )
     if done.returncode:
         errors = [line for line in done.stderr.splitlines() if line.startswith("ERROR")] or ["pip said nothing"]
-        raise DeployError(f"{pins.name}: {errors[-1]}; is the package index there?")
+        raise DeployError(f"{what}: {errors[-1]}; is the package index there?")
+    return done.stdout
