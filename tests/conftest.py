@@ -1,4 +1,4 @@
-"""What holds for every test: repeatable properties, signals that end, and skips that fail where nothing may be missing.
+"""What holds for every test: repeatable properties, signals that end, an end, and skips that fail where none may be.
 
 ``pytest --hypothesis-profile explore`` looks for new counterexamples; what it finds becomes an ``@example``.
 """
@@ -10,9 +10,15 @@ import pytest
 
 from tests import once
 from tests.dispositions import give_children_the_default
+from tests.endless import pytest_runtest_call, pytest_runtest_setup
 from tests.skips import pytest_make_collect_report, pytest_runtest_makereport
 
-__all__ = ["pytest_make_collect_report", "pytest_runtest_makereport"]
+__all__ = [
+    "pytest_make_collect_report",
+    "pytest_runtest_call",
+    "pytest_runtest_makereport",
+    "pytest_runtest_setup",
+]
 
 # No deadline, and no complaint about slow examples: a shared machine's pace is not a property of the code. No database:
 # the same examples in every clone.
