@@ -115,6 +115,15 @@ def test_a_steward_takes_no_car_before_its_giver_has_said_where_it_stands(heard:
     assert CarAt(BAY, CAR, PLACE, 3, WHEELBASE_MM) in said(both)
 
 
+def test_a_robot_takes_no_car_that_it_neither_needs_nor_knows_the_place_of() -> None:
+    """It could not give it back, and who gave it would be free to forget where the car stands."""
+    robot = machine(ROBOT)
+    late = grant(2, BAY, ROBOT)
+    assert not any(isinstance(word, TokenHeld) for word in said(robot.receive(late, 20))), "as if it had not been heard"
+    both = [*robot.receive(CarAt(BAY, CAR, HERE, 1, WHEELBASE_MM), 30), *robot.receive(late, 40)]
+    assert TokenHeld(ROBOT, TokenKind.CAR, car_token(*CAR).number, 2) in said(both)
+
+
 def test_the_place_is_in_the_journal_before_the_token() -> None:
     steward = machine(BAY, GIVEN)
     written = records([*steward.receive(put_down(), 10), *steward.receive(grant(3), 20)])

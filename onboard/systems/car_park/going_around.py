@@ -8,12 +8,13 @@ for anew by their initiators. A task whose car is aboard is never given back: it
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import Grade, LegAction, Reason, TaskPhase
+from onboard.contract.codes import Grade, LegAction, Reason, TaskPhase, TokenKind
 from onboard.contract.constants import NOBODY
-from onboard.contract.messages import CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport
+from onboard.contract.messages import CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport, TokenGrant
 from onboard.core.authority import segment_token, station_token
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.site import Segment
+from onboard.core.token_keys import TokenKey
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
@@ -71,6 +72,7 @@ class GoingAround:
         self.places = PlaceChoice(self.fleet, self.generation, self.shuttle)
         self.standoff = Standoff(self.fleet, self.carriage)
         self.kept_out = KeptOut(self.fleet, self.shuttle)
+        self.fleet.tokens.before_taking = self._before_taking
 
     @property
     def program(self) -> Program:
@@ -224,13 +226,23 @@ class GoingAround:
         """Give back what was granted for work that is dropped; looked for where tokens have moved."""
         if self.fleet.tokens.changes == self._tokens_seen:
             return []
+        effects = custody.give_back(self.fleet, self._needed(), now_us)
+        self._tokens_seen = self.fleet.tokens.changes
+        return effects
+
+    def _needed(self) -> set[TokenKey]:
         works, at_hand = self.program.works(), self.shuttle.work
         if at_hand is not None and self.shuttle.phase is not HandlingPhase.DONE:
             works.append(at_hand)
-        needed = {key for work in works for key in (station_token(work.station), car_token(*work.car))}
-        effects = custody.give_back(self.fleet, needed, now_us)
-        self._tokens_seen = self.fleet.tokens.changes
-        return effects
+        return {key for work in works for key in (station_token(work.station), car_token(*work.car))}
+
+    def _before_taking(self, grant: TokenGrant) -> list[Effect] | None:
+        """A car that no work of mine needs is taken once its place is heard: without, it could not be given back."""
+        is_car, key = grant.token_kind is TokenKind.CAR, TokenKey(grant.token_kind, grant.token)
+        if not is_car or key in self._needed() or self.fleet.mirror.car_station(custody.car_of(grant)) is not None:
+            return []
+        self.fleet.drops[Reason.MIRROR_BEHIND] += 1
+        return None
 
     def _cut_behind_ride(self) -> None:
         steps = self.program.remaining[:2]
