@@ -236,7 +236,7 @@ class PartAt(Message):
     part: Reference
     #: x of the part. -262144 to 262143 mm.
     x_mm: int
-    #: y of the part. -262144 to 262143 mm.
-    y_mm: int
     #: 1: a robot carries it.
     aboard: bool
+    #: y of the part. -262144 to 262143 mm.
+    y_mm: int

@@ -39,7 +39,7 @@ CASE = Case(
     bidding=_offer,
     broken={
         "inside-area": [[ArmProgress(1, 23_000, 10_000, ArmPhase.CARRYING, 1)]],
-        "part-passed-on": [[PartAt(node, PART, 22_000, 10_000, aboard=True) for node in (1, 2, 1)]],
+        "part-passed-on": [[PartAt(node, PART, 22_000, True, 10_000) for node in (1, 2, 1)]],
     },
     broken_in={"predecessors": _by_predecessor},
     words=(

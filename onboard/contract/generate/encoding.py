@@ -242,9 +242,11 @@ class _Lines:
         """The expression of the bytes, and what it raises for a value out of its range."""
         used = [word for word in self.words if word.pieces]
         errors = []
+        if not used:
+            return f'b"{chr(92)}0" * {_FRAME_BYTES}', ""
         if any(_is_from_table(word, piece) for word in used for piece in word.pieces):
             errors.append("KeyError")
-        if used and used[0].is_number:
+        if used[0].is_number:
             errors += ["OverflowError"] if used[0].closing else []
             made = f'({self._number(used[0])}).to_bytes({_FRAME_BYTES}, "little")'
         else:
@@ -317,7 +319,8 @@ def tools(frame: DbcMessage) -> set[tuple[str, str]]:
     """Names and values of what a frame's function uses."""
     cut = words(frame)
     found = {_table(piece) for word in cut for piece in word.pieces if _is_from_table(word, piece)}
-    return found if any(word.is_number for word in cut) else found | {_packer(cut)}
+    needs_none = any(word.is_number for word in cut) or not any(word.pieces for word in cut)
+    return found if needs_none else found | {_packer(cut)}
 
 
 def _packer(cut: tuple[Word, ...]) -> tuple[str, str]:

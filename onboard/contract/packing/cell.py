@@ -26,7 +26,6 @@ from onboard.contract.cell import (
 _new = tuple.__new__
 _ARM_PHASE = tuple(ArmPhase)
 _PACK_BHBBBBB = struct.Struct("<BHBBBBB").pack
-_PACK_BHBI = struct.Struct("<BHBI").pack
 _PACK_BHBSI = struct.Struct("<BHBi").pack
 _PACK_BHIX = struct.Struct("<BHIx").pack
 _PACK_BSIBH = struct.Struct("<BiBH").pack
@@ -300,15 +299,10 @@ def pack_arm_progress(message: ArmProgress) -> bytes:
         x_mm += 0x100000
     elif x_mm > 524287:
         raise OutOfRangeError("ArmProgress.x_mm", x_mm, -524288, 524287)
-    goal = message.goal
-    if goal < 0 or goal > 65535:
-        raise OutOfRangeError("ArmProgress.goal", goal, 0, 65535)
     try:
-        return _PACK_BSIBH(
-            x_mm & 0xFF, (x_mm >> 8) + message.y_mm * 0x1000, message.arm_phase + (goal & 0xF) * 0x10, goal >> 4
-        )
+        return _PACK_BSIBH(x_mm & 0xFF, (x_mm >> 8) + message.y_mm * 0x1000, message.arm_phase, message.goal)
     except struct.error as error:
-        raise refusal(message, ("ArmProgress.y_mm", -524288, 524287)) from error
+        raise refusal(message, ("ArmProgress.y_mm", -524288, 524287), ("ArmProgress.goal", 0, 65535)) from error
 
 
 def unpack_arm_progress(sender: int, data: bytes) -> ArmProgress | None:
@@ -318,7 +312,7 @@ def unpack_arm_progress(sender: int, data: bytes) -> ArmProgress | None:
     arm_phase = word_0 >> 40 & 0xF
     if arm_phase > 5:
         return None
-    goal = word_0 >> 44 & 0xFFFF
+    goal = word_0 >> 48
     return ArmProgress(sender, x_mm, y_mm, _ARM_PHASE[arm_phase], goal)
 
 
@@ -331,19 +325,14 @@ def pack_part_at(message: PartAt) -> bytes:
         x_mm += 0x80000
     elif x_mm > 262143:
         raise OutOfRangeError("PartAt.x_mm", x_mm, -262144, 262143)
-    y_mm = message.y_mm
-    if y_mm < 0:
-        if y_mm < -262144:
-            raise OutOfRangeError("PartAt.y_mm", y_mm, -262144, 262143)
-        y_mm += 0x80000
-    elif y_mm > 262143:
-        raise OutOfRangeError("PartAt.y_mm", y_mm, -262144, 262143)
     try:
-        return _PACK_BHBI(
-            part[0], part[1], x_mm & 0xFF, (x_mm >> 8) + y_mm * 0x800 + (0x40000000 if message.aboard else 0)
+        return _PACK_BHBSI(
+            part[0], part[1], x_mm & 0xFF, (x_mm >> 8) + (0x800 if message.aboard else 0) + message.y_mm * 0x2000
         )
     except struct.error as error:
-        raise refusal(message, ("PartAt.part.origin", 0, 255), ("PartAt.part.number", 0, 65535)) from error
+        raise refusal(
+            message, ("PartAt.part.origin", 0, 255), ("PartAt.part.number", 0, 65535), ("PartAt.y_mm", -262144, 262143)
+        ) from error
 
 
 def unpack_part_at(sender: int, data: bytes) -> PartAt | None:
@@ -351,8 +340,8 @@ def unpack_part_at(sender: int, data: bytes) -> PartAt | None:
     part_origin = word_0 & 0xFF
     part_number = word_0 >> 8 & 0xFFFF
     x_mm = ((word_0 >> 24 & 0x7FFFF) ^ 0x40000) - 0x40000
-    y_mm = ((word_0 >> 43 & 0x7FFFF) ^ 0x40000) - 0x40000
-    return PartAt(sender, _new(Reference, (part_origin, part_number)), x_mm, y_mm, word_0 & 0x4000000000000000 != 0)
+    y_mm = ((word_0 >> 45) ^ 0x40000) - 0x40000
+    return PartAt(sender, _new(Reference, (part_origin, part_number)), x_mm, word_0 & 0x80000000000 != 0, y_mm)
 
 
 #: Every frame of this module.

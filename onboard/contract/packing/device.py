@@ -52,7 +52,6 @@ _PACK_BIXXX = struct.Struct("<BIxxx").pack
 _PACK_BSIHB = struct.Struct("<BiHB").pack
 _PACK_BSISHB = struct.Struct("<BihB").pack
 _PACK_IXXXX = struct.Struct("<Ixxxx").pack
-_PACK_XXXXXXXX = struct.Struct("<xxxxxxxx").pack
 _UNPACK_BBXXXXXX = struct.Struct("<BBxxxxxx").unpack_from
 _UNPACK_BIXXX = struct.Struct("<BIxxx").unpack_from
 _UNPACK_BSIHB = struct.Struct("<BiHB").unpack_from
@@ -146,7 +145,7 @@ def unpack_desk_order(sender: int, data: bytes) -> DeskOrder | None:
 
 
 def pack_state_request(message: StateRequest) -> bytes:
-    return _PACK_XXXXXXXX()
+    return b"\0" * 8
 
 
 def unpack_state_request(sender: int, data: bytes) -> StateRequest | None:

@@ -103,7 +103,7 @@ class GoalManager(OrderDesk[GoalOrder]):
         for order in self.orders.values():
             if self.fleet.tokens.holds(part_token(order.goal.part)):
                 place = order.goal.end if order.state is OrderState.DONE else order.goal.start
-                effects.append(Send(PartAt(self.fleet.node_id, order.goal.part, *place, False)))
+                effects.append(Send(PartAt(self.fleet.node_id, order.goal.part, place.x_mm, False, place.y_mm)))
         return effects + self.fleet.tokens.statements()
 
     def _on_order(self, wanted: OrderTo, now_us: int) -> list[Effect]:
@@ -118,7 +118,7 @@ class GoalManager(OrderDesk[GoalOrder]):
         limit_ms = to_bus_ms(now_us + wanted.within_ms * 1000) if wanted.within_ms else 0
         start, end = Point(begin.x_mm, begin.y_mm), Point(wanted.x_mm, wanted.y_mm)
         order = GoalOrder(task, Goal(task, task, start, end, (), limit_ms))
-        return [*self.come_in(order, now_us), Send(PartAt(self.fleet.node_id, task, *start, False))]
+        return [*self.come_in(order, now_us), Send(PartAt(self.fleet.node_id, task, start.x_mm, False, start.y_mm))]
 
     # --- the OrderDesk -----------------------------------------------------------------------------------------
 

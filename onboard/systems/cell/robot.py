@@ -365,7 +365,7 @@ class ArmRobot:
     def _part_at(self, one: Undertaking) -> Send:
         aboard = one.stage is ContractStage.TAKEN
         place = one.contract.goal.start if aboard else one.contract.move.via
-        return Send(PartAt(self.fleet.node_id, one.contract.goal.part, place.x_mm, place.y_mm, aboard))
+        return Send(PartAt(self.fleet.node_id, one.contract.goal.part, place.x_mm, aboard, place.y_mm))
 
     # --- steps -------------------------------------------------------------------------------------------------
 
