@@ -26,11 +26,10 @@ from tests.tools import DEADLINE_S
 
 Capture = pytest.CaptureFixture[str]
 
-#: Machines so fast that a car is parked in less than a minute; who is started again has to be followed anew.
+#: Machines so fast that a car is parked in less than a minute.
 SITE = """
 [site]
 name = "fast"
-seals = "required"
 [floors]
 count = 3
 positions = 4
