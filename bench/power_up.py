@@ -1,6 +1,7 @@
-"""What all machines say that start together: ``python -m bench.power_up [MACHINES] [SEEDS] [BIT/S]``.
+"""What all machines say that start together: ``python -m bench.power_up [MACHINES] [SEEDS] [BIT/S] [SEALS]``.
 
-Default: 26 machines at 500 kbit/s, first without loss, then 20 seeds in which each receiver misses 10 % of all frames.
+Default: 26 machines at 500 kbit/s, first without loss, then 20 seeds in which each receiver misses 10 % of all frames;
+SEALS is off, watch or required (``docs/seals.md``).
 ``bus_sim/campaign/power_up.py`` says when a machine takes part.
 """
 
@@ -19,9 +20,11 @@ def _line(title: str, found: PowerUp) -> str:
 
 def main() -> int:
     """Exit status 1 where somebody never takes part."""
-    numbers = [int(word) for word in sys.argv[1:]]
+    words = sys.argv[1:]
+    seals = words.pop() if words and not words[-1].isdecimal() else "off"
+    numbers = [int(word) for word in words]
     machines, seeds, bitrate = [*numbers, *(26, 20, 500_000)[len(numbers) :]]
-    site = large_with(machines, bitrate)
+    site = large_with(machines, bitrate, seals)
     whole = power_up(site)
     print(_line(f"{machines} machines, nothing lost", whole), flush=True)
     lossy = [power_up(site, LOSS, seed) for seed in range(1, seeds + 1)]

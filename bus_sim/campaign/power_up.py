@@ -49,7 +49,7 @@ class PowerUp:
         return max(self.parts_s.values(), default=0.0)
 
 
-def large_with(machines: int, bitrate: int = 500_000) -> Site:
+def large_with(machines: int, bitrate: int = 500_000, seals: str = "off") -> Site:
     """The site ``large`` with so many machines, 18 to 108: the more are robots, more than find refuges at work."""
     if not LARGE <= machines <= LARGE + _FLOORS * _MORE_ON_FLOOR:
         raise ValueError(f"{machines} machines: {LARGE} to {LARGE + _FLOORS * _MORE_ON_FLOOR} can start together here")
@@ -58,7 +58,7 @@ def large_with(machines: int, bitrate: int = 500_000) -> Site:
         f'home = "p({2 + number % _FLOORS},{10 + 2 * (number // _FLOORS)})"\n'
         for number in range(machines - LARGE)
     )
-    text = site_text("large").replace("bitrate = 500_000", f"bitrate = {bitrate}")
+    text = site_text("large").replace("bitrate = 500_000", f'bitrate = {bitrate}\nseals = "{seals}"')
     return parse_site(text + "".join(more), "large.toml", crowded=True)
 
 

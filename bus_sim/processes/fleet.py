@@ -5,7 +5,8 @@ import resource
 import signal
 import tempfile
 from asyncio.subprocess import Process
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,16 @@ from bus_sim.outside import Served
 from bus_sim.processes.plan import PowerSpan, ProcessPlan, machine_file, spans_of
 from bus_sim.processes.spawn import log_of, start_machine
 from bus_sim.run import BusRun
+from bus_sim.seals import SimulatedSeals
+from onboard.config.keys import key_path, key_text
+from onboard.core.site import Site
 
 #: How long a process may take to end once it was told to, s: two closings of a connection and a journal write.
 GRACE_S = 5.0
 #: A process that was told to end says 0, or was told before it could listen.
 _ENDED_AS_TOLD = (0, -signal.SIGTERM)
+#: When a run's keys were made, as key files tell it: before all lives.
+_MADE = 1
 
 
 class ProcessesError(Exception):
@@ -154,10 +160,22 @@ class ProcessFleet:
             (self._directory / "site.toml").write_text(self._plan.site_text, encoding="utf-8")
             for name in self._spans:
                 (self._directory / f"{name}.toml").write_text(machine_file(name, served.arguments), encoding="utf-8")
+            if self._simulation.seals.are_used:
+                write_keys(self._directory, self._simulation.site, self._simulation.seals, self._spans)
         except OSError as error:
             raise ProcessesError(
                 f"{error.filename}: cannot be written ({error.strerror}); name another directory"
             ) from error
+
+
+def write_keys(directory: Path, site: Site, seals: SimulatedSeals, names: Collection[str]) -> None:
+    """The keys that a run draws from its seed, in the files that ``onboard keys`` would have made; ``OSError``."""
+    for node, machine in site.machines.items():
+        if machine.name in names:
+            file = key_path(directory / f"journal-{machine.name}")
+            file.touch(mode=0o600)
+            keys = replace(seals.keys(node), made=_MADE)
+            file.write_text(key_text(keys, site.name, machine.name, "none: drawn from a seed"), encoding="utf-8")
 
 
 def _status(code: int) -> str:

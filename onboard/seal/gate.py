@@ -17,7 +17,7 @@ from onboard.seal.heard import MOST_WAITING, WAITS_US, HeardNode, WaitingFrame, 
 from onboard.seal.keys import Keys
 from onboard.seal.sender import SealingSender
 from onboard.seal.subjects import Reading, frame_of, taker_of
-from onboard.seal.tags import following, tag_of
+from onboard.seal.tags import following, tag_of, tag_over
 
 _NODE_MASK = 0xFF
 #: A node whose seals do not fit is challenged again after so long, and after twice as long each time, us.
@@ -210,6 +210,8 @@ class Gate:
         heard.waiting.append(WaitingFrame(frame, now_us, is_done, taker_of(word) == self._keys.node))
         if len(heard.waiting) > MOST_WAITING:
             self._pass_over(word.sender, (heard.waiting.popleft(),))
+        due_us = now_us + WAITS_US
+        self.next_us = due_us if self.next_us is None else min(self.next_us, due_us)
 
     def _on_seal(self, seal: Seal, now_us: int) -> tuple[list[Frame], list[Frame]]:
         if seal.sender == self._keys.node:
@@ -246,7 +248,7 @@ class Gate:
         self._pass_over(node, [one for one in found if one.needs_my_key])
         return self._accept(heard, [one for one in found if not one.needs_my_key])
 
-    def _accept(self, heard: HeardNode, found: Iterable[WaitingFrame]) -> list[Frame]:
+    def _accept(self, heard: HeardNode, found: Sequence[WaitingFrame]) -> list[Frame]:
         """Take up what sealed words tell of their sender; those that were not handed on yet."""
         handed: list[Frame] = []
         for one in found:
@@ -330,7 +332,7 @@ class Gate:
         if old is not None:
             for one in old:
                 heard.waiting.remove(one)
-            self.faults[seal.sender, SealWord.REPLAYED] += len(old)
+            self._count(seal.sender, SealWord.REPLAYED, old)
             return []
         self.faults[seal.sender, SealWord.FALSE_SEAL] += 1
         heard.misfits += 1
@@ -355,14 +357,18 @@ class Gate:
     def _fitting(self, seal: Seal, number: int, waiting: Iterable[WaitingFrame]) -> Sequence[WaitingFrame] | None:
         """What of the frames that wait the seal is over, under that number; None where that is nothing."""
         for found in readings(list(waiting)):
-            if seal.tag == tag_of(self._keys.group, number, [one.frame for one in found]):
+            if seal.tag == tag_over(self._keys.group, number, b"".join([one.said for one in found])):
                 return found
         return None
 
     def _drop_all(self, node: int, heard: HeardNode, why: SealWord) -> None:
-        self.faults[node, why] += len(heard.waiting)
+        self._count(node, why, list(heard.waiting))
         heard.waiting.clear()
 
-    def _pass_over(self, node: int, frames: Iterable[WaitingFrame]) -> None:
-        for _ in frames:
-            self.faults[node, SealWord.UNSEALED] += 1
+    def _pass_over(self, node: int, frames: Sequence[WaitingFrame]) -> None:
+        self._count(node, SealWord.UNSEALED, frames)
+
+    def _count(self, node: int, why: SealWord, frames: Sequence[WaitingFrame]) -> None:
+        """These came to nothing, or should have. A seal behind nothing is no fault that could be told."""
+        if frames:
+            self.faults[node, why] += len(frames)

@@ -8,6 +8,7 @@ from onboard.contract.messages import Heartbeat
 from onboard.core.frame import Frame
 from onboard.seal.sender import MOST_SEALED
 from onboard.seal.subjects import UNSEALED_FOR_US, CarPlaces, life_told
+from onboard.seal.tags import bytes_of
 
 #: Most frames of one node that wait for a seal: those of one, and what others may say between them in its name.
 MOST_WAITING = MOST_SEALED + 4
@@ -30,6 +31,11 @@ class WaitingFrame:
     since_us: int
     is_done: bool
     needs_my_key: bool = False
+    #: What of it goes into a tag: a seal that does not fit is tried over many frames.
+    said: bytes = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.said = bytes_of(self.frame)
 
 
 @dataclass(slots=True)
@@ -70,12 +76,16 @@ class HeardNode:
 def readings(waiting: Sequence[WaitingFrame]) -> Iterator[Sequence[WaitingFrame]]:
     """What a seal may be over: all that waits; the earlier ones, where others spoke before the seal; the later ones.
 
-    Then all but one in between. At most ``3 * MOST_WAITING`` sequences.
+    Then all but one in between. None of more than ``MOST_SEALED`` frames, so at most 23 sequences.
     """
-    if waiting:
+    whole = len(waiting)
+    if 0 < whole <= MOST_SEALED:
         yield waiting
-    for at in range(1, len(waiting)):
-        yield waiting[:at]
-        yield waiting[at:]
-    for left_out in range(1, len(waiting) - 1):
-        yield [*waiting[:left_out], *waiting[left_out + 1 :]]
+    for at in range(1, whole):
+        if at <= MOST_SEALED:
+            yield waiting[:at]
+        if whole - at <= MOST_SEALED:
+            yield waiting[at:]
+    if whole <= MOST_SEALED + 1:
+        for left_out in range(1, whole - 1):
+            yield [*waiting[:left_out], *waiting[left_out + 1 :]]

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from onboard.contract.codes import Reason, TokenKind
+from onboard.contract.codes import MachineState, Reason, TokenKind
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Award, CarAt, Heartbeat, Message, TokenGrant
 from onboard.contract.packing.seal import FRAMES
@@ -32,8 +32,12 @@ def taker_of(word: Message | Reason) -> int:
 
 
 def life_told(beat: Heartbeat) -> tuple[int, ...]:
-    """What a sign of life says of its sender itself; a digest of what all know costs others a question at most."""
-    return beat.contract, beat.site_digest, beat.boot, beat.kind, beat.state, beat.epoch
+    """What a sign of life says of its sender itself; a digest of what all know costs others a question at most.
+
+    Idle or working is one: no machine acts on which (``regeneration`` asks for either), and it changes with each task.
+    """
+    state = MachineState.IDLE if beat.state is MachineState.WORKING else beat.state
+    return beat.contract, beat.site_digest, beat.boot, beat.kind, state, beat.epoch
 
 
 class CarPlaces:

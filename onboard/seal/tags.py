@@ -25,14 +25,22 @@ def _begun(key: bytes) -> blake2s:
     return blake2s(key=key, digest_size=TAG_BYTES, person=_PERSON)
 
 
+def bytes_of(frame: Frame) -> bytes:
+    """What of one frame goes into a tag."""
+    arbitration_id, data, *_ = frame
+    return _FRAME(arbitration_id, len(data)) + data
+
+
+def tag_over(key: bytes, number: int, said: bytes, taker: int = 0, nonce: int = 0) -> int:
+    """The tag over frames that are bytes already (``bytes_of``, one after the other)."""
+    begun = _begun(key).copy()
+    begun.update(_HEAD(number, taker, nonce) + said)
+    return int.from_bytes(begun.digest(), "little")
+
+
 def tag_of(key: bytes, number: int, frames: Iterable[Frame], taker: int = 0, nonce: int = 0) -> int:
     """The tag under ``number``, 64 bits; ``taker`` 0 under a group key, ``nonce`` 0 but in answers."""
-    said = _HEAD(number, taker, nonce)
-    for arbitration_id, data, *_ in frames:
-        said += _FRAME(arbitration_id, len(data)) + data
-    begun = _begun(key).copy()
-    begun.update(said)
-    return int.from_bytes(begun.digest(), "little")
+    return tag_over(key, number, b"".join(map(bytes_of, frames)), taker, nonce)
 
 
 def following(last: int, low: int) -> int:

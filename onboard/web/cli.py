@@ -3,23 +3,25 @@
 import argparse
 import asyncio
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from onboard.config.arguments import Parser
+from onboard.config.keys import load_keys
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Site
 from onboard.io.kept_token import TokenFileError, kept_token
 from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
 from onboard.io.signals import ended_by
+from onboard.seal.keys import Keys
 from onboard.systems.contract import codecs_for
 from onboard.trace.readers.open_log import Log, LogOpenError
 from onboard.web.address import DEFAULT_PORT, WebError
 from onboard.web.film import Film
 from onboard.web.live import LiveSource, LogSource
 from onboard.web.serve import WebServer
-from onboard.wire.codec import Codecs
 
 EXAMPLES = """\
 exit status: 0 stopped by a person; 1 the bus is gone or not there yet; 2 a mistake in the command line or in a file
@@ -55,6 +57,9 @@ def build_parser() -> argparse.ArgumentParser:
         metavar="FILE",
         help="keep the token of the printed address here, so that it stays (made where missing; default: a new one)",
     )
+    parser.add_argument(
+        "--keys", type=Path, metavar="FILE", help="a key file of a site with seals: tell whose seals are right"
+    )
     add_bus_arguments(parser)
     return parser
 
@@ -67,13 +72,13 @@ def main(argv: Sequence[str]) -> int:
         parser.error("name a log, or a bus: -i INTERFACE -c CHANNEL")
     try:
         site, token = load_site(args.site), web_token(args.web_token)
-        codec = codecs_for(site)
+        keys, codec = _keys(args.keys, site), codecs_for(site)
         if args.log is not None:
-            with Film(site, codec) as film:
+            with Film(site, codec, keys) as film:
                 _read(film, args.log)
                 return asyncio.run(_show_log(film, args.web, token))
         settings = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
-        return asyncio.run(_show_bus(site, codec, settings, args.web, token))
+        return asyncio.run(_show_bus(partial(LiveSource, site, codec, keys), settings, args.web, token))
     except (ConfigError, BusOpenError, LogOpenError, WebError) as error:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"onboard web: {line}", file=sys.stderr)
@@ -86,6 +91,12 @@ def web_token(path: Path | None) -> str | None:
         return None if path is None else kept_token(path)
     except TokenFileError as error:
         raise WebError(f"--web-token {error}") from error
+
+
+def _keys(path: Path | None, site: Site) -> Keys | None:
+    if path is not None and site.seals == "off":
+        raise WebError(f"--keys {path}: {site.name} has no seals; leave it out")
+    return None if path is None else load_keys(path, site)
 
 
 def _read(film: Film, name: str) -> None:
@@ -110,8 +121,8 @@ async def _show_log(film: Film, where: str, token: str | None) -> int:
         playing.cancel()
 
 
-async def _show_bus(site: Site, codec: Codecs, settings: BusSettings, where: str, token: str | None) -> int:
-    source = LiveSource(site, codec)
+async def _show_bus(listens: Callable[[], LiveSource], settings: BusSettings, where: str, token: str | None) -> int:
+    source = listens()
     bus = await open_bus(settings)
     bus.subscribe(source.on_frame)
     lost = asyncio.get_running_loop().create_task(bus.wait_lost())

@@ -14,9 +14,10 @@ from typing import BinaryIO, NamedTuple, Self
 from onboard.contract.runs import singles
 from onboard.core.frame import Frame
 from onboard.core.site import Site
+from onboard.seal.keys import Keys
 from onboard.trace.listener import Listener
 from onboard.trace.raw import RawFrame
-from onboard.web.picture import LivePicture
+from onboard.web.picture import LivePicture, marks_of
 from onboard.wire.codec import Codecs
 
 #: Time us, identifier, channel, kind bits, data length, data.
@@ -38,9 +39,10 @@ class _FilmState(NamedTuple):
 class Film:
     """Read it once with ``read``; then ``show(time_us)`` gives the picture of a moment. ``close`` frees the file."""
 
-    def __init__(self, site: Site, codecs: Codecs) -> None:
+    def __init__(self, site: Site, codecs: Codecs, keys: Keys | None = None) -> None:
+        """``keys``: of any node, for whose seals are right."""
         self.site = site
-        self._codecs = codecs
+        self._codecs, self._seal_keys = codecs, keys
         self._file: BinaryIO = TemporaryFile(prefix="onboard-web-")  # noqa: SIM115  # closed by close()
         self._channels: list[str] = []
         self._count = 0
@@ -52,7 +54,8 @@ class Film:
         self.first_us = self.last_us = 0
 
     def _empty(self) -> _FilmState:
-        return _FilmState(LivePicture(self.site), Listener(self._codecs))
+        marks = marks_of(self.site, self._codecs, self._seal_keys)
+        return _FilmState(LivePicture(self.site, marks), Listener(self._codecs))
 
     def __enter__(self) -> Self:
         return self
@@ -113,6 +116,7 @@ class Film:
         heard = listener.hear(raw)
         if heard.is_fleet or classic.is_error:
             picture.count_frame(classic)
+            picture.mark_frame(classic, raw.time_us)
         if heard.message is None:
             return False
         if heard.is_fleet:

@@ -8,10 +8,11 @@ from typing import Any
 from onboard.contract.runs import singles
 from onboard.core.frame import Frame
 from onboard.core.site import Site
+from onboard.seal.keys import Keys
 from onboard.web.app import CommandError, number
 from onboard.web.film import Film
 from onboard.web.local_time import offset_s, zone_of
-from onboard.web.picture import LivePicture
+from onboard.web.picture import LivePicture, marks_of
 from onboard.wire.codec import Codecs
 from onboard.wire.decoder import Decoder
 
@@ -26,8 +27,9 @@ class LiveSource:
 
     mode = "live"
 
-    def __init__(self, site: Site, codecs: Codecs) -> None:
-        self.picture = LivePicture(site)
+    def __init__(self, site: Site, codecs: Codecs, keys: Keys | None = None) -> None:
+        """``keys``: of any node, for whose seals are right."""
+        self.picture = LivePicture(site, marks_of(site, codecs, keys))
         self._codecs = codecs
         self._fleet, self._device = Decoder(codecs.fleet, site.machines), Decoder(codecs.device)
         self._loop = asyncio.get_running_loop()
@@ -39,6 +41,7 @@ class LiveSource:
         """One frame of the bus, at a time of the loop; a machine's devices may be on the same wires."""
         self.picture.count_frame(frame)
         is_fleet = self._codecs.fleet.name_of(frame) is not None
+        self.picture.mark_frame(frame, time_us)
         message = (self._fleet if is_fleet else self._device).feed(frame, time_us)
         if message is None:
             return

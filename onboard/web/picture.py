@@ -14,11 +14,14 @@ from onboard.core.site import Site
 from onboard.history.calls import CallHistory
 from onboard.history.history import Fact
 from onboard.history.lives import SILENT_BEATS
+from onboard.seal.keys import Keys
+from onboard.seal.marks import Mark, SealMarks
 from onboard.trace.frame_bits import frame_bits
 from onboard.trace.indicators import Indicators
 from onboard.trace.scene.scenes import scene_of
 from onboard.trace.view import SiteView
 from onboard.ways.site import way_site
+from onboard.wire.codec import Codecs
 
 #: Calls, and lines of events, that a snapshot tells.
 CALLS_SHOWN = 12
@@ -33,8 +36,10 @@ SAMPLES = 180
 class LivePicture:
     """Feed it every message of the fleet bus, and of device buses where they are heard; ask for snapshots."""
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: Site, marks: SealMarks | None = None) -> None:
+        """``marks``: what tells which frames are sealed, where the site has seals."""
         self.site = site
+        self._marks = marks
         self.view = SiteView(site)
         self.history = self.view.history
         self.scene = scene_of(site, self.view)
@@ -59,6 +64,11 @@ class LivePicture:
         self._frames += 1
         if frame is not None:
             self._bits += frame_bits(frame)
+
+    def mark_frame(self, frame: Frame, time_us: int) -> None:
+        """One frame of the fleet bus, for the counts of what is sealed."""
+        if self._marks is not None:
+            self._marks.hear(frame, time_us)
 
     def feed(self, message: Message, time_us: int) -> None:
         """One message of the fleet bus."""
@@ -145,6 +155,9 @@ class LivePicture:
                 "why": view.words.reason(wait[1].reason),
                 "since_us": wait[0],
             }
+        if self._marks is not None:
+            counts = self._marks.counts
+            told["seals"] = {mark.value: counts[node, mark] for mark in Mark if counts[node, mark]}
         return told
 
     def _state(self, node: int) -> str:
@@ -204,3 +217,11 @@ class LivePicture:
             for reference, task in view.tasks.items()
             if task.is_waiting
         ]
+
+
+def marks_of(site: Site, codecs: Codecs, keys: Keys | None) -> SealMarks | None:
+    """What tells the seals of a site's bus apart, by any node's keys or by none; None where the site has no seals."""
+    if site.seals == "off":
+        return None
+    nodes = site.machines if keys is None else (*keys.pairs, keys.node)
+    return SealMarks(nodes, codecs.fleet.decode_part, None if keys is None else keys.group)

@@ -12,6 +12,7 @@ from tests.models.explorer import Explorer, Limits
 from tests.models.gate import GatePart
 from tests.models.moving import engine_of
 from tests.models.runs import RunPart
+from tests.models.sealed import explore_sealed
 
 #: What is explored by the engine, by name: made from how many machines and calls.
 PARTS: dict[str, Callable[[int, int], engine.Part]] = {
@@ -27,17 +28,24 @@ PARTS: dict[str, Callable[[int, int], engine.Part]] = {
 def main() -> None:
     """Explore as the command line says."""
     parser = argparse.ArgumentParser(description="Every interleaving of shipped code.")
-    parser.add_argument("part", nargs="?", default="tokens", choices=["tokens", *PARTS])
+    parser.add_argument("part", nargs="?", default="tokens", choices=["tokens", "sealed", *PARTS])
     parser.add_argument("--crashes", type=int, default=1)
     parser.add_argument("--sleeps", action="store_true", help="parts: or a machine sleeps for a while")
     parser.add_argument("--most-s", type=float, default=600.0, help="CPU seconds after which it ends")
     parser.add_argument("--nodes", type=int, default=3, help="of the book of rights, or of the part")
-    parser.add_argument("--versions", type=int, default=2, help="tokens: the newest that is explored")
-    parser.add_argument("--old-copies", type=int, default=0, help="tokens: starts from an old copy of a journal")
+    parser.add_argument("--versions", type=int, default=2, help="tokens, sealed: the newest that is explored")
+    parser.add_argument(
+        "--old-copies", type=int, default=0, help="tokens, sealed: starts from an old copy of a journal"
+    )
+    parser.add_argument("--seals", type=int, default=3, help="sealed: most seals that a node says in one life")
     parser.add_argument("--ghost", action="store_true", help="tokens: a node that the site does not have speaks")
     parser.add_argument("--calls", type=int, default=2, help="most calls in one life; runs: half the versions")
     parser.add_argument("--scenario", type=Path, help="a counterexample is written here, for `bus-sim run --scenario`")
     options = parser.parse_args()
+    if options.part == "sealed":
+        sizes = (options.nodes, options.versions, options.crashes, options.old_copies)
+        explore_sealed(Limits(*sizes, most_s=options.most_s), options.seals)
+        return
     if options.part != "tokens":
         limits = engine.Limits(options.crashes, most_s=options.most_s, sleeps=options.sleeps)
         explore_part(PARTS[options.part](options.nodes, options.calls), limits, options.scenario)

@@ -83,6 +83,8 @@ class State(NamedTuple):
     bus: int
     crashes: int
     old_copies: int
+    #: Of sealed exploration: each node's gate.
+    gates: tuple[Any, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,7 @@ class Explorer:
     _journals: Table[Journal] = field(default_factory=Table)
     _done: dict[tuple[int, int, Message | None], tuple[int, int]] = field(default_factory=dict)
     _seen_starting: dict[tuple[int, int, int], int] = field(default_factory=dict)
-    _started: dict[tuple[int, int], tuple[Memory, int]] = field(default_factory=dict)
+    _started: dict[tuple[int, int], tuple[Memory, Deeds]] = field(default_factory=dict)
     _hold: dict[tuple[int, int], bool] = field(default_factory=dict)
     _ends_well: dict[Any, bool] = field(default_factory=dict)
     _ghosts: int = 0
@@ -211,8 +213,8 @@ class Explorer:
             witness.hear(word)
         return hear(book, word, _NOW_US)
 
-    def starts(self, i: int, journal: int) -> tuple[Memory, int]:
-        """Node i begins again with what its journal says: its memory, and what it says, as bits of the bus."""
+    def starts(self, i: int, journal: int) -> tuple[Memory, Deeds]:
+        """Node i begins again with what its journal says: its memory, and what it says."""
         known = self._started.get((i, journal))
         if known is None:
             book = TokenBook(SITE, self.nodes[i])
@@ -221,8 +223,7 @@ class Explorer:
                 for record, version, holder in self._journals.things[journal]
             )
             witness = self._witness(book, Memory())
-            said = self._bits(_deeds(witness.begin(0)))
-            known = self._started[i, journal] = self._save(book, witness), said
+            known = self._started[i, journal] = self._save(book, witness), _deeds(witness.begin(0))
         return known
 
     def _sees_start(self, j: int, memory: int, started: int) -> int:
@@ -300,7 +301,7 @@ class Explorer:
         if state.old_copies < self.limits.old_copies and sum(one is None for one in state.memory) == 1:
             journal = self._journals.things[state.journal[i]]
             for length in range(len(journal)):
-                old = state._replace(old_copies=state.old_copies + 1, bus=self._ghosts)
+                old = state._replace(old_copies=state.old_copies + 1, bus=self._left_on_bus(state))
                 yield self._restarted(old, i, self._journals.number(journal[:length]))
 
     def _restarted(self, state: State, i: int, journal: int) -> State:
@@ -311,13 +312,21 @@ class Explorer:
         ]
         live = frozenset(self.nodes[j] for j, one in enumerate(others) if one is not None and j != i)
         others[i] = self._memories.number(memory._replace(asked=live, is_synced=not live))
-        return state._replace(memory=tuple(others), journal=_set(state.journal, i, journal), bus=state.bus | said)
+        return self._say(state._replace(memory=tuple(others), journal=_set(state.journal, i, journal)), i, said)
+
+    def _left_on_bus(self, state: State) -> int:
+        """What can still be heard once a medium was changed."""
+        return self._ghosts
+
+    def _say(self, state: State, i: int, deeds: Deeds) -> State:
+        """Node i says the words of these deeds."""
+        return state._replace(bus=state.bus | self._bits(deeds))
 
     def _carry_out(self, state: State, i: int) -> State:
         deed, *rest = self._deeds.things[state.to_do[i]]
         after = state._replace(to_do=_set(state.to_do, i, self._deeds.number(tuple(rest))))
         if isinstance(deed, Message):
-            return after._replace(bus=state.bus | 1 << self._words.number(deed))
+            return self._say(after, i, (deed,))
         journal = self._journals.number((*self._journals.things[state.journal[i]], deed))
         return after._replace(journal=_set(state.journal, i, journal))
 
@@ -333,10 +342,8 @@ class Explorer:
             to_do += self._deeds.things[more]
         asking = self._trusts(state, asking, j)
         memories = _set(_set(state.memory, i, memory), j, asking)
-        said = self._bits(tuple(word for word in words if not isinstance(word, SyncDone)))
-        return state._replace(
-            memory=memories, to_do=_set(state.to_do, j, self._deeds.number(to_do)), bus=state.bus | said
-        )
+        after = state._replace(memory=memories, to_do=_set(state.to_do, j, self._deeds.number(to_do)))
+        return self._say(after, i, tuple(word for word in words if not isinstance(word, SyncDone)))
 
     def _trusts(self, state: State, asking: int, j: int) -> int:
         """Once all that live have answered, and nobody knew better, a node's rights are its own."""

@@ -164,7 +164,7 @@ LAYERS: dict[str, Layer] = {
     # Runs where somebody commissions a site, never on a board.
     "onboard.keys": Layer(("onboard.config", "onboard.core.site", "onboard.seal.keys", "onboard.systems.registry")),
     "onboard.trace": Layer(
-        (*CORE_TYPES, *REGISTRY, "onboard.history", "onboard.wire"),
+        (*CORE_TYPES, *REGISTRY, "onboard.history", "onboard.seal.heard", "onboard.wire"),
         not_stdlib=frozenset({"asyncio", "random", "threading"}),
     ),
     # Logs a million frames at a time: on a desk, never on a board; the rest of the trace does without.
@@ -184,9 +184,14 @@ LAYERS: dict[str, Layer] = {
     # Judges nothing: it runs the very code of a controller, and only compares what comes out.
     "onboard.trace.replay": Layer((*ALL_OF_ONBOARD, "onboard.trace")),
     # The page shows what the trace knows; only its own command line opens files and buses.
-    "onboard.web": Layer((*CORE_TYPES, "onboard.history", "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")),
+    "onboard.web": Layer(
+        (*CORE_TYPES, "onboard.history", "onboard.seal", "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")
+    ),
     "onboard.web.cli": Layer(
-        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.systems", "onboard.trace", "onboard.web", "onboard.wire")
+        (
+            *(*CORE_TYPES, "onboard.config", "onboard.io", "onboard.seal.keys"),
+            *("onboard.systems", "onboard.trace", "onboard.web", "onboard.wire"),
+        )
     ),
     # What is published is decided from the decoded bus alone; sessions, files and buses come in through ports.
     "onboard.gateway": Layer(

@@ -14,11 +14,11 @@ from onboard.contract.messages import (
     TokenGrant,
     TokenHeld,
 )
-from onboard.contract.seal import SealFault, SealWord
+from onboard.contract.seal import Seal, SealFault, SealWord
 from onboard.core.frame import Frame
 from onboard.seal.heard import UNHEARD_US, WAITS_US
 from onboard.seal.sender import MOST_SEALED
-from onboard.seal.subjects import UNSEALED_FOR_US
+from onboard.seal.subjects import UNSEALED_FOR_US, frame_of
 from tests.seal.nodes import CODEC, NODES, SECOND_US, Wire, gate_of, keys_of, wire_of
 
 GRANT = TokenGrant(1, TokenKind.SEGMENT, 258, 7, 11)
@@ -130,6 +130,31 @@ def test_signs_of_life_that_say_nothing_new_go_without_a_seal_for_a_while() -> N
     wire.wait(UNHEARD_US + SECOND_US)
     wire.put(CODEC.encode(beat()))
     assert len(wire.heard[5]) == 5
+
+
+def test_what_waits_for_a_seal_is_forgotten_in_time_though_a_fault_is_to_be_told_later() -> None:
+    wire = wire_of()
+    for _ in range(3):
+        wire.put(CODEC.encode(HELD))
+        wire.wait(WAITS_US + SECOND_US // 10)
+    assert faults(wire, 5) == {(1, SealWord.UNSEALED): 3}
+
+
+def test_idle_or_working_is_no_news_of_a_node() -> None:
+    wire = wire_of()
+    said = [names(wire.say(beat(state))) for state in (*[MachineState.IDLE] * 2, MachineState.WORKING)]
+    assert said == [["Heartbeat", "Seal"]] * 2 + [["Heartbeat"]]
+    assert wire.heard[5][-1] == beat(MachineState.WORKING)
+    # Whoever waits for a person, or for a way, is asked for nothing: that needs proof.
+    assert names(wire.say(beat(MachineState.WAITING))) == ["Heartbeat", "Seal"]
+
+
+def test_a_seal_behind_nothing_is_told_to_nobody() -> None:
+    wire = wire_of()
+    wire.gates[11] = gate_of(11, life=2)
+    wire.put([frame_of(Seal(1, 7, 7))])
+    wire.wait(SECOND_US)
+    assert (1, SealWord.NOT_FRESH) not in wire.gates[11].faults
 
 
 def test_an_emergency_stop_holds_from_anybody() -> None:

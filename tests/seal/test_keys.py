@@ -4,12 +4,16 @@ from pathlib import Path
 
 import pytest
 
+from bus_sim.processes.fleet import write_keys
+from bus_sim.seals import SimulatedSeals
 from onboard.cli import main
 from onboard.config.keys import load_keys, machine_keys
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site, parse_site
 from onboard.core.site import Site
 from onboard.io.seal_lives import SealLivesError, next_life
+from onboard.systems.contract import codecs_for
+from tests.seal.test_site import site_with
 
 TEXT = (Path(__file__).parents[2] / "bus_sim" / "sites" / "level1.toml").read_text(encoding="utf-8")
 
@@ -120,3 +124,12 @@ def test_no_life_has_the_number_of_another(tmp_path: Path) -> None:
     (tmp_path / "journal.lives").write_text("", encoding="ascii")
     with pytest.raises(SealLivesError, match="holds no number of a life; delete it, and give"):
         next_life(journal, 100)
+
+
+def test_a_simulated_machines_process_finds_the_keys_of_its_run(tmp_path: Path) -> None:
+    site = load_site(Path(site_with("required", tmp_path)))
+    seals = SimulatedSeals(site, 1, codecs_for(site).fleet.decode_part)
+    write_keys(tmp_path, site, seals, ("R1",))
+    assert [file.name for file in tmp_path.glob("*.keys")] == ["journal-R1.keys"]
+    keys = machine_keys(tmp_path / "journal-R1", site, 11)
+    assert keys is not None and (keys.group, keys.pairs) == (seals.keys(11).group, seals.keys(11).pairs)

@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 from onboard.bounded_file import read_bounded
-from onboard.config.keys import load_keys
 from onboard.core.site import Site
 from onboard.systems.contract import codecs_for
 from onboard.trace.check.checks import Checks, LogVerdict
@@ -20,7 +19,7 @@ from onboard.trace.commands.common import (
     site_of,
     write_text,
 )
-from onboard.trace.commands.proof import LogProof
+from onboard.trace.commands.proof import LogProof, proof_of
 from onboard.trace.words import Words
 
 HELP = """\
@@ -48,7 +47,7 @@ def register(commands: Commands) -> None:
         "--keys",
         type=Path,
         metavar="FILE",
-        help="a key file of a site that requires seals: judge only what counts on its bus, and tell what did not",
+        help="a key file of a site with seals: judge only what counts on its bus, and tell whose seals are right",
     )
     check.add_argument(
         "--faults", action="store_true", help="frames were lost on purpose: leave out rules that need every frame"
@@ -63,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     if args.dbc is not None:
         _check_contract(args.dbc)
     checks = Checks(site, disturbed=args.faults, fleet=contracts.fleet, device=contracts.device)
-    proof = _proof_of(args, site)
+    proof = proof_of(args, site)
     verdict = _check(args, checks, proof)
     if args.json is not None:
         write_text(args.json, json.dumps(verdict.to_json(), indent=2) + "\n")
@@ -76,15 +75,6 @@ def _report(verdict: LogVerdict, site: Site | None) -> list[str]:
     return verdict.lines(Words(site).machine)
 
 
-def _proof_of(args: argparse.Namespace, site: Site | None) -> LogProof | None:
-    """What tells by the seals of a log what counted; None without ``--keys``. ``ConfigError`` for a bad file."""
-    if args.keys is None:
-        return None
-    if site is None or site.seals == "off":
-        raise TraceError(f"--keys {args.keys}: needs --site with the file of a site that has seals")
-    return LogProof(load_keys(args.keys, site), codecs_for(site).fleet.decode_part)
-
-
 def _check(args: argparse.Namespace, checks: Checks, proof: LogProof | None) -> LogVerdict:
     with open_log(args) as log:
         for portion in log.portions():
@@ -94,6 +84,8 @@ def _check(args: argparse.Namespace, checks: Checks, proof: LogProof | None) -> 
                 for frame in portion.frames:
                     for one in (frame,) if proof is None else proof.counting(frame):
                         checks.feed_raw(one)
+        if proof is not None:
+            proof.end()
         verdict = checks.finish()
     for fault, count in log.faults.counts.items():
         verdict.unknown[fault.value] += count

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from onboard.bounded_file import read_bounded
+from onboard.core.site import Site
 from onboard.systems.contract import codecs_for
 from onboard.trace.commands.common import (
     Commands,
@@ -19,6 +20,7 @@ from onboard.trace.commands.common import (
     site_of,
     tell_faults,
 )
+from onboard.trace.commands.proof import LogProof, proof_of
 from onboard.trace.dump.decode import DbcLines, MessageLines
 from onboard.trace.dump.filters import FilterSet, parse_filters
 from onboard.trace.dump.formats import Look, Screen, TimeFormat, log_line, time_of_name
@@ -43,6 +45,7 @@ examples:
   onboard trace dump run.log -tz fleet 0C000000:1C000000
   candump -L can0 | onboard trace dump - --decode --site mysite.toml
   onboard trace dump car.log --decode --dbc car.dbc
+  onboard trace dump run.log --decode --site mysite.toml --keys MR1.keys     whose seals are right, line by line
 """
 
 
@@ -64,20 +67,29 @@ def register(commands: Commands) -> None:
     dump.add_argument("--decode", action="store_true", help="one readable line a message")
     add_site(dump)
     dump.add_argument("--dbc", type=Path, metavar="FILE", help="with --decode: any DBC instead of the fleet's contract")
+    dump.add_argument(
+        "--keys", type=Path, metavar="FILE", help="a key file of a site with seals: tell whose seals are right"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Print, and tell what could not be printed."""
     sets = parse_filters(args.filters, errors=args.errors)
+    site = site_of(args)
+    proof = proof_of(args, site)
+    if args.keys is not None and (args.file or args.log_format or args.dbc is not None):
+        raise TraceError(
+            f"--keys {args.keys}: a log file, or another's DBC, has no place for it; leave out -l, -L, --dbc"
+        )
     with open_log(args) as log:
-        chosen = _Chosen(log, sets, args.count)
+        chosen = _Chosen(log, sets, args.count, None if args.file or args.log_format else proof)
         if args.decode:
-            _decode(args, chosen)
+            _decode(args, site, chosen)
         elif args.file:
             _write_file(chosen)
         else:
             screen = Screen(_look(args), tuple(one.channel for one in sets if one.channel != "any"))
-            _print_all((map(screen.text, part.frames), are_there) for part, are_there in chosen.portions())
+            _print_all((chosen.marked(map(screen.text, part.frames)), there) for part, there in chosen.portions())
             tell_faults(log)
     if chosen.errors_hidden:
         print(f"{log.name}: error frames not shown: {chosen.errors_hidden}; -e shows them", file=sys.stderr)
@@ -87,17 +99,28 @@ def run(args: argparse.Namespace) -> int:
 class _Chosen:
     """The frames that pass; error frames that nobody asked about are counted."""
 
-    def __init__(self, log: Log, sets: list[FilterSet], count: int | None) -> None:
+    def __init__(self, log: Log, sets: list[FilterSet], count: int | None, proof: LogProof | None) -> None:
+        """``proof``: where each line is to say whether its frame is sealed."""
         self.log = log
         self.errors_hidden = 0
         self._sets = sets
         self._left = count
+        self._proof = proof
 
     def __iter__(self) -> Iterator[RawFrame]:
         return chain.from_iterable(part.frames for part, _ in self.portions())
 
+    def marked(self, lines: Iterable[str]) -> Iterable[str]:
+        """Lines of a portion's frames as they come, with what their frames' seals are worth."""
+        if self._proof is None:
+            return lines
+        return (line if (mark := self._proof.mark) is None else f"{line}  [{mark.value}]" for line in lines)
+
     def portions(self) -> Iterator[tuple[Portion, bool]]:
         """Some at a time, and whether these are there already, as the log has them."""
+        if self._proof is not None:
+            yield Portion(None, self._passing(self._proof.marked(self.log.one_by_one()))), False
+            return
         if self._left is not None:
             # Who asks for a number of frames gets an answer as soon as they are there.
             yield Portion(None, self._passing(self.log.one_by_one())), False
@@ -144,15 +167,14 @@ def _look(args: argparse.Namespace) -> Look:
     )
 
 
-def _decode(args: argparse.Namespace, chosen: _Chosen) -> None:
+def _decode(args: argparse.Namespace, site: Site | None, chosen: _Chosen) -> None:
     screen = Screen(Look(TimeFormat(args.stamp or "a"), colour=args.colour, errors=True))
     lines: DbcLines | MessageLines
     if args.dbc is not None:
         lines = DbcLines(_read_dbc(args.dbc), screen)
     else:
-        site = site_of(args)
         lines = MessageLines(site, codecs_for(site), screen)
-    _print_all((lines.of(portion), are_there) for portion, are_there in chosen.portions())
+    _print_all((chosen.marked(lines.of(portion)), are_there) for portion, are_there in chosen.portions())
     tell_faults(chosen.log)
     for line in lines.report():
         print(f"{chosen.log.name}: {line}", file=sys.stderr)

@@ -275,6 +275,8 @@ function machineLines() {
   if (told.holds?.length) lines.push(`holds ${told.holds.map(([track, index]) => `p(${track},${index})`).join(" ")}`);
   for (const [us, words] of told.told ?? []) lines.push(us === null ? words : `${clock(us)}: ${words}`);
   for (const [track, from, to, begin, end] of told.plan ?? []) lines.push(`${clock(begin)} to ${clock(end)}: ${track >= 128 ? "lift or spur" : "floor"} ${track}, ${from} to ${to}`);
+  const seals = Object.entries(told.seals ?? {}).map(([mark, count]) => `${count} ${mark}`);
+  if (seals.length) lines.push(`frames: ${seals.join("; ")}`);
   if (told.desk) lines.push(`the desk shows: ${told.desk}`);
   if (told.doors) lines.push(`street door ${told.doors.input}, alley door ${told.doors.output}, light ${told.doors.light}`);
   const task = snapshot.tasks.find((one) => one.owner === machine.name);
