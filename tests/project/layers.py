@@ -248,6 +248,7 @@ LAYERS: dict[str, Layer] = {
             *("onboard.seal.keys", "onboard.wire"),
         )
     ),
+    "onboard.gateway.roles_file": Layer((*CORE_TYPES, "onboard.config", "onboard.gateway")),
     "onboard.gateway.options": Layer((*CORE_TYPES, "onboard.bounded_file", "onboard.gateway", "onboard.io")),
     "onboard": Layer(
         (
