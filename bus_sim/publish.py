@@ -16,11 +16,15 @@ from bus_sim.outside import Served
 from bus_sim.run import FLEET
 from onboard.core.site import Site
 from onboard.gateway.options import plain_warning, watch_lines
+from onboard.gateway.roles import Role
 from onboard.gateway.settings import GatewaySettings
 from onboard.io.broker_address import BrokerAddress, is_mqtt_installed, parse_broker
 
 #: The gateway's node-ID: it takes orders too.
 NODE = 251
+#: Who may order everything of a run, on the topic of this name.
+DEMO = "demo"
+_ROLES = {DEMO: Role(frozenset(), frozenset())}
 #: What a process may take to start or to end, s of the loop.
 PATIENCE_S = 10.0
 
@@ -61,7 +65,7 @@ class Publishing:
             await self.__aexit__()
             raise
         warning = [f"warning: --mqtt {told}"] if (told := plain_warning(address)) else []
-        for line in (*warning, *watch_lines(address, self._site, GatewaySettings(node_id=NODE))):
+        for line in (*warning, *watch_lines(address, self._site, GatewaySettings(node_id=NODE, roles=_ROLES))):
             self._console.print(line, highlight=False, soft_wrap=True)
 
     async def __aexit__(self, *_: object) -> None:
@@ -95,9 +99,10 @@ class Publishing:
 
     async def _start_gateway(self, address: BrokerAddress) -> None:
         (Path(self._folder.name) / "site.toml").write_text(self._site_text, encoding="utf-8")
+        (Path(self._folder.name) / "roles.toml").write_text(f"[{DEMO}]\n", encoding="utf-8")
         words = ["-m", "onboard", "gateway", "-i", "socketcand-asyncio", "-c", FLEET, "--bus-kwargs"]
         words += [f"{key}={value}" for key, value in self._served.arguments.items()]
-        words += ["--site", "site.toml", "--orders", str(NODE)]
+        words += ["--site", "site.toml", "--orders", str(NODE), "--roles", "roles.toml"]
         await self._start("gateway", sys.executable, *words, "--mqtt", self._url or str(address))
 
     async def _start(self, name: str, *words: str) -> Process:

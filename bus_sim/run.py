@@ -6,6 +6,7 @@ Same seed, same options: the same candump log, byte for byte.
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from hashlib import blake2s
 from typing import Any, Generic, Protocol, TypeVar
 
 from bus_sim.can.faults import InjectedFault
@@ -28,9 +29,10 @@ from onboard.core.site import Machine, Site, journal_owner
 from onboard.holon.holon import Holon
 from onboard.ports.bus import Bus
 from onboard.systems.contract import codecs_for
-from onboard.systems.registry import compaction_for, condition_for, factory_for
+from onboard.systems.registry import compaction_for, condition_for, factory_for, with_secrets
 from onboard.trace.candump import CandumpWriter
 from onboard.wire.decoder import Decoder
+from onboard.wire.untold import untold
 
 #: The fleet bus in a log and on the served socket.
 FLEET = "fleet"
@@ -108,6 +110,8 @@ class BusRun(Generic[PlantT]):
 
     def __post_init__(self) -> None:
         self.codecs = codecs_for(self.site)
+        #: What machines of a kind share; drawn from the seed.
+        self.secret = blake2s(f"secret:{self.options.seed}".encode()).digest()
         self.seals = SimulatedSeals(self.site, self.options.seed, self.codecs.fleet.decode_part)
 
     def start(self) -> None:
@@ -125,7 +129,7 @@ class BusRun(Generic[PlantT]):
         holon = self.holon_class(
             self.site,
             machine,
-            self.factories(self.site, machine.kind),
+            with_secrets(self.factories(self.site, machine.kind), (self.secret,)),
             boot=next_boot(entries),
             entries=entries,
             journal=condition_for(self.site, journal.condition, entries, journal.name),
@@ -217,7 +221,7 @@ class BusRun(Generic[PlantT]):
     def _device_tap(self, name: str) -> Tap:
         def on_device(frame: Frame, time_us: int, _: str) -> None:
             assert self.writer is not None
-            self.writer.write(self.options.epoch_us + time_us, name, frame)
+            self.writer.write(self.options.epoch_us + time_us, name, untold(frame))
 
         return on_device
 

@@ -23,6 +23,7 @@ from onboard.io.broker_address import is_mqtt_installed
 from onboard.io.console import ConsoleTelemetry, ManyTelemetry
 from onboard.io.endings import ExitStatus
 from onboard.io.journal import FileJournal
+from onboard.io.kept_secrets import SecretsFileError, kept_secrets, secrets_path
 from onboard.io.networkd import write_network_files
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings
 from onboard.io.seal_lives import SealLivesError
@@ -34,7 +35,8 @@ from onboard.ports.bus import Bus
 from onboard.ports.telemetry import Telemetry
 from onboard.seal.keys import Keys
 from onboard.systems.contract import codecs_for
-from onboard.systems.registry import compaction_for, condition_for, factory_for, system_of
+from onboard.systems.registry import compaction_for, condition_for, factory_for, system_of, with_secrets
+from onboard.systems.system import WithSecrets
 from onboard.ways.effort import SLICE_STEPS, Searching
 from onboard.web.address import is_installed as is_web_installed
 from onboard.wire.codec import Codec
@@ -74,7 +76,7 @@ examples:
   onboard operate status -i socketcan -c can0 --site site.toml
       who stands and why; stop, go, block, clear, hold, release; see onboard operate --help
   onboard keys make site.toml
-      keys for a site with seals (docs/seals.md); see onboard keys --help
+      keys for a site with seals (docs/seals.md), and for tickets; see onboard keys --help
 """
 
 
@@ -119,9 +121,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ConfigError as error:
         print(error, file=sys.stderr)
         return 2
-    if config.machine.kind not in system_of(config.site).factories:
-        what = f"a {config.machine.kind.name} of a {config.site.system} has no controller yet"
-        print(f"{args.machine}: {config.machine.name}: {what}; name a machine of another site", file=sys.stderr)
+    if unfit := _unfit(config, fleet_settings):
+        print(f"{args.machine}: {config.machine.name}: {unfit}", file=sys.stderr)
         return 2
     if args.check:
         site = config.site
@@ -133,14 +134,41 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         keys = machine_keys(journal, config.site, config.machine.node_id)
         gateway = _beside(args, config) if args.mqtt is not None else None
-        return asyncio.run(run(config, fleet_settings, journal, gateway, keys))
-    except (ConfigError, BusOpenError, BrokerError, GatewayError, SealLivesError) as error:
+        secrets = _secrets(config, journal)
+        return asyncio.run(run(config, fleet_settings, journal, gateway, keys, secrets))
+    except (ConfigError, BusOpenError, BrokerError, GatewayError, SealLivesError, SecretsFileError) as error:
         print(error if isinstance(error, ConfigError) else f"onboard: {error}", file=sys.stderr)
         return 2
     except OSError as error:
         remedy = "name another folder with --journal, or mend this one"
         print(f"onboard: journal {journal}: {error.strerror or error}; {remedy}", file=sys.stderr)
         return ExitStatus.MISTAKE if error.errno in _MISTAKES else ExitStatus.COMES_BACK
+
+
+def _keeps_secrets(config: MachineConfig) -> bool:
+    return isinstance(factory_for(config.site, config.machine.kind), WithSecrets)
+
+
+def _unfit(config: MachineConfig, fleet_settings: BusSettings) -> str:
+    """Why the machine cannot be run as its file says, with the remedy; empty where it can."""
+    if config.machine.kind not in system_of(config.site).factories:
+        what = f"a {config.machine.kind.name} of a {config.site.system} has no controller yet"
+        return f"{what}; name a machine of another site"
+    if _keeps_secrets(config) and BusSettings.of(config.device_bus) == fleet_settings:
+        return "its tickets would be read on the fleet bus; give its devices a bus of their own, [device_bus]"
+    return ""
+
+
+def _secrets(config: MachineConfig, journal: Path) -> tuple[bytes, ...]:
+    """What its kind keeps. A new one is told: other desks do not know it. Raises ``SecretsFileError``."""
+    if not _keeps_secrets(config):
+        return ()
+    path = secrets_path(journal)
+    kept = kept_secrets(path)
+    if kept.is_new:
+        what = "a new secret for tickets: those printed before open nothing, and other desks know none of this one"
+        print(f"onboard: {path}: {what}; onboard keys tickets makes one file for all desks", file=sys.stderr)
+    return kept.secrets
 
 
 def _beside(args: argparse.Namespace, config: MachineConfig) -> GatewayMaker:
@@ -215,8 +243,12 @@ async def run(
     journal_directory: Path,
     gateway: GatewayMaker | None = None,
     keys: Keys | None = None,
+    secrets: tuple[bytes, ...] = (),
 ) -> int:
-    """Run until stopped; the exit status (``ExitStatus``). ``keys`` where the site has seals."""
+    """Run until stopped; the exit status (``ExitStatus``).
+
+    ``keys`` where the site has seals; ``secrets`` where the machine's kind keeps any (``WithSecrets``).
+    """
     life = ControllerLife(config.machine.name, journal_directory)
     with life.ended_by_signals():
         journal = FileJournal(journal_directory, journal_owner(config.site, config.machine))
@@ -225,7 +257,7 @@ async def run(
         holon = Holon(
             config.site,
             config.machine,
-            factory_for(config.site, config.machine.kind),
+            with_secrets(factory_for(config.site, config.machine.kind), secrets),
             boot=boot,
             entries=entries,
             journal=condition_for(config.site, journal.condition, entries, journal.name),

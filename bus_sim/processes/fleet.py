@@ -19,6 +19,9 @@ from bus_sim.run import BusRun
 from bus_sim.seals import SimulatedSeals
 from onboard.config.keys import key_path, key_text
 from onboard.core.site import Site
+from onboard.io.kept_secrets import secrets_path
+from onboard.systems.registry import factory_for
+from onboard.systems.system import WithSecrets
 
 #: How long a process may take to end once it was told to, s: two closings of a connection and a journal write.
 GRACE_S = 5.0
@@ -162,10 +165,20 @@ class ProcessFleet:
                 (self._directory / f"{name}.toml").write_text(machine_file(name, served.arguments), encoding="utf-8")
             if self._simulation.seals.are_used:
                 write_keys(self._directory, self._simulation.site, self._simulation.seals, self._spans)
+            self._write_secrets()
         except OSError as error:
             raise ProcessesError(
                 f"{error.filename}: cannot be written ({error.strerror}); name another directory"
             ) from error
+
+    def _write_secrets(self) -> None:
+        """One for all desks of the run, as a person would put it there: a ticket is good at each."""
+        site = self._simulation.site
+        for name in self._spans:
+            if isinstance(factory_for(site, site.machine(name).kind), WithSecrets):
+                path = secrets_path(self._directory / f"journal-{name}")
+                path.touch(mode=0o600)
+                path.write_text(f"{self._simulation.secret.hex()}\n", encoding="ascii")
 
 
 def write_keys(directory: Path, site: Site, seals: SimulatedSeals, names: Collection[str]) -> None:

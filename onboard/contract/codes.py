@@ -245,6 +245,7 @@ class DeskText(IntEnum):
     LEAVE_COMPARTMENT = 7
     OUT_OF_ORDER = 8
     NO_CHARGING = 9
+    TOO_MANY_TRIES = 10
 
 
 class DriveMode(IntEnum):

@@ -81,7 +81,11 @@ class LightOrder(Message):
 
 @message(frozen=True, slots=True)
 class DeskOrder(Message):
-    """What the desk shows; with TAKE_TICKET it prints the ticket of the car."""
+    """What the desk shows; with TAKE_TICKET it prints the ticket of the car.
+
+    Its number, and the code of both TicketPrint with this sequence. Without both it does nothing and waits for a
+    repeat.
+    """
 
     #: Grows by one with every order. 0 to 255.
     sequence: int
@@ -99,6 +103,21 @@ class StateRequest(Message):
     Each answers at once with its state words. Sent when a controller begins a life, and every second while it
     starts; a device that does not know it tells the same on change and at its slow repeats.
     """
+
+
+@message(frozen=True, slots=True)
+class TicketPrint(Message):
+    """Half of the code of the ticket that the DeskOrder of this sequence prints.
+
+    Whoever knows car and code gets the car: it is on this bus and on paper, and no log keeps it.
+    """
+
+    #: That of the DeskOrder. 0 to 255.
+    sequence: int
+    #: 0: the low 40 bits, 1: the high 40 bits. 0 to 1.
+    half: int
+    #: The half. 0 to 1099511627775.
+    code: int
 
 
 @message(frozen=True, slots=True)
@@ -157,7 +176,10 @@ class DoorState(Message):
 
 @message(frozen=True, slots=True)
 class DeskEvent(Message):
-    """A customer's act at the desk; sent three times 50 ms apart, as one lost frame must not lose a customer."""
+    """A customer's act at the desk; sent three times 50 ms apart, as one lost frame must not lose a customer.
+
+    TICKET and CANCEL come with the two TicketRead of what was read, each time.
+    """
 
     #: Grows by one with every act; repeats have the same. 0 to 255.
     sequence: int
@@ -199,3 +221,15 @@ class PlatformState(Message):
     crossing: bool
     #: Weight on the platform beyond the empty carrier. 0 to 4095 kg.
     load_kg: int
+
+
+@message(frozen=True, slots=True)
+class TicketRead(Message):
+    """Half of the code of the ticket of a DeskEvent; no log keeps it."""
+
+    #: That of the DeskEvent. 0 to 255.
+    sequence: int
+    #: 0: the low 40 bits, 1: the high 40 bits. 0 to 1.
+    half: int
+    #: The half, as it was read. 0 to 1099511627775.
+    code: int

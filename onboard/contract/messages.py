@@ -18,6 +18,8 @@ from onboard.contract.device import (
     ShuttleOrder,
     ShuttleState,
     StateRequest,
+    TicketPrint,
+    TicketRead,
 )
 from onboard.contract.plans import (
     Blocked,
@@ -104,6 +106,8 @@ __all__ = [
     "SyncDone",
     "SyncRequest",
     "TaskReport",
+    "TicketPrint",
+    "TicketRead",
     "TokenAssigned",
     "TokenDispute",
     "TokenGiven",

@@ -7,6 +7,7 @@ from onboard.contract.codes import KindCode
 from onboard.contract.messages import Message, Reference, SyncRequest
 from onboard.core.site import Site
 from onboard.gateway.order import GatewayOrder, OrderRequest
+from onboard.gateway.roles import Role
 from onboard.history.history import Fact
 
 #: After its start a gateway asks all what they vouch for, and knows the cars so much later, us: answers to one question
@@ -41,6 +42,9 @@ class BusOrders(Protocol):
     def transport(self, body: dict[str, Any]) -> OrderRequest:
         """What a transport asks of the bus. Raises ``RefusedError``."""
 
+    def check_role(self, request: OrderRequest, role: Role | None) -> None:
+        """Raises ``RefusedError`` where what a transport asks is not its giver's to ask; ``role`` None: it has none."""
+
     def visit(self, node: int, body: dict[str, Any], since: tuple[str, int] | None = None) -> OrderRequest:
         """What a VDA 5050 order asks of a robot; an update's from ``since`` on. Raises ``RefusedError``."""
 
@@ -68,6 +72,9 @@ class NoBusOrders:
     def transport(self, body: dict[str, Any]) -> OrderRequest:
         """Raises ``RefusedError``: this system takes no transports from outside."""
         raise RefusedError("UNSUPPORTED", f"a {self._site.system} takes no transports from outside its desks")
+
+    def check_role(self, request: OrderRequest, role: Role | None) -> None:
+        """Nothing here is anybody's own: whoever the broker lets write may order."""
 
     def visit(self, node: int, body: dict[str, Any], since: tuple[str, int] | None = None) -> OrderRequest:
         """Raises ``RefusedError``: machines of this system take no orders by name."""

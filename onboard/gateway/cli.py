@@ -15,6 +15,7 @@ from onboard.core.site import Machine, Site
 from onboard.gateway.gateway import Gateway
 from onboard.gateway.options import add_mqtt_arguments, broker_address, gateway_settings, plain_warning, watch_lines
 from onboard.gateway.reports import Reports
+from onboard.gateway.roles_file import load_roles
 from onboard.gateway.settings import GatewayError, GatewaySettings, level
 from onboard.io.broker_address import BrokerAddress
 from onboard.io.journal import FileJournal, JournalDamagedError
@@ -43,7 +44,7 @@ exit status: 0 stopped by a person; 1 the bus is gone or not there yet; 2 a mist
 examples:
   onboard gateway -i socketcan -c can0 --site mysite.toml --mqtt mqtt://127.0.0.1
       listens to a real bus; terminal reports are kept in ./spool until the broker has them
-  onboard gateway -i socketcan -c can0 --site mysite.toml --mqtt mqtt://127.0.0.1 --orders 251
+  onboard gateway -i socketcan -c can0 --site mysite.toml --mqtt mqtt://127.0.0.1 --orders 251 --roles roles.toml
       the same, and takes orders (docs/mqtt.md)
   onboard gateway -i socketcand-asyncio -c fleet --bus-kwargs host=127.0.0.1 port=29536 --site mysite.toml \\
           --mqtt mqtts://broker.example --mqtt-ca ca.pem --mqtt-cert gateway.pem --mqtt-key gateway.key --vda5050 3.0
@@ -74,6 +75,7 @@ def build_parser() -> argparse.ArgumentParser:
         metavar="NODE",
         help="take orders too, and speak on the bus under this node-ID, 251 to 255, that nobody else there has",
     )
+    parser.add_argument("--roles", type=Path, metavar="FILE", help="with --orders: who may fetch what (docs/mqtt.md)")
     parser.add_argument("--keys", type=Path, metavar="FILE", help="with --orders: its keys, where the site has seals")
     add_mqtt_arguments(parser, required=True)
     return parser
@@ -84,7 +86,8 @@ def main(argv: Sequence[str]) -> int:
     args = parse_with_bus(build_parser(), argv)
     try:
         site = load_site(args.site)
-        settings = gateway_settings(args, node_id=args.orders)
+        roles = load_roles(args.roles, site) if args.roles is not None else {}
+        settings = gateway_settings(args, node_id=args.orders, roles=roles)
         address = _broker(args)
         bus = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
         keys = None if args.orders is None else tool_keys(args.keys, site, args.orders)

@@ -54,10 +54,12 @@ class GatewayDesk:
         self._site, self._publisher, self._reports, self._send, self._post = site, publisher, reports, send, post
         settings, fleet = publisher.settings, publisher.fleet
         assert settings.node_id is not None, "who only listens takes no orders"
-        self.inbox = Inbox(settings.dialect, publisher.root, settings.manufacturer)
+        self.inbox = Inbox(settings.dialect, publisher.root, settings.manufacturer, settings.roles)
         bus_orders = edge_of(site).bus_orders(fleet.picture.view, fleet.place)
         seed = (settings.epoch_us + now_us) // 1_000_000
-        self.orders = OrderBook(site, bus_orders, settings.node_id, reports.others, now_us=now_us, seed=seed)
+        self.orders = OrderBook(
+            site, bus_orders, settings.node_id, reports.others, settings.roles, now_us=now_us, seed=seed
+        )
         reports.keep = self.orders.entries
         self.pauses = Pauses(settings.node_id, seed)
         self._no_pause = bus_orders.no_pause
@@ -200,6 +202,8 @@ class GatewayDesk:
         if order.task is not None:
             stands = self._publisher.fleet.task(order.task, now_us)
             body |= {key: stands[key] for key in ("task", "car", "promised") if key in stands}
+        if order.giver:
+            body["orderedBy"] = order.giver
         if order.owner:
             body["owner"] = self._publisher.fleet.picture.view.name(order.owner)
         if order.before_us is not None:
@@ -219,6 +223,7 @@ class GatewayDesk:
             "reason": incoming.reason,
         }
         body |= {"path": incoming.path, "why": incoming.why}
+        body |= {"orderedBy": incoming.giver} if incoming.giver else {}
         self._post([Outgoing(FLEET, self._publisher.publication(f"order/{level(name)}", body, qos=1))])
         node = next((one.node_id for one in self._site.machines.values() if one.name == incoming.serial), None)
         if node is not None:

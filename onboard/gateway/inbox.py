@@ -1,8 +1,10 @@
 """What arrives as an order: bounded, parsed, checked; refused with a path and a reason, or handed on. Never raises."""
 
 import json
+import re
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from typing import Any
 
 from onboard.gateway.dialect import Dialect
@@ -17,6 +19,8 @@ from onboard.ports.broker import Publication
 BURST, RATE_US = 20, 1_000_000
 #: Objects and lists within each other: an order of VDA 5050 has 7, and what stands in a parameter of an action.
 MOST_DEPTH = 32
+#: A name that gives orders, as the level of a topic.
+GIVER = re.compile(r"[A-Za-z0-9_.:-]{1,64}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +36,8 @@ class Incoming:
     reason: str = ""
     path: str = ""
     why: str = ""
+    #: Who gave it, by the topic; empty where that names nobody.
+    giver: str = ""
 
 
 @dataclass(slots=True)
@@ -55,19 +61,25 @@ class _Allowance:
 class Inbox:
     """Judges publications one after another. ``refused`` counts by reason."""
 
-    def __init__(self, dialect: Dialect, root: str, manufacturer: str) -> None:
-        """``root`` is PREFIX/SITE."""
+    def __init__(self, dialect: Dialect, root: str, manufacturer: str, givers: Collection[str] = ()) -> None:
+        """``root`` is PREFIX/SITE; ``givers`` have an allowance of their own each."""
         self.refused: Counter[str] = Counter()
         self._dialect = dialect
         self._transport = f"{root}/orders"
         self._machines = f"{dialect.topic_root}/{manufacturer}/"
-        #: By the machine whose instant actions they are; those of all orders are under no name.
+        self._givers = givers
+        #: By the machine whose instant actions they are, or the giver; those of all other orders are under no name.
         self._allowances: dict[str, _Allowance] = {}
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """What is to be subscribed to."""
-        return (self._transport, f"{self._machines}+/order", f"{self._machines}+/instantActions")
+        return (
+            self._transport,
+            f"{self._transport}/+",
+            f"{self._machines}+/order",
+            f"{self._machines}+/instantActions",
+        )
 
     def is_action(self, topic: str) -> bool:
         """Whether a topic is that of instant actions."""
@@ -78,7 +90,7 @@ class Inbox:
         kind, serial = self._kind(publication.topic)
         if not kind:
             return None
-        found = self._judge(kind, serial, publication, now_us)
+        found = replace(self._judge(kind, serial, publication, now_us), giver=self._giver(publication.topic))
         if found.reason:
             self.refused[found.reason] += 1
         return found
@@ -86,7 +98,7 @@ class Inbox:
     def refuse(self, order: Incoming, reason: str, why: str, path: str = "$") -> Incoming:
         """The same order, refused for what it means; counted."""
         self.refused[reason] += 1
-        return Incoming(order.kind, order.serial, order.body, reason, path, why)
+        return replace(order, reason=reason, path=path, why=why)
 
     def _judge(self, kind: str, serial: str, publication: Publication, now_us: int) -> Incoming:
         if len(publication.payload) > MOST_BYTES:
@@ -111,13 +123,18 @@ class Inbox:
         if publication.retain:
             # Kept by the broker from who knows when: an order is not to be carried out at every start.
             return Incoming(kind, serial, named, "RETAINED", "$", "an order must not be retained")
-        whose = serial if kind == "instantActions" else ""
+        giver = self._giver(publication.topic)
+        whose = f"orders/{giver}" if giver in self._givers else serial if kind == "instantActions" else ""
         if not self._allowances.setdefault(whose, _Allowance(now_us)).take(now_us):
             return Incoming(kind, serial, named, "TOO_FAST", "$", f"{BURST} at once and one a second are taken")
         return Incoming(kind, serial, named)
 
+    def _giver(self, topic: str) -> str:
+        name = topic.removeprefix(f"{self._transport}/")
+        return name if name != topic and GIVER.fullmatch(name) else ""
+
     def _kind(self, topic: str) -> tuple[str, str]:
-        if topic == self._transport:
+        if topic == self._transport or self._giver(topic):
             return TRANSPORT, ""
         serial, _, name = topic.removeprefix(self._machines).partition("/")
         is_order = topic.startswith(self._machines) and name in ("order", "instantActions")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from onboard.bounded_file import read_bounded
 from onboard.core.site import Site
+from onboard.gateway.roles import Roles
 from onboard.gateway.settings import GatewayError, GatewaySettings, level
 from onboard.io.broker_address import BrokerAddress, is_loopback, parse_broker
 
@@ -62,11 +63,19 @@ def plain_warning(address: BrokerAddress) -> str:
 
 
 def gateway_settings(
-    args: argparse.Namespace, serials: frozenset[str] = frozenset(), node_id: int | None = None
+    args: argparse.Namespace,
+    serials: frozenset[str] = frozenset(),
+    node_id: int | None = None,
+    roles: Roles | None = None,
 ) -> GatewaySettings:
     """What is published. Raises ``GatewayError``."""
     return GatewaySettings(
-        version=args.vda5050, manufacturer=args.manufacturer, prefix=args.prefix, serials=serials, node_id=node_id
+        version=args.vda5050,
+        manufacturer=args.manufacturer,
+        prefix=args.prefix,
+        serials=serials,
+        node_id=node_id,
+        roles=roles or {},
     )
 
 
@@ -91,7 +100,7 @@ def watch_lines(address: BrokerAddress, site: Site, settings: GatewaySettings) -
     return [
         *lines,
         f"it takes orders as node {settings.node_id}; for a car park:",
-        f"  {said} -q 1 -t {root}/orders -m '{order}'",
+        f"  {said} -q 1 -t {root}/orders/{next(iter(settings.roles), 'NAME')} -m '{order}'",
     ]
 
 

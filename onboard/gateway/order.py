@@ -56,6 +56,8 @@ class GatewayOrder:
     ahead: tuple[tuple[int, ...], ...] = ()
     #: It was taken back while the robot had it: the robot is told until it says so.
     is_cancelled: bool = False
+    #: Who gave it, as the broker lets nobody else say; empty where nobody is named.
+    giver: str = ""
 
     def entry(self) -> Entry:
         """The whole order, for the journal; the newest record of a name counts."""
@@ -83,6 +85,7 @@ class GatewayOrder:
             task=self.task,
             before_us=self.before_us,
             charging=request.charging,
+            giver=self.giver,
         ).entry
 
 
@@ -113,6 +116,7 @@ def order_of(record: WishRecord) -> GatewayOrder:
         record.said,
         ahead=tuple(_numbers(stops) for stops in record.ahead.split(",")) if record.ahead else (),
         is_cancelled=record.cancelled,
+        giver=record.giver,
     )
 
 

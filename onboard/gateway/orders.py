@@ -20,6 +20,7 @@ from onboard.gateway.bus_orders import LISTEN_US, BusOrders, RefusedError, is_ro
 from onboard.gateway.inbox import Incoming
 from onboard.gateway.order import RANK, GatewayOrder, OrderRequest, order_of, same_content, with_number
 from onboard.gateway.records import OrderPhase, WishRecord
+from onboard.gateway.roles import Roles
 from onboard.gateway.schema import TRANSPORT
 from onboard.history.history import Fact
 from onboard.history.tasks import TaskTold
@@ -64,13 +65,14 @@ class OrderBook:
         bus_orders: BusOrders,
         node_id: int,
         entries: Iterable[Entry],
+        roles: Roles | None = None,
         *,
         now_us: int = 0,
         seed: int = 0,
     ) -> None:
         """``seed`` (16 bits) begins the numbers of visit lists where the journal is empty: another than last time."""
         self.book: OrderedDict[str, GatewayOrder] = OrderedDict()
-        self._site, self._bus_orders, self._node_id = site, bus_orders, node_id
+        self._site, self._bus_orders, self._node_id, self._roles = site, bus_orders, node_id, roles or {}
         self._number = seed & 0xFFFF
         self._asked = False
         self._ready_us = now_us + LISTEN_US
@@ -110,15 +112,14 @@ class OrderBook:
         try:
             self._take(incoming, wall_us, now_us, outcome)
         except RefusedError as refused:
-            outcome.refused.append(
-                Incoming(incoming.kind, incoming.serial, incoming.body, refused.reason, refused.path, refused.why)
-            )
+            outcome.refused.append(replace(incoming, reason=refused.reason, path=refused.path, why=refused.why))
         return outcome
 
     def _take(self, incoming: Incoming, wall_us: int, now_us: int, outcome: OrderEffects) -> None:
         body = incoming.body
         name, update = name_of(incoming), int(body.get("orderUpdateId", 0))
-        content = same_content(incoming.kind, _essence(body))
+        # What one giver has named is not another's to ask after; orders without a giver are as they were.
+        content = same_content(incoming.kind, _essence(body), *([incoming.giver] if incoming.giver else []))
         known = self.book.get(name)
         if known is not None:
             if known.update != update:
@@ -135,7 +136,7 @@ class OrderBook:
         before_us = _moment_us(body.get("before"))
         if before_us is not None and before_us <= wall_us:
             raise RefusedError("TOO_LATE", "is past", "$.before")
-        order = GatewayOrder(name, self._request(incoming), content, before_us, update)
+        order = GatewayOrder(name, self._request(incoming), content, before_us, update, giver=incoming.giver)
         order.due_us = max(now_us, self._ready_us)
         self.book[name] = order
         outcome.changed.append(order)
@@ -171,7 +172,9 @@ class OrderBook:
 
     def _request(self, incoming: Incoming) -> OrderRequest:
         if incoming.kind == TRANSPORT:
-            return self._numbered(self._bus_orders.transport(incoming.body))
+            request = self._bus_orders.transport(incoming.body)
+            self._bus_orders.check_role(request, self._roles.get(incoming.giver))
+            return self._numbered(request)
         node = next((one.node_id for one in self._site.machines.values() if one.name == incoming.serial), 0)
         if not is_robot(self._site, node):
             raise RefusedError("UNKNOWN_MACHINE", "no machine of this name travels", "$.serialNumber")

@@ -55,6 +55,7 @@ class WishRecord(JournalRecord):
     task: Reference | None = None
     before_us: int | None = None
     charging: bool = False
+    giver: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,10 +1,11 @@
 """What a person chooses about a gateway's topics and rates."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from onboard.contract.constants import MAX_NODE_ID
 from onboard.gateway.dialect import DIALECTS, Dialect
+from onboard.gateway.roles import Roles
 
 #: Characters of a topic level: those of a serial number in VDA 5050 2.1, section 6.4.
 _LEVEL = re.compile(r"[A-Za-z0-9_.:-]+")
@@ -20,7 +21,7 @@ class GatewaySettings:
 
     ``epoch_us`` is the wall time (us since 1970) at loop time 0, for the time stamps. ``serials`` names the machines
     that are told of; empty for all of the site. ``node_id`` is the gateway's own on the bus, 251 to 255 (core/codes),
-    where it takes orders; None where it only listens.
+    where it takes orders; None where it only listens. ``roles`` are those who may have something fetched.
     """
 
     version: str = "2.1"
@@ -29,6 +30,7 @@ class GatewaySettings:
     epoch_us: int = 0
     serials: frozenset[str] = frozenset()
     node_id: int | None = None
+    roles: Roles = field(default_factory=dict)
     #: A state at least so often (VDA 5050 2.1, section 6.10: 30 s).
     state_us: int = 30_000_000
     #: Two states of one machine are so far apart at least; changes between them are told together.

@@ -36,10 +36,7 @@ class KeyFolder:
         self._folder, self._site = folder, site
         names = {node: machine.name for node, machine in site.machines.items()}
         self._names = names | {tool: f"tool-{tool}" for tool in sorted(tools)}
-        whole = folder.resolve()
-        checkout = next((one for one in (whole, *whole.parents) if any((one / mark).exists() for mark in _MARKS)), None)
-        if checkout is not None:
-            raise KeysError(f"{folder}: is inside the checkout {checkout}; name a folder outside with --folder")
+        refuse_checkout(folder)
 
     def renew(self, names: Collection[str]) -> None:
         """Forget the identities of these nodes, and the group key, which they knew too."""
@@ -63,7 +60,7 @@ class KeyFolder:
             own = {other: pairs[min(node, other), max(node, other)] for other in self._names if other != node}
             keys = Keys(node, bytes.fromhex(group.decode()), own, now_s)
             file, print_ = self._folder / f"{name}.keys", fingerprint(public[node])
-            _write(file, key_text(keys, self._site.name, name, print_).encode())
+            write_private(file, key_text(keys, self._site.name, name, print_).encode())
             made.append(MadeKeys(name, node, print_, file))
         return made
 
@@ -80,12 +77,21 @@ class KeyFolder:
     def _kept(self, name: str, make: Callable[[], bytes]) -> bytes:
         path = self._folder / name
         if not path.exists():
-            _write(path, make())
+            write_private(path, make())
         return path.read_bytes().strip()
 
 
-def _write(path: Path, content: bytes) -> None:
+def write_private(path: Path, content: bytes) -> None:
+    """A file of mode 0600, whole or as it was. Raises ``OSError``."""
     fresh = path.with_name(f"{path.name}.new")
     with os.fdopen(os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "wb") as file:
         file.write(content)
     fresh.replace(path)
+
+
+def refuse_checkout(folder: Path) -> None:
+    """Raises ``KeysError`` for a folder from which keys would get into somebody's commits."""
+    whole = folder.resolve()
+    checkout = next((one for one in (whole, *whole.parents) if any((one / mark).exists() for mark in _MARKS)), None)
+    if checkout is not None:
+        raise KeysError(f"{folder}: is inside the checkout {checkout}; name a folder outside with --folder")

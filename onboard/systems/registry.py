@@ -16,7 +16,7 @@ from onboard.core.journal_state import JournalCondition, JournalState
 from onboard.core.records import CORE_RECORDS
 from onboard.core.site import Site
 from onboard.systems.folders import Folders
-from onboard.systems.system import System
+from onboard.systems.system import System, WithSecrets
 from onboard.work.compaction import compact
 
 #: What a site file is that does not say: those of version 0.1 had no other system.
@@ -73,6 +73,11 @@ def system_of(site: Site) -> System:
 def factory_for(site: Site, kind: KindCode) -> BehaviourFactory:
     """The factory of one kind of machine. Raises ``KeyError`` for a kind that this image cannot drive there."""
     return system_of(site).factories[kind]
+
+
+def with_secrets(factory: BehaviourFactory, secrets: tuple[bytes, ...]) -> BehaviourFactory:
+    """The factory for these secrets, where its kind keeps any (``WithSecrets``)."""
+    return factory.with_secrets(secrets) if isinstance(factory, WithSecrets) else factory
 
 
 def compaction_for(site: Site) -> Callable[[list[Entry]], list[Entry]]:

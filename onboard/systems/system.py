@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 from onboard.contract.codes import KindCode
 from onboard.core.behaviour import BehaviourFactory
@@ -19,3 +20,11 @@ class System:
     name: str
     factories: Mapping[KindCode, BehaviourFactory]
     records: RecordTypes = ()
+
+
+@runtime_checkable
+class WithSecrets(Protocol):
+    """A factory whose machines know what nobody else of the site may: the same for all machines of the kind."""
+
+    def with_secrets(self, secrets: tuple[bytes, ...]) -> BehaviourFactory:
+        """The same for these secrets, 32 bytes each: the newest first, then those that still count for a while."""

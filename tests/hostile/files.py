@@ -76,6 +76,8 @@ def hostile() -> Iterator[Hostile]:
     yield Hostile("scenario: nested 450 times", _SCENARIO, b'[scenario]\nsite = "small"\nseed = ' + nested, ".toml")
     yield Hostile("keys: nested arrays", _KEYS, b"x = " + DEEP, ".keys")
     yield Hostile("keys: zeros without end", _KEYS, ZERO)
+    yield Hostile("roles: nested arrays", _GATEWAY + " --orders 251 --roles {}", b"x = " + DEEP, ".toml")
+    yield Hostile("roles: zeros without end", _GATEWAY + " --orders 251 --roles {}", ZERO)
     # Machine files, keys, journals.
     yield Hostile("machine file: nested", _ONBOARD, b"x = " + DEEP, ".toml")
     yield Hostile("machine file: endless", _ONBOARD, ZERO)

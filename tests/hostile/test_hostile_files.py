@@ -37,6 +37,7 @@ READ = {
     "--mqtt-key": "certificate's key",
     "--mqtt-password": "broker's password",
     "--play": "counterexample",
+    "--roles": "roles",
     "--scenario": "scenario",
     "--serve-token": "served bus's token",
     "--sessions": "sessions",

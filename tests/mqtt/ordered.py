@@ -13,6 +13,7 @@ from onboard.contract.messages import Message
 from onboard.core.site import Site
 from onboard.gateway.gateway import Gateway
 from onboard.gateway.reports import Reports
+from onboard.gateway.roles import Role, Roles
 from onboard.gateway.settings import GatewaySettings
 from onboard.ports.broker import Publication
 from onboard.ports.journal import Entry
@@ -52,7 +53,10 @@ class Ordered:
         deaths_s: Sequence[float] = (),
         version: str = "2.1",
         journal: MemoryJournal | None = None,
+        roles: Roles | None = None,
     ) -> None:
+        """``roles`` beside ``desk``, which may order everything."""
+        self._roles = roles or {}
         self.broker = DoubleBroker()
         self.journal = journal if journal is not None else MemoryJournal()
         self.gateways: list[Gateway] = []
@@ -73,7 +77,8 @@ class Ordered:
 
     def _start(self, run: BusRun[Any]) -> None:
         bus = self._bus = run.fleet.attach(f"gateway {len(self.gateways)}", NODE)
-        settings = GatewaySettings(version=self._version, epoch_us=EPOCH_US, node_id=NODE)
+        roles = {"desk": Role(frozenset(run.site.machines), frozenset(run.site.machines)), **self._roles}
+        settings = GatewaySettings(version=self._version, epoch_us=EPOCH_US, node_id=NODE, roles=roles)
         gateway = Gateway(
             run.site, run.codecs.fleet, self.broker, settings, reports=Reports(self.journal), send=bus.send
         )

@@ -73,7 +73,7 @@ def test_one_command_shows_a_site_with_a_broker_of_its_own_and_takes_an_order(tm
             told: Any = json.loads(state.split(" ", 1)[1])
             assert told["lastNodeId"] == "p(2,3)" and told["operatingMode"] == "AUTOMATIC"
             order = '{"id": "A1", "car": "1.99", "to": "IOC1"}'
-            run_tool("mosquitto_pub", *where, "-q", "1", "-t", "onboard/small/orders", "-m", order)
+            run_tool("mosquitto_pub", *where, "-q", "1", "-t", "onboard/small/orders/demo", "-m", order)
             life = lines_until(reader, r"UNKNOWN_TICKET")
             assert any('"phase":"accepted"' in one for one in life)
             site.send_signal(signal.SIGINT)

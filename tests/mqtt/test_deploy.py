@@ -21,8 +21,19 @@ TELEMETRY = {
     *(f"{interface}/{name}" for interface in INTERFACES for name in MACHINE),
 }
 ANSWERS = {"onboard/site/order/7"}
-ORDERS = {"onboard/site/orders", *(f"{one}/{name}" for one in INTERFACES for name in ("order", "instantActions"))}
-OF_ANOTHER = {"uagv/v2/onboard/MR2/state", "onboard/site/log/MR2", "uagv/v2/other/MR1/state", "elsewhere", "$SYS/x"}
+ORDERS = {
+    "onboard/site/orders/dispatcher",
+    *(f"{one}/{name}" for one in INTERFACES for name in ("order", "instantActions")),
+}
+OF_ANOTHER = {
+    "onboard/site/orders",
+    "onboard/site/orders/other",
+    "uagv/v2/onboard/MR2/state",
+    "onboard/site/log/MR2",
+    "uagv/v2/other/MR1/state",
+    "elsewhere",
+    "$SYS/x",
+}
 EVERY = TELEMETRY | ANSWERS | ORDERS | OF_ANOTHER
 #: Who may write and read what.
 MAY_WRITE = {
@@ -75,7 +86,7 @@ async def test_each_role_writes_what_it_may_and_nothing_else(mosquitto: Mosquitt
         for topic in sorted(EVERY):
             await session.publish(Publication(topic, b"x", 1))
     async with mosquitto.broker("dispatcher").session("end", None, ()) as session:
-        await session.publish(Publication("onboard/site/orders", b"last", 1))
+        await session.publish(Publication("onboard/site/orders/dispatcher", b"last", 1))
     assert await witness == MAY_WRITE[role]
 
 
@@ -120,18 +131,18 @@ async def test_a_certificate_of_another_authority_or_none_does_not_get_in(mosqui
 
 async def test_nobody_takes_the_gateways_place_under_its_client_id(mosquitto: Mosquitto) -> None:
     """A viewer under the gateway's id threw it out, and what waited for it was gone."""
-    mine = ("onboard/+/orders",)
+    mine = ("onboard/+/orders/+",)
     async with mosquitto.broker("gateway").session("onboard-site-fleet", None, mine):
         pass
     async with mosquitto.broker("viewer").session("onboard-site-fleet", None, ()) as viewer:
         await viewer.publish(Publication("elsewhere", b"x", 1))
     async with mosquitto.broker("dispatcher").session("onboard-site-fleet", None, ()) as dispatcher:
-        await dispatcher.publish(Publication("onboard/site/orders", b"A1", 1))
+        await dispatcher.publish(Publication("onboard/site/orders/dispatcher", b"A1", 1))
         async with mosquitto.broker("gateway").session("onboard-site-fleet", None, mine) as gateway:
             async with asyncio.timeout(DEADLINE_S):
                 assert (await anext(gateway.incoming())).payload == b"A1", "it waited for the gateway"
             # Both are there still: the broker answers both.
-            await dispatcher.publish(Publication("onboard/site/orders", b"A2", 1))
+            await dispatcher.publish(Publication("onboard/site/orders/dispatcher", b"A2", 1))
             await gateway.publish(Publication("onboard/site/status", b"x", 1))
 
 

@@ -12,7 +12,7 @@ from tests.mqtt.played import MemoryJournal
 from tests.sites import one_floor
 from tests.system.scene import Scene
 
-ORDERS = "onboard/{}/orders"
+ORDERS = "onboard/{}/orders/desk"
 SMALL = ORDERS.format("small")
 FETCH = {"id": "A7", "car": "1.1", "to": "IOC1"}
 
@@ -43,6 +43,7 @@ def test_an_order_becomes_one_task_and_its_life_comes_back(fetched: tuple[Scene,
     assert lives == ["accepted", "called", "awarded", "moving", "done"]
     done = next(one for one in ordered.told("small", "A7") if one["phase"] == "done")
     assert (done["task"], done["car"], done["owner"]) == ("1.2", "1.1", ordered.told("small", "A7")[-1]["owner"])
+    assert {one.get("orderedBy") for one in ordered.told("small", "A7")} == {"desk"}
     assert done["owner"] in ("MR1", "MR2") and done["promised"] > "2026-03-01T06:03:20"
 
 

@@ -12,8 +12,18 @@ from onboard.contract.codes import (
     ShuttleAction,
     Side,
 )
-from onboard.contract.messages import BayState, DeskEvent, DeskOrder, DoorOrder, DoorState, Reference
+from onboard.contract.messages import (
+    BayState,
+    DeskEvent,
+    DeskOrder,
+    DoorOrder,
+    DoorState,
+    Reference,
+    TicketPrint,
+    TicketRead,
+)
 from onboard.core.site import Station
+from onboard.systems.car_park.tickets import Ticket
 from tests.plant.support import CAR, COMPARTMENT, ROBOT, SECOND, Bench
 
 BAY = Station(1, 4, Side.NEAR)
@@ -157,7 +167,8 @@ def test_the_desk_says_each_act_three_times_under_one_sequence() -> None:
     bench = Bench()
     bench.compartments[COMPARTMENT].press_key()
     bench.timers.run_for(SECOND)
-    bench.compartments[COMPARTMENT].insert_ticket(Reference(1, 7))
+    code = 3 << 40 | 5
+    bench.compartments[COMPARTMENT].insert_ticket(Ticket(Reference(1, 7), code))
     bench.timers.run_for(SECOND)
     said = [(t, e.sequence, e.event, e.car) for t, e in bench.links[COMPARTMENT].all(DeskEvent)]
     none, ticket = Reference(0, 0), Reference(1, 7)
@@ -165,14 +176,34 @@ def test_the_desk_says_each_act_three_times_under_one_sequence() -> None:
         *[(time_us, 1, DeskInput.KEY, none) for time_us in (0, 50_000, 100_000)],
         *[(SECOND + time_us, 2, DeskInput.TICKET, ticket) for time_us in (0, 50_000, 100_000)],
     ]
+    read = [(t, e.sequence, e.half, e.code) for t, e in bench.links[COMPARTMENT].all(TicketRead)]
+    assert read == [
+        (SECOND + time_us, 2, half, code) for time_us in (0, 50_000, 100_000) for half, code in enumerate((5, 3))
+    ]
 
 
 def test_the_desk_prints_one_ticket_for_an_order_repeated() -> None:
     bench = Bench()
     for sequence in (1, 1, 2):
+        bench.links[COMPARTMENT].order(TicketPrint(COMPARTMENT, sequence, 0, 7))
+        bench.links[COMPARTMENT].order(TicketPrint(COMPARTMENT, sequence, 1, sequence))
         order = DeskOrder(COMPARTMENT, sequence, DeskText.TAKE_TICKET, Reference(1, 9 + sequence))
         bench.links[COMPARTMENT].order(order)
-    assert bench.compartments[COMPARTMENT].tickets_printed == [Reference(1, 10), Reference(1, 11)]
+    printed = [Ticket(Reference(1, 10), 1 << 40 | 7), Ticket(Reference(1, 11), 2 << 40 | 7)]
+    assert bench.compartments[COMPARTMENT].tickets_printed == printed
+
+
+def test_no_ticket_is_printed_without_its_whole_code() -> None:
+    bench, order = Bench(), DeskOrder(COMPARTMENT, 1, DeskText.TAKE_TICKET, Reference(1, 9))
+    desk = bench.compartments[COMPARTMENT]
+    for lost in (TicketPrint(COMPARTMENT, 1, 1, 7), TicketPrint(COMPARTMENT, 2, 0, 7)):
+        bench.links[COMPARTMENT].order(lost)
+        bench.links[COMPARTMENT].order(order)
+        assert (desk.tickets_printed, desk.text) == ([], DeskText.WELCOME)
+    for half in (0, 1):
+        bench.links[COMPARTMENT].order(TicketPrint(COMPARTMENT, 1, half, 7))
+    bench.links[COMPARTMENT].order(order)
+    assert [one.car for one in desk.tickets_printed] == [Reference(1, 9)], "the order comes again with its code"
 
 
 def test_a_car_lifted_by_the_shuttle_weighs_nothing_on_the_bay() -> None:

@@ -9,6 +9,7 @@ from bus_sim.systems.car_park.plant.bodies import CarBody, random_car
 from bus_sim.systems.car_park.plant.customer import CustomerState, VisitOutcome
 from onboard.contract.codes import DeskText
 from onboard.contract.messages import DeskOrder, Reference
+from onboard.systems.car_park.tickets import Ticket
 from tests.plant.support import COMPARTMENT, SECOND, Bench
 from tests.plant.valet import Valet
 
@@ -25,7 +26,7 @@ def test_a_customer_comes_parks_and_fetches_their_car() -> None:
     customer = bench.street.add(Stay(10 * SECOND, 600 * SECOND, car("blue")))
     bench.timers.run_until(300 * SECOND)
     assert customer.state is CustomerState.PARKED
-    assert customer.ticket == Reference(COMPARTMENT, 1)
+    assert customer.ticket == Ticket(Reference(COMPARTMENT, 1), 0)
     # Reaction 1 s, driving 10 to 30 s, walking 4 to 8 s, and the script's tick.
     assert customer.visit.in_wait_us is not None
     assert 15 * SECOND <= customer.visit.in_wait_us <= 40 * SECOND
@@ -93,7 +94,7 @@ def test_told_full_after_walking_away_the_customer_comes_back_for_the_car() -> N
         bench.timers.run_for(50_000)
     assert customer.ticket is not None
     valet.condition = lambda: False
-    bench.links[COMPARTMENT].order(DeskOrder(COMPARTMENT, 200, DeskText.FULL, customer.ticket))
+    bench.links[COMPARTMENT].order(DeskOrder(COMPARTMENT, 200, DeskText.FULL, customer.ticket.car))
     bench.timers.run_for(60 * SECOND)
     assert customer.visit.outcome is VisitOutcome.FULL
     assert bench.world.where["blue"] is None

@@ -30,6 +30,7 @@ from onboard.contract.messages import (
 )
 from onboard.core.site import Station
 from onboard.systems.car_park.site import car_park
+from onboard.systems.car_park.tickets import TicketCodes
 from tests.plant.support import COMPARTMENT, ROBOT, Bench
 
 NO_CAR = Reference(0, 0)
@@ -88,7 +89,10 @@ class Valet:
         return self.sequence
 
     def desk(self, text: DeskText, car: Reference = NO_CAR) -> None:
-        self.bench.links[COMPARTMENT].order(DeskOrder(COMPARTMENT, self.next(), text, car))
+        number = self.next()
+        for half in TicketCodes().halves(COMPARTMENT, number, car) if text is DeskText.TAKE_TICKET else ():
+            self.bench.links[COMPARTMENT].order(half)
+        self.bench.links[COMPARTMENT].order(DeskOrder(COMPARTMENT, number, text, car))
 
     def light(self, colour: LightColour) -> None:
         self.bench.links[COMPARTMENT].order(LightOrder(COMPARTMENT, colour))

@@ -105,6 +105,7 @@ def _parts_of(system: str) -> Iterator[tuple[str, Layer]]:
         "gateway": edge,
         "history": fold,
         "words": words,
+        "tickets": Layer(machines, only_stdlib=PURE_STDLIB | {"hashlib", "hmac"}, pure=True),
         **dict.fromkeys(("constants", "layout", "machines", "missions_reader", "reader", "report", "room"), config),
         **dict.fromkeys(("building", "chart", "checks", "diagram", "scene", "traffic"), history),
     }
@@ -162,7 +163,12 @@ LAYERS: dict[str, Layer] = {
         ("onboard.bounded_file", "onboard.ports", "onboard.core", "onboard.seal", "onboard.wire"), ("can", "aiomqtt")
     ),
     # Runs where somebody commissions a site, never on a board.
-    "onboard.keys": Layer(("onboard.config", "onboard.core.site", "onboard.seal.keys", "onboard.systems.registry")),
+    "onboard.keys": Layer(
+        (
+            *("onboard.config", "onboard.core.site", "onboard.seal.keys"),
+            *("onboard.systems.registry", "onboard.systems.system"),
+        )
+    ),
     "onboard.trace": Layer(
         (*CORE_TYPES, *REGISTRY, "onboard.history", "onboard.seal.heard", "onboard.wire"),
         not_stdlib=frozenset({"asyncio", "random", "threading"}),
@@ -247,6 +253,7 @@ LAYERS: dict[str, Layer] = {
             *("onboard.seal.keys", "onboard.wire"),
         )
     ),
+    "onboard.gateway.roles_file": Layer((*CORE_TYPES, "onboard.config", "onboard.gateway")),
     "onboard.gateway.options": Layer((*CORE_TYPES, "onboard.bounded_file", "onboard.gateway", "onboard.io")),
     "onboard": Layer(
         (

@@ -96,7 +96,7 @@ def test_p53_a_burst_queues_before_the_busy_compartment_and_is_served_in_its_ord
     assert set(falling) == {0, -1} and queues[-1] == 0, "one after the other"
     customers = scene.simulation.plant.street.customers
     assert {customer.state for customer in customers} == {CustomerState.PARKED}
-    tickets = [customer.ticket.number for customer in customers if customer.ticket is not None]
+    tickets = [customer.ticket.car.number for customer in customers if customer.ticket is not None]
     assert tickets == sorted(tickets) and len(tickets) == 6, "first come, first served"
     waits = [customer.visit.in_wait_us or 0 for customer in customers]
     assert waits == sorted(waits) and waits[-1] > waits[0] + 5 * 30_000_000

@@ -31,6 +31,8 @@ from onboard.contract.device import (
     ShuttleOrder,
     ShuttleState,
     StateRequest,
+    TicketPrint,
+    TicketRead,
 )
 
 _new = tuple.__new__
@@ -46,6 +48,7 @@ _SHUTTLE_MODE = tuple(ShuttleMode)
 _SIDE = tuple(Side)
 _FROM_0_TO_255_AT_2 = {value: value << 2 for value in range(256)}
 _FROM_0_TO_255_AT_4 = {value: value << 4 for value in range(256)}
+_PACK_BBBIX = struct.Struct("<BBBIx").pack
 _PACK_BBXXXXXX = struct.Struct("<BBxxxxxx").pack
 _PACK_BHIX = struct.Struct("<BHIx").pack
 _PACK_BIXXX = struct.Struct("<BIxxx").pack
@@ -137,7 +140,7 @@ def pack_desk_order(message: DeskOrder) -> bytes:
 def unpack_desk_order(sender: int, data: bytes) -> DeskOrder | None:
     sequence, word_1 = _UNPACK_BIXXX(data)
     text = word_1 & 0xF
-    if text > 9:
+    if text > 10:
         return None
     car_origin = word_1 >> 4 & 0xFF
     car_number = word_1 >> 12 & 0xFFFF
@@ -150,6 +153,25 @@ def pack_state_request(message: StateRequest) -> bytes:
 
 def unpack_state_request(sender: int, data: bytes) -> StateRequest | None:
     return StateRequest(sender)
+
+
+def pack_ticket_print(message: TicketPrint) -> bytes:
+    half = message.half
+    if half < 0 or half > 1:
+        raise OutOfRangeError("TicketPrint.half", half, 0, 1)
+    code = message.code
+    try:
+        return _PACK_BBBIX(message.sequence, half, code & 0xFF, code >> 8)
+    except struct.error as error:
+        raise refusal(message, ("TicketPrint.sequence", 0, 255), ("TicketPrint.code", 0, 1099511627775)) from error
+
+
+def unpack_ticket_print(sender: int, data: bytes) -> TicketPrint | None:
+    (word_0,) = _UNPACK_Q(data)
+    sequence = word_0 & 0xFF
+    half = word_0 >> 8 & 0x1
+    code = word_0 >> 16 & 0xFFFFFFFFFF
+    return TicketPrint(sender, sequence, half, code)
 
 
 def pack_drive_state(message: DriveState) -> bytes:
@@ -305,6 +327,25 @@ def unpack_platform_state(sender: int, data: bytes) -> PlatformState | None:
     return PlatformState(sender, word_0 & 0x1 != 0, word_0 & 0x2 != 0, load_kg)
 
 
+def pack_ticket_read(message: TicketRead) -> bytes:
+    half = message.half
+    if half < 0 or half > 1:
+        raise OutOfRangeError("TicketRead.half", half, 0, 1)
+    code = message.code
+    try:
+        return _PACK_BBBIX(message.sequence, half, code & 0xFF, code >> 8)
+    except struct.error as error:
+        raise refusal(message, ("TicketRead.sequence", 0, 255), ("TicketRead.code", 0, 1099511627775)) from error
+
+
+def unpack_ticket_read(sender: int, data: bytes) -> TicketRead | None:
+    (word_0,) = _UNPACK_Q(data)
+    sequence = word_0 & 0xFF
+    half = word_0 >> 8 & 0x1
+    code = word_0 >> 16 & 0xFFFFFFFFFF
+    return TicketRead(sender, sequence, half, code)
+
+
 #: Every frame of this module.
 FRAMES = (
     FrameCode(
@@ -342,6 +383,17 @@ FRAMES = (
         True,
     ),
     FrameCode(
+        "TicketPrint",
+        0x14860000,
+        8,
+        pack_ticket_print,
+        unpack_ticket_print,
+        TicketPrint,
+        TicketPrint,
+        ("Controller",),
+        True,
+    ),
+    FrameCode(
         "DriveState", 0x16900000, 8, pack_drive_state, unpack_drive_state, DriveState, DriveState, ("Drive",), True
     ),
     FrameCode(
@@ -368,5 +420,8 @@ FRAMES = (
         PlatformState,
         ("Platform",),
         True,
+    ),
+    FrameCode(
+        "TicketRead", 0x16960000, 8, pack_ticket_read, unpack_ticket_read, TicketRead, TicketRead, ("Desk",), True
     ),
 )

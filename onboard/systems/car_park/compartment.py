@@ -34,6 +34,7 @@ from onboard.contract.messages import (
     OperatorOrder,
     Reference,
     TaskReport,
+    TicketRead,
     TokenRefusal,
     TokenRequest,
 )
@@ -62,6 +63,8 @@ from onboard.systems.car_park.pipeline import Pipeline
 from onboard.systems.car_park.program import Program
 from onboard.systems.car_park.site import ANY_CLASS, car_park
 from onboard.systems.car_park.stewardship import Stewardship
+from onboard.systems.car_park.ticket_slot import TicketSlot
+from onboard.systems.car_park.tickets import TicketCodes
 from onboard.ways.mirror import WayFleet
 from onboard.ways.site import BayUse
 from onboard.ways.tokens import car_token
@@ -73,6 +76,7 @@ class Compartment:
 
     fleet: WayFleet
     generation: BayGeneration
+    codes: TicketCodes = field(default_factory=TicketCodes)
     kind: KindCode = KindCode.COMPARTMENT
     phase: BayPhase = BayPhase.STARTING
     doors: DoorState | None = None
@@ -81,15 +85,16 @@ class Compartment:
     stewardship: Stewardship = field(init=False)
     memory: BayMemory = field(init=False)
     outputs: BayOutputs = field(init=False)
+    slot: TicketSlot = field(init=False)
     calls: BayCalls = field(init=False)
     pipeline: Pipeline = field(init=False)
-    _desk_sequence: int | None = None
     _key: DeskInput | None = None
     _robot_waits: bool = False
 
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
-        self.outputs = BayOutputs(self.fleet.node_id, self.fleet.motion, station_token(self.station))
+        self.outputs = BayOutputs(self.fleet.node_id, self.fleet.motion, station_token(self.station), self.codes)
+        self.slot = TicketSlot(self.outputs, self.fleet.drops)
         self._park = site = car_park(self.fleet.site)
         self._use = site.bay_uses.get(self.fleet.node_id, BayUse.BOTH)
         self._robots = CarParkGeneration(site, self.fleet.machine, self.fleet.mirror, Program(site))
@@ -152,9 +157,8 @@ class Compartment:
         if isinstance(message, BayState):
             self.bay = message
             return self.outputs.again(message, now_us)
-        if isinstance(message, DeskEvent) and message.sequence != self._desk_sequence:
-            self._desk_sequence = message.sequence
-            return self._at_desk(message.event, message.car)
+        if isinstance(message, DeskEvent | TicketRead):
+            return self.slot.take(message, now_us, self._at_desk)
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
@@ -207,7 +211,8 @@ class Compartment:
             if requester != self.job.winner:
                 return Reason.TOKEN_NOT_GRANTABLE_YET
             self._robot_waits = True
-            if self.phase is not BayPhase.SERVING or not self._is_open_to_machines():
+            is_open = self._is(DoorName.OUTPUT, DoorPosition.OPEN) and self._is(DoorName.INPUT, DoorPosition.LOCKED)
+            if self.phase is not BayPhase.SERVING or not is_open:
                 return Reason.DOOR_NOT_READY
             self.job.was_granted |= key.kind is TokenKind.STATION
             return Reason.NONE
@@ -348,12 +353,13 @@ class Compartment:
             # The number first: one that is not used is no harm, one used twice would be.
             effects.append(number)
         car = self.job.car
+        effects[:0] = self.outputs.prepare_ticket(car)
         effects += self.fleet.tokens.create(car_token(*car))
         effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm, found))
         if is_called:
             effects += self.calls.has_come(bay.wheelbase_mm)
         stated = custody.state(self.fleet, car, self.station.number, bay.wheelbase_mm)
-        effects += [*stated, self.outputs.show(DeskText.TAKE_TICKET, car)]
+        effects += [*stated, self.outputs.print_ticket(car)]
         if not is_called:
             effects += self.calls.call_for(self.job, now_us)
         self._go(BayPhase.LOCKING)
@@ -384,7 +390,7 @@ class Compartment:
             # Who presses again has no ticket: the power failed before it was printed.
             asked, self._key = self._key is not None, None
             is_new = self.job.operation is Operation.PARK
-            return [self.outputs.show(DeskText.TAKE_TICKET, self.job.car)] if asked and is_new else []
+            return self.outputs.reprint(self.job.car) if asked and is_new else []
         return self.outputs.door(DoorName.INPUT, DoorAction.CLOSE)
 
     def _when_reserving(self, now_us: int) -> list[Effect]:
@@ -487,10 +493,6 @@ class Compartment:
     def _is(self, door: DoorName, position: DoorPosition) -> bool:
         assert self.doors is not None
         return (self.doors.input_door if door is DoorName.INPUT else self.doors.output_door) is position
-
-    def _is_open_to_machines(self) -> bool:
-        """Whether a shuttle can come in and a person cannot, by what the doors say now."""
-        return self._is(DoorName.OUTPUT, DoorPosition.OPEN) and self._is(DoorName.INPUT, DoorPosition.LOCKED)
 
     def _go(self, phase: BayPhase) -> None:
         self.phase = phase

@@ -13,6 +13,7 @@ from onboard.gateway.bus_orders import BusOrders, NoBusOrders, OrderMessages, Re
 from onboard.gateway.dialect import Json
 from onboard.gateway.edge import PhysicalLimits, SystemEdge
 from onboard.gateway.order import GatewayOrder, OrderRequest
+from onboard.gateway.roles import Role
 from onboard.history.calls import CallOpened, CallRepeated
 from onboard.history.history import Fact
 from onboard.history.loads import LoadTold
@@ -52,6 +53,15 @@ class CarParkOrders(NoBusOrders):
         if not any(one.charging for one in self._park.classes):
             refuse_charging(body, "this site has no place to charge; leave it out")
         return OrderRequest("park", self._desk(body["from"], "$.from"), urgent=urgent, charging=charging)
+
+    def check_role(self, request: OrderRequest, role: Role | None) -> None:
+        """Whoever has no ticket answers for a car by a role: without one none is fetched, known number or not."""
+        if role is None and request.car is not None:
+            raise RefusedError("NOT_ALLOWED", "no role: order under a name that --roles gives one")
+        if role is not None and request.node not in role.desks:
+            raise RefusedError("NOT_ALLOWED", "not a desk of this role", "$.to" if request.car else "$.from")
+        if role is not None and request.car is not None and request.car.origin not in role.cars:
+            raise RefusedError("NOT_ALLOWED", "not a car of this role", "$.car")
 
     def say(self, order: GatewayOrder, sender: int, wall_us: int) -> OrderMessages:
         """A ticket, or the key."""

@@ -8,12 +8,13 @@ which do nothing when they come twice; a desk that hears the number of its last 
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import DeskText, DoorAction, DoorName, DoorPosition, LightColour, Reason
-from onboard.contract.messages import BayState, DeskOrder, DoorOrder, DoorState, LightOrder, Reference
+from onboard.contract.messages import BayState, DeskOrder, DoorOrder, DoorState, LightOrder, Reference, TicketPrint
 from onboard.core.authority import TokenKey
 from onboard.core.effects import Effect, Record, Tell
 from onboard.core.motion_authority import ALONE, MotionAuthority, Permit, authorised
 from onboard.core.serial import successor
 from onboard.systems.car_park.records import DoorRecord
+from onboard.systems.car_park.tickets import TicketCodes
 from onboard.systems.car_park.unheard import Unheard
 
 #: A desk tells nobody what it shows: its last order is said again with so many states of the bay: a second at the
@@ -37,11 +38,14 @@ class BayOutputs:
     node_id: int
     motion: MotionAuthority
     bay: TokenKey
+    codes: TicketCodes
     light: LightColour | None = None
     _sequence: int = 0
     _doors: dict[DoorName, DoorOrder] = field(default_factory=dict)
     _desk: DeskOrder | None = None
     _desk_left: int = 0
+    #: The code of the ticket that the desk's last order prints, or the next one will.
+    _print: list[TicketPrint] = field(default_factory=list)
     _unheard: Unheard = field(default_factory=Unheard)
 
     def door(self, door: DoorName, action: DoorAction) -> list[Effect]:
@@ -62,8 +66,25 @@ class BayOutputs:
         return authorised(self.motion, ALONE, Reason.TOKEN_HELD_BY_OTHER if is_away else Reason.NONE)
 
     def show(self, text: DeskText, car: Reference) -> Effect:
-        """What the desk is to show; with TAKE_TICKET it prints."""
-        self._desk, self._desk_left = DeskOrder(self.node_id, self._next(), text, car), DESK_TIMES
+        """What the desk is to show, printing aside."""
+        self._print = []
+        return self._order_desk(self._next(), text, car)
+
+    def prepare_ticket(self, car: Reference) -> list[Effect]:
+        """The code goes before all else, so that it is there when what the ticket stands for is on the disk."""
+        self._print = self.codes.halves(self.node_id, self._next(), car)
+        return [Tell(half) for half in self._print]
+
+    def print_ticket(self, car: Reference) -> Effect:
+        """TAKE_TICKET, under the number that its code was prepared with."""
+        return self._order_desk(self._print[0].sequence, DeskText.TAKE_TICKET, car)
+
+    def reprint(self, car: Reference) -> list[Effect]:
+        """The same ticket once more: a code does not change."""
+        return [*self.prepare_ticket(car), self.print_ticket(car)]
+
+    def _order_desk(self, sequence: int, text: DeskText, car: Reference) -> Effect:
+        self._desk, self._desk_left = DeskOrder(self.node_id, sequence, text, car), DESK_TIMES
         self._unheard.ordered("desk")
         return Tell(self._desk)
 
@@ -93,7 +114,7 @@ class BayOutputs:
         if self._desk is None or not self._desk_left or not self._unheard.is_due("desk", now_us, heard=False):
             return []
         self._desk_left -= 1
-        return [Tell(self._desk)]
+        return [*(Tell(half) for half in self._print), Tell(self._desk)]
 
     def _next(self) -> int:
         self._sequence = successor(self._sequence, 8)

@@ -21,9 +21,12 @@ from onboard.contract.messages import (
     LightOrder,
     Message,
     Reference,
+    TicketPrint,
+    TicketRead,
 )
 from onboard.core.serial import successor
 from onboard.systems.car_park.site import car_park
+from onboard.systems.car_park.tickets import Ticket, TicketHalves, split
 from onboard.ways.site import WaySite
 
 #: DoorState and BayState are repeated this often where nothing changes (dbc/device.dbc).
@@ -39,7 +42,8 @@ class CompartmentPlant:
     """Doors, light, desk and sensors of one compartment, and what a person standing before it sees.
 
     ``watch`` tells whenever something visible changed; ``watch_desk`` tells every text that the desk shows, with the
-    car's number; TAKE_TICKET prints a ticket of that number. A DeskOrder like the last one is not shown again.
+    car's number; TAKE_TICKET prints a ticket of that number, once its code has come. A DeskOrder like the last
+    one is not shown again.
     """
 
     def __init__(self, node_id: int, site: WaySite, world: CarParkWorld, timers: Timers, link: DeviceBusLink) -> None:
@@ -47,12 +51,15 @@ class CompartmentPlant:
         self.light = LightColour.RED
         self.text = DeskText.WELCOME
         self.text_car = NO_CAR
-        self.tickets_printed: list[Reference] = []
+        self.tickets_printed: list[Ticket] = []
         self._world = world
         self._timers = timers
         self._link = link
         self._desk_sequence = 0
         self._desk_order: DeskOrder | None = None
+        self._halves = TicketHalves()
+        #: What was read for the act that comes next.
+        self._read: Ticket | None = None
         self._told: BayState | None = None
         self._repeat_timer: Timer | None = None
         self._watchers: list[Callable[[], None]] = []
@@ -122,20 +129,37 @@ class CompartmentPlant:
         """The key: "park my car", or "park it where it is charged"."""
         self._desk_event(DeskInput.CHARGING_KEY if charging else DeskInput.KEY, NO_CAR)
 
-    def insert_ticket(self, car: Reference) -> None:
+    def read_ticket(self, ticket: Ticket) -> None:
+        """A ticket goes in: it is read before it has gone in whole, which is the act."""
+        self._read = ticket
+        self._say_code(successor(self._desk_sequence, 8), ticket)
+
+    def insert_ticket(self, ticket: Ticket) -> None:
         """A ticket: "fetch my car"."""
-        self._desk_event(DeskInput.TICKET, car)
+        self._desk_event(DeskInput.TICKET, ticket.car, ticket)
 
-    def press_cancel(self, car: Reference) -> None:
+    def press_cancel(self, ticket: Ticket) -> None:
         """The cancel key with a ticket in the slot: "I want it back at once"."""
-        self._desk_event(DeskInput.CANCEL, car)
+        self._desk_event(DeskInput.CANCEL, ticket.car, ticket)
 
-    def _desk_event(self, event: DeskInput, car: Reference) -> None:
+    def _desk_event(self, event: DeskInput, car: Reference, ticket: Ticket | None = None) -> None:
         self._desk_sequence = successor(self._desk_sequence, 8)
-        said = DeskEvent(self.node_id, self._desk_sequence, event, car)
+        said, was_read = DeskEvent(self.node_id, self._desk_sequence, event, car), self._read
+        self._read = None
+        if ticket is not None and was_read != ticket:
+            self._say_code(said.sequence, ticket)
         self._link.send(said)
         for time in range(1, DESK_TIMES):
-            self._timers.call_at(self._timers.now_us() + time * DESK_GAP_US, lambda: self._link.send(said))
+            self._timers.call_at(self._timers.now_us() + time * DESK_GAP_US, lambda: self._say_act(said, ticket))
+
+    def _say_act(self, said: DeskEvent, ticket: Ticket | None) -> None:
+        if ticket is not None:
+            self._say_code(said.sequence, ticket)
+        self._link.send(said)
+
+    def _say_code(self, sequence: int, ticket: Ticket) -> None:
+        for half, code in enumerate(split(ticket.code)):
+            self._link.send(TicketRead(self.node_id, sequence, half, code))
 
     # --- orders ------------------------------------------------------------------------------------------------
 
@@ -149,14 +173,23 @@ class CompartmentPlant:
             self._say_doors()
             if changed:
                 self._notify()
+        elif isinstance(message, TicketPrint):
+            self._halves.take(message)
         elif isinstance(message, DeskOrder) and message != self._desk_order:
-            self._desk_order = message
-            self._show(message.text, message.car)
+            self._obey(message)
+
+    def _obey(self, order: DeskOrder) -> None:
+        code = self._halves.code(order.sequence)
+        is_ticket = order.text is DeskText.TAKE_TICKET
+        if is_ticket and code is None:
+            return
+        self._desk_order = order
+        if is_ticket and code is not None:
+            self.tickets_printed.append(Ticket(order.car, code))
+        self._show(order.text, order.car)
 
     def _show(self, text: DeskText, car: Reference) -> None:
         self.text, self.text_car = text, car
-        if text is DeskText.TAKE_TICKET:
-            self.tickets_printed.append(car)
         for watcher in list(self._desk_watchers):
             watcher(text, car)
 

@@ -17,7 +17,7 @@ from bus_sim.systems.car_park.plant.compartment import CompartmentPlant
 from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.rules import PlantRule
 from bus_sim.systems.car_park.plant.world import CarParkWorld
-from onboard.contract.messages import Reference
+from onboard.systems.car_park.tickets import Ticket
 
 #: From seeing that one may go to going, us: a person's reaction.
 REACTION_US = 1_000_000
@@ -26,6 +26,8 @@ WALK_S = (4.0, 8.0)
 #: The key is pressed, or the ticket inserted, again after this long without an answer, us: a person's patience with a
 #: key.
 PATIENCE_US = 15_000_000
+#: A ticket is read so long before it has gone in, us: two frames' time.
+READ_US = 2_000
 #: A ticket that the desk does not know is tried again after this, us, and so many times in all: then one asks for help.
 UNKNOWN_RETRY_US = 60_000_000
 UNKNOWN_TRIES = 5
@@ -144,7 +146,7 @@ class Customer:
         self.stay = stay
         self.state = CustomerState.COMING
         self.visit = CustomerVisit()
-        self.ticket: Reference | None = None
+        self.ticket: Ticket | None = None
         self.compartment: CompartmentPlant | None = None
         #: Dawdles so long in the compartment before driving out, us; set by faults.
         self.dawdle_us = 0
@@ -227,7 +229,16 @@ class Customer:
         self._place.press_key(charging=self.stay.car.charging)
 
     def _walk_out(self) -> None:
-        self._wait(self._draw_us(WALK_S))
+        walk_us = self._draw_us(WALK_S)
+        self._wait(walk_us)
+        if self._leave_us is not None:
+            leave_us = max(self._leave_us, self._timers.now_us() + walk_us)
+            self._timers.call_at(leave_us - READ_US, self._let_read)
+
+    def _let_read(self) -> None:
+        """About to come for the car, at the desk that is chosen then."""
+        if self.ticket is not None and not self.has_lost_ticket and self.visit.asked_us is None:
+            self._choose(self).read_ticket(self.ticket)
 
     def _walk_away(self) -> None:
         self.visit.parked_us = self._timers.now_us()

@@ -12,6 +12,7 @@ from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.world import CarParkWorld
 from onboard.contract.codes import DeskText
 from onboard.contract.messages import Reference
+from onboard.systems.car_park.tickets import Ticket
 from onboard.ways.site import BayUse
 
 #: What a text on the desk means to the customer whom it concerns.
@@ -24,6 +25,8 @@ TEXTS: dict[DeskText, CustomerEvent] = {
     DeskText.NO_CHARGING: CustomerEvent.NO_CHARGING,
     DeskText.PLEASE_WAIT: CustomerEvent.WAIT,
     DeskText.UNKNOWN_TICKET: CustomerEvent.UNKNOWN,
+    # A minute later the desk takes tickets again.
+    DeskText.TOO_MANY_TRIES: CustomerEvent.UNKNOWN,
     DeskText.CAR_READY: CustomerEvent.READY,
 }
 
@@ -194,7 +197,7 @@ class Street:
         if reader is None:
             reader = self._at_key(node_id)
             if text is DeskText.TAKE_TICKET:
-                self._take(reader, car)
+                self._take(reader, self._compartments[node_id].tickets_printed[-1])
         if reader is not None:
             reader.on(event)
 
@@ -202,12 +205,12 @@ class Street:
         waiting = self._waiting[node_id]
         return next((customer for customer in waiting if customer.state is CustomerState.AWAITING_TICKET), None)
 
-    def _take(self, customer: Customer | None, car: Reference) -> None:
+    def _take(self, customer: Customer | None, ticket: Ticket) -> None:
         if customer is None:
             self.tickets_uncollected += 1
             return
-        customer.ticket = car
-        self._by_ticket[car] = customer
+        customer.ticket = ticket
+        self._by_ticket[ticket.car] = customer
 
 
 def _is_since(moment_us: int | None, since_us: int) -> bool:
