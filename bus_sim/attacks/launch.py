@@ -5,6 +5,7 @@ from typing import Any
 
 from bus_sim.attacks.attack import TICK_US, Attack, AttackerNode
 from bus_sim.attacks.catalogue import ATTACKS
+from bus_sim.attacks.stolen import StolenKeys
 from bus_sim.can.node import SimulatedBus
 from bus_sim.faults.injection import Injection
 from bus_sim.run import BusRun
@@ -32,6 +33,8 @@ class _Attacker:
         chance = random.Random(f"attack:{run.site.name}:{injection}")
         node = AttackerNode(run.site, node_id, chance, self._say, self._put, lambda: self._bus.waiting_to_send)
         self._is_begun = False
+        has_keys = injection.text("keys") == "stolen" and run.seals.are_used
+        self._keys = StolenKeys(run.seals, node_id, run.codecs.fleet.decode_part) if has_keys else None
         what = injection.text("name")
         own = simulated_of(run.site).attacks.get(what)
         self._attack: Attack = (own or ATTACKS[what].attack)(node)
@@ -39,14 +42,18 @@ class _Attacker:
         run.plant.timers.call_at(injection.at_us, self._begin)
 
     def _say(self, message: Message) -> None:
-        for frame in self._run.codecs.fleet.encode(message) if self._is_begun else ():
-            self._bus.send(frame)
+        for frame in self._run.codecs.fleet.encode(message):
+            self._put(frame)
 
     def _put(self, frame: Frame) -> None:
-        if self._is_begun:
-            self._bus.send(frame)
+        if not self._is_begun:
+            return
+        for one in [frame] if self._keys is None else self._keys.sealed(frame, self._run.loop.now_us()):
+            self._bus.send(one)
 
     def _hear(self, frame: Frame, time_us: int) -> None:
+        if self._keys is not None:
+            self._keys.hear(frame)
         self._attack.hear_frame(frame, time_us)
         message = self._decoder.feed(frame, time_us)
         for word in singles(message) if message is not None else ():

@@ -18,7 +18,7 @@ from bus_sim.campaign.engine import on_cores, on_dask
 from bus_sim.campaign.ledger import Ledger
 from bus_sim.campaign.points import SceneOccasion, Single, count, points, reference
 from bus_sim.campaign.profiles import PROFILES, kinds_for
-from bus_sim.campaign.report import FAILURES
+from bus_sim.campaign.report import FAILURES, RunVerdict
 from bus_sim.campaign.runner import CampaignSettings, FaultPoint, TrialResult, run_point, run_points, run_seed
 from bus_sim.campaign.strangers import StrangerPlan, play_pairs
 from bus_sim.campaign.trial import play
@@ -218,7 +218,7 @@ def _why(result: TrialResult) -> str:
     return "; ".join([result.report.why(), *(str(fault) for fault in least.faults)])
 
 
-def _ledger(args: argparse.Namespace, plan: CampaignSettings) -> Ledger | None:
+def _ledger(args: argparse.Namespace, plan: CampaignSettings) -> Ledger[RunVerdict] | None:
     """The results so far, where there is a file for them; it knows a campaign by all that its trials have in common."""
     if args.add_to is None:
         return None
@@ -230,11 +230,11 @@ def _ledger(args: argparse.Namespace, plan: CampaignSettings) -> Ledger | None:
         f"{plan.faults_an_hour}",
         f"{plan.limit_s}",
     ]
-    return Ledger.read(args.add_to, "; ".join(what))
+    return Ledger.read(args.add_to, "; ".join(what), RunVerdict, FAILURES)
 
 
 def _trials(
-    args: argparse.Namespace, plan: CampaignSettings, site: Site, console: Console, ledger: Ledger | None
+    args: argparse.Namespace, plan: CampaignSettings, site: Site, console: Console, ledger: Ledger[RunVerdict] | None
 ) -> tuple[Iterator[TrialResult], int]:
     """What is to be played, as an iterator over results, and how many they will be."""
     jobs = args.jobs or os.cpu_count() or 1

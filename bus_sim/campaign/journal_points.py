@@ -58,7 +58,10 @@ class Held:
 
     def hear(self, message: Message, time_us: int) -> None:
         """To be told every message of the fleet bus."""
-        if isinstance(message, Halted) and message.needs_person and message.reason in OF_JOURNALS:
+        if not isinstance(message, Halted) or message.sender != message.machine:
+            # What others say of it is not believed.
+            return
+        if message.needs_person and message.reason in OF_JOURNALS:
             self.since_us.setdefault(message.machine, time_us)
 
     def is_over(self, now_us: int) -> bool:

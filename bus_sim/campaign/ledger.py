@@ -7,14 +7,15 @@ campaign that it belongs to; lines of other states stay in the file and are told
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 from functools import cache
 from pathlib import Path
+from typing import Any, Final, Generic, NamedTuple, TypeVar
 
 import bus_sim
 import onboard
-from bus_sim.campaign.report import FAILURES, RunVerdict
 from bus_sim.demand import DemandError
 from onboard.bounded_file import MOST_EXPORT, read_bounded
 
@@ -34,20 +35,40 @@ def state() -> str:
     return found.hexdigest()[:16]
 
 
+VerdictT = TypeVar("VerdictT", bound=StrEnum)
+#: What a line says of every trial; all else belongs to one sort of trial.
+_OF_ALL: Final = ("state", "campaign", "number", "verdict", "why")
+
+
+class LedgerEntry(NamedTuple):
+    """What a line says of one trial: its verdict, in a failure why, and figures of this sort of trial."""
+
+    verdict: StrEnum
+    why: str
+    more: Mapping[str, Any]
+
+
 @dataclass
-class Ledger:
-    """The file at ``path`` as far as it is about ``campaign``, a text that names all that its trials have in common."""
+class Ledger(Generic[VerdictT]):
+    """The file at ``path`` as far as it is about ``campaign``, a text that names all that its trials have in common.
+
+    ``verdicts`` are those of its trials, ``failures`` those that make the whole fail.
+    """
 
     path: Path
     campaign: str
-    #: Verdicts of this state by the number of the seed or point, with why.
-    done: dict[int, tuple[RunVerdict, str]] = field(default_factory=dict)
+    verdicts: type[VerdictT]
+    failures: Collection[VerdictT]
+    #: Entries of this state by the number of the seed or point, or another name of the trial.
+    done: dict[int | str, LedgerEntry] = field(default_factory=dict)
     others: int = 0
 
     @classmethod
-    def read(cls, path: Path, campaign: str) -> "Ledger":
+    def read(
+        cls, path: Path, campaign: str, verdicts: type[VerdictT], failures: Collection[VerdictT]
+    ) -> "Ledger[VerdictT]":
         """A file that is not there yet is empty. Raises ``DemandError`` for one that is no ledger."""
-        ledger = cls(path, campaign)
+        ledger = cls(path, campaign, verdicts, failures)
         try:
             text = read_bounded(path, MOST_EXPORT).decode() if path.exists() else ""
             for line in text.splitlines():
@@ -57,9 +78,11 @@ class Ledger:
             raise DemandError(f"--add-to {path}: cannot be read as results of campaigns ({why})") from error
         return ledger
 
-    def _take(self, line: dict[str, str | int]) -> None:
+    def _take(self, line: dict[str, Any]) -> None:
         if (line["state"], line["campaign"]) == (state(), self.campaign):
-            self.done[int(line["number"])] = RunVerdict(str(line["verdict"])), str(line["why"])
+            more = {key: value for key, value in line.items() if key not in _OF_ALL}
+            number = line["number"] if isinstance(line["number"], str) else int(line["number"])
+            self.done[number] = LedgerEntry(self.verdicts(line["verdict"]), str(line["why"]), more)
         else:
             self.others += 1
 
@@ -67,25 +90,26 @@ class Ledger:
         """Those that were not played under this state."""
         return [number for number in numbers if number not in self.done]
 
-    def add(self, number: int, verdict: RunVerdict, why: str) -> None:
-        """One trial more, on disk at once."""
-        self.done[number] = verdict, why
-        entry = {"state": state(), "campaign": self.campaign, "number": number, "verdict": verdict.value, "why": why}
+    def add(self, number: int | str, verdict: VerdictT, why: str, more: Mapping[str, object] | None = None) -> None:
+        """One trial more, on disk at once; ``more`` as ``json.dump`` takes it."""
+        self.done[number] = LedgerEntry(verdict, why, more or {})
+        head = {"state": state(), "campaign": self.campaign, "number": number, "verdict": verdict.value, "why": why}
+        entry = {**head, **self.done[number].more}
         with self.path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(entry) + "\n")
 
     @property
     def has_failed(self) -> bool:
         """Whether any trial of this state failed."""
-        return any(verdict in FAILURES for verdict, _ in self.done.values())
+        return any(entry.verdict in self.failures for entry in self.done.values())
 
     def lines(self) -> list[str]:
         """What the file has of this state by now."""
-        counts = Counter(verdict for verdict, _ in self.done.values())
-        told = ", ".join(f"{verdict.value} {counts[verdict]}" for verdict in RunVerdict if counts[verdict])
+        counts = Counter(entry.verdict for entry in self.done.values())
+        told = ", ".join(f"{verdict.value} {counts[verdict]}" for verdict in self.verdicts if counts[verdict])
         failed = [
-            f"  {number}: {verdict.value}: {why}"
-            for number, (verdict, why) in sorted(self.done.items())
-            if verdict in FAILURES
+            f"  {number}: {entry.verdict.value}: {entry.why}"
+            for number, entry in sorted(self.done.items(), key=lambda one: (str(type(one[0])), one[0]))
+            if entry.verdict in self.failures
         ]
         return [f"{self.path}: {len(self.done)} runs of state {state()}: {told or 'none'}", *failed]

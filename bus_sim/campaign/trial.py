@@ -2,7 +2,7 @@
 
 from collections import Counter
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from bus_sim.campaign.journal_points import Held
 from bus_sim.campaign.judges import Judges
@@ -27,6 +27,16 @@ HANGS = (StandstillError, EventLimitError)
 DELAY_US = 60_000_000
 
 
+class TrialWatch(Protocol):
+    """Looks at one trial from outside, and changes nothing."""
+
+    def begin(self, stage: SystemStage[Any]) -> None:
+        """The run is connected and armed, and not switched on."""
+
+    def is_over(self, now_us: int) -> bool:
+        """Whether all is known that it looks for, at loop time ``now_us``; the trial goes on until then."""
+
+
 def stage_of(site: Site, scenario: FaultScenario, loop: VirtualTimeLoop, trace: Path | None = None) -> SystemStage[Any]:
     """A scenario's run, connected and not switched on; only faults of single frames are there.
 
@@ -38,14 +48,19 @@ def stage_of(site: Site, scenario: FaultScenario, loop: VirtualTimeLoop, trace: 
 
 
 def play(
-    site: Site, scenario: FaultScenario, *, usual_wait_s: float | None = None, trace: Path | None = None
+    site: Site,
+    scenario: FaultScenario,
+    *,
+    usual_wait_s: float | None = None,
+    trace: Path | None = None,
+    watch: TrialWatch | None = None,
 ) -> TrialReport:
     """Play a scenario; ``usual_wait_s`` is the longest wait without its faults, where it is known."""
     loop = VirtualTimeLoop()
     loop.event_limit = event_limit(scenario.limit_s)
     try:
         with wall_limit(wall_limit_s(scenario.limit_s)):
-            return run_on(loop, _play(site, scenario, usual_wait_s, trace, loop))
+            return run_on(loop, _play(site, scenario, usual_wait_s, trace, loop, watch))
     except (WallLimitError, *HANGS) as hang:
         return hung(scenario, loop, hang)
 
@@ -59,15 +74,26 @@ def hung(scenario: FaultScenario, loop: VirtualTimeLoop, why: BaseException) -> 
 
 
 async def _play(
-    site: Site, scenario: FaultScenario, usual_wait_s: float | None, trace: Path | None, loop: VirtualTimeLoop
+    site: Site,
+    scenario: FaultScenario,
+    usual_wait_s: float | None,
+    trace: Path | None,
+    loop: VirtualTimeLoop,
+    watch: TrialWatch | None,
 ) -> TrialReport:
     stage = stage_of(site, scenario, loop, trace)
     arm(stage.run, scenario.faults)
-    return await play_stage(stage, scenario, usual_wait_s, loop)
+    if watch is not None:
+        watch.begin(stage)
+    return await play_stage(stage, scenario, usual_wait_s, loop, watch)
 
 
 async def play_stage(
-    stage: SystemStage[Any], scenario: FaultScenario, usual_wait_s: float | None, loop: VirtualTimeLoop
+    stage: SystemStage[Any],
+    scenario: FaultScenario,
+    usual_wait_s: float | None,
+    loop: VirtualTimeLoop,
+    watch: TrialWatch | None = None,
 ) -> TrialReport:
     """The same of a stage whose faults are armed."""
     judges = Judges(stage.run, disturbed=bool(scenario.faults))
@@ -77,7 +103,7 @@ async def play_stage(
         judges.excuse_clocks(right_us)
     held = Held()
     stage.run.observers.append(held.hear)
-    error, hang, ends = "", "", _End(stage, recovery)
+    error, hang, ends = "", "", _End(stage, recovery, watch)
     try:
         stage.run.start()
         await run_until(
@@ -99,8 +125,9 @@ async def play_stage(
 class _End:
     """When a trial is over: safety comes first, then all heals, then everything must converge."""
 
-    def __init__(self, stage: SystemStage[Any], recovery: RecoveryMeasure) -> None:
+    def __init__(self, stage: SystemStage[Any], recovery: RecoveryMeasure, watch: TrialWatch | None) -> None:
         self._stage = stage
+        self._watch = watch
         self._recovery = recovery
         self._over_us: int | None = None
 
@@ -109,7 +136,7 @@ class _End:
         if now_us < self._recovery.healed_us:
             return False
         self._recovery.look_at_waits(self._stage.waits_since)
-        if not self._stage.is_over:
+        if not self._stage.is_over or (self._watch is not None and not self._watch.is_over(now_us)):
             return False
         self._over_us = max(self._over_us or now_us, self._recovery.healed_us)
         return self._recovery.mirrors_agree() or now_us - self._over_us >= CONVERGED_US

@@ -149,12 +149,13 @@ KINDS: Final[Mapping[str, Kind]] = {
     ),
     "attack": Kind(
         Group.BUS,
-        "a node that sees only the bus, under a node-ID that the site does not have, attacks it",
+        "a node that sees only the bus attacks it, under a node-ID that the site does not have unless told",
         {
             "name": _one_of(*ATTACKS)._replace(default=None),
             "at_s": _AT,
             "for_s": _seconds(60.0),
             "node": _count("a node-ID", 240, 1, 255),
+            "keys": _one_of("none", "stolen"),
             "seed": _SEED,
         },
     ),

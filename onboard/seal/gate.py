@@ -35,6 +35,8 @@ _ANSWERS_AT_ONCE = 2
 #: For so long at least a start waits for answers, us; beyond the time that all answers need.
 _START_US = 500_000
 _MOST_COUNTED = 65_535
+#: What two nodes prove to each other, and others cannot judge.
+_OF_NUMBERS = (SealTo, SealChallenge, SealAnswer)
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +169,9 @@ class Gate:
             return [frame], []
         handed: list[Frame] = []
         said: list[Frame] = []
+        if word.sender == self._keys.node and isinstance(word, _OF_NUMBERS):
+            # Nobody hears itself: somebody asks or answers in my name, and only I can tell that it was not me.
+            self.faults[word.sender, SealWord.FALSE_SEAL] += 1
         match word:
             case Seal():
                 handed, said = self._on_seal(word, now_us)

@@ -6,13 +6,15 @@ from pathlib import Path
 
 import pytest
 
+from bus_sim.attacks import watch
 from bus_sim.attacks.catalogue import ATTACKS
-from bus_sim.attacks.trials import TrialSettings, run_attack
+from bus_sim.attacks.trials import MISSES, AttackVerdict, TrialSettings, run_attack
 from bus_sim.cli import main
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.orders import OrderArrivals
 from onboard.contract.codes import Reason
 from onboard.holon.admission import Admission
+from onboard.holon.drops import ToldDrops
 from tests.mapd.sites import drawn, site_text
 
 PARK = TrialSettings("small", demand=Arrivals(3, 60.0, 30.0))
@@ -20,9 +22,9 @@ PLANS = {name: TrialSettings(name, demand=OrderArrivals(4, 10.0)) for name in ("
 
 
 def play(attack: str, plan: TrialSettings, seed: int = 1) -> list[str]:
-    """What was not harmless, in words; nothing where all was."""
+    """What was harmful, or not named or back in time, in words; nothing where all was well."""
     result = run_attack(plan, (attack, seed))
-    return [] if result.is_harmless else [f"{result.report.verdict.value}: {result.why()}"]
+    return [f"{result.verdict.value}: {result.why}"] if result.verdict in MISSES else []
 
 
 @pytest.mark.parametrize("attack", ["swap-cars", "stop", "newer-boot"])
@@ -64,13 +66,31 @@ def test_the_attacks_are_real(site: str, monkeypatch: pytest.MonkeyPatch) -> Non
     assert play("hold-all", plan)
 
 
-def test_the_command_prints_a_row_for_each_attack(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = tmp_path / "found.json"
-    options = ["--attacks", "stop,claim", "--seeds", "1", "--orders", "3", "--jobs", "1", "--json", str(found)]
-    assert main(["attack", "graph", *options]) == 0
+def test_what_nobody_names_or_gets_over_in_time_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = replace(PLANS["graph"], demand=OrderArrivals(1, 1.0))
+    monkeypatch.setattr(ToldDrops, "words", lambda *_: [])
+    result = run_attack(plan, ("hold-all", 1))
+    assert (result.verdict, result.named, result.back_s) == (AttackVerdict.NOT_NAMED, "", 0.0)
+    monkeypatch.setattr(watch, "BACK_US", 5_000_000)
+    result = run_attack(plan, ("stop", 1))
+    assert (result.verdict, result.named, result.named_s) == (AttackVerdict.LATE_BACK, "EMERGENCY_STOP", 0.0)
+    assert result.back_s is not None and result.back_s > 15
+
+
+def test_the_command_prints_a_row_for_each_attack_and_goes_on_where_its_file_ends(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found, ledger = tmp_path / "found.json", tmp_path / "all.jsonl"
+    options = ["--orders", "3", "--jobs", "1", "--json", str(found), "--add-to", str(ledger)]
+    assert main(["attack", "graph", "--attacks", "stop,claim", "--seeds", "1", *options]) == 0
     rows = capsys.readouterr().out.splitlines()
-    assert [row.split()[:2] for row in rows if row[:1].islower()][1:] == [["stop", "1/1"], ["claim", "1/1"]]
+    assert [row.split()[:3] for row in rows if row[:1].islower()][1:] == [["claim", "1/1", "1"], ["stop", "1/1", "1"]]
+    assert [row.split()[-1] for row in rows if row[:1].islower()][1:] == ["NOT_OF_SITE", "EMERGENCY_STOP"]
     assert [one["harmless"] for one in json.loads(found.read_text())["runs"]] == [True, True]
+    kept = ledger.read_text()
+    assert main(["attack", "graph", "--attacks", "claim", "--seeds", "1", *options]) == 0
+    assert capsys.readouterr().out.splitlines()[-len(rows) :] == rows
+    assert ledger.read_text() == kept
 
 
 @pytest.mark.parametrize(
@@ -78,6 +98,8 @@ def test_the_command_prints_a_row_for_each_attack(tmp_path: Path, capsys: pytest
     [
         (["--attacks", "clame"], '--attacks clame: no such attack; did you mean "claim"?'),
         (["--node", "11"], "--node 11: that is"),
+        (["--node", "240", "--insider"], "--node 240: no machine of small"),
+        (["--attacks", "own-number"], "--attacks own-number: speaks under numbers of the site's machines"),
         (["--node", "300"], "--node 300: must be from 1 to 255"),
         (["--seeds", "2-1"], "--seeds 2-1: must be a seed"),
         (["--cars", "0"], "--cars 0: must be above 0"),

@@ -6,11 +6,15 @@ from pathlib import Path
 import pytest
 
 from bus_sim.campaign.ledger import Ledger, state
-from bus_sim.campaign.report import RunVerdict
+from bus_sim.campaign.report import FAILURES, RunVerdict
 from bus_sim.cli import main
 from bus_sim.demand import DemandError
 
 SEEDS = "campaign level1 --cars 1 --faults two-crashes --no-baseline --jobs 1 --limit 900 --seeds"
+
+
+def read(path: Path, campaign: str) -> Ledger[RunVerdict]:
+    return Ledger.read(path, campaign, RunVerdict, FAILURES)
 
 
 def test_a_campaign_goes_on_where_its_file_ends(
@@ -29,17 +33,17 @@ def test_a_campaign_goes_on_where_its_file_ends(
 
 def test_results_of_another_state_or_campaign_do_not_count(tmp_path: Path) -> None:
     path = tmp_path / "all.jsonl"
-    Ledger.read(path, "one").add(7, RunVerdict.SERVED, "")
+    read(path, "one").add(7, RunVerdict.SERVED, "")
     path.write_text(path.read_text() + path.read_text().replace(state(), "old"))
-    assert Ledger.read(path, "other").open_of([7]) == [7]
-    ledger = Ledger.read(path, "one")
+    assert read(path, "other").open_of([7]) == [7]
+    ledger = read(path, "one")
     assert (ledger.open_of([7, 8]), ledger.others) == ([8], 1)
 
 
 def test_a_failure_of_before_still_fails_the_whole(tmp_path: Path) -> None:
     path = tmp_path / "all.jsonl"
-    Ledger.read(path, "one").add(7, RunVerdict.HUNG, "why")
-    ledger = Ledger.read(path, "one")
+    read(path, "one").add(7, RunVerdict.HUNG, "why")
+    ledger = read(path, "one")
     assert ledger.has_failed
     assert any("7: hung: why" in line for line in ledger.lines())
 
@@ -48,4 +52,4 @@ def test_a_file_that_is_no_ledger_is_told(tmp_path: Path) -> None:
     path = tmp_path / "all.jsonl"
     path.write_text("once upon a time\n")
     with pytest.raises(DemandError, match="--add-to"):
-        Ledger.read(path, "one")
+        read(path, "one")

@@ -1,5 +1,6 @@
 """What counts behind a gate, and what does not: by a seal, by its number, by whose key it is."""
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,7 +15,7 @@ from onboard.contract.messages import (
     TokenGrant,
     TokenHeld,
 )
-from onboard.contract.seal import Seal, SealFault, SealWord
+from onboard.contract.seal import Seal, SealAnswer, SealChallenge, SealFault, SealTo, SealWord
 from onboard.core.frame import Frame
 from onboard.seal.heard import UNHEARD_US, WAITS_US
 from onboard.seal.sender import MOST_SEALED
@@ -301,3 +302,14 @@ def test_whatever_is_lost_doubled_or_changed_nothing_counts_that_was_not_said(
     for sender in NODES:
         mine = iter([word for word in words if word.sender == sender])
         assert all(any(word == one for one in mine) for word in heard if word.sender == sender), "each once, in order"
+
+
+@pytest.mark.parametrize(
+    "word", [SealChallenge(1, 0, 77), SealAnswer(1, 1, 9), SealTo(1, 3, 4711)], ids=lambda word: type(word).__name__
+)
+def test_who_asks_or_answers_in_my_name_is_named_by_me(word: Message) -> None:
+    wire = wire_of()
+    wire.put(CODEC.encode(word))
+    wire.wait(3 * SECOND_US)
+    assert faults(wire, 1) == {(1, SealWord.FALSE_SEAL): 1}
+    assert CODEC.encode(SealFault(1, 1, SealWord.FALSE_SEAL, 1))[0] in wire.log

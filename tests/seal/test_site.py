@@ -23,4 +23,4 @@ def test_a_forger_under_a_machines_own_number_is_harmless_where_seals_are_requir
 ) -> None:
     plan = TrialSettings(site_with(seals, tmp_path), node=11, demand=OrderArrivals(3, 10.0))
     result = run_attack(plan, ("grant-asked", 1))
-    assert result.is_harmless is is_harmless, result.why()
+    assert result.is_harmless is is_harmless, result.why
