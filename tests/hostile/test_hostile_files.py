@@ -55,6 +55,7 @@ WRITTEN = {
     "--draw",
     "--folder",
     "--json",
+    "--junit",
     "--networkd",
     "--out",
     "--parquet",
