@@ -13,7 +13,7 @@ from onboard.seal.listener import SealListener
 from onboard.seal.subjects import Reading
 
 
-class Mark(Enum):
+class SealMark(Enum):
     """What is told of one frame. The first two without a key: whether a seal stands behind it, whatever it is worth."""
 
     SEALED = "sealed"
@@ -30,10 +30,14 @@ class Marked(NamedTuple):
     """A frame whose mark is known now; None for a frame that no seal is about, or that two nodes alone can judge."""
 
     frame: Frame
-    mark: Mark | None
+    mark: SealMark | None
 
 
-_FALLEN = {SealWord.UNSEALED: Mark.UNSEALED, SealWord.REPLAYED: Mark.AGAIN, SealWord.NOT_FRESH: Mark.NOT_FRESH}
+_FALLEN = {
+    SealWord.UNSEALED: SealMark.UNSEALED,
+    SealWord.REPLAYED: SealMark.AGAIN,
+    SealWord.NOT_FRESH: SealMark.NOT_FRESH,
+}
 #: What is no word of its own, but proves others or asks for proof.
 _OF_SEALS = Seal | SealTo | SealChallenge | SealAnswer
 
@@ -43,7 +47,7 @@ class SealMarks:
 
     def __init__(self, nodes: Collection[int], reading: Reading, group: bytes | None = None) -> None:
         """``group``: the group key, None for who has none. ``nodes``: who is of the site or a tool of its people."""
-        self.counts: Counter[tuple[int, Mark]] = Counter()
+        self.counts: Counter[tuple[int, SealMark]] = Counter()
         #: The frames that are known to count since the last call; without a key each, as it comes.
         self.counting: Sequence[Frame] = ()
         self._reading, self._nodes = reading, frozenset(nodes)
@@ -62,7 +66,7 @@ class SealMarks:
 
     def end(self) -> list[Marked]:
         """The bus is over: what still waits has no seal."""
-        left = [Marked(frame, Mark.UNSEALED) for waiting in self._waiting.values() for frame, *_ in waiting]
+        left = [Marked(frame, SealMark.UNSEALED) for waiting in self._waiting.values() for frame, *_ in waiting]
         self._waiting.clear()
         if self._proof is not None:
             self._proof.end()
@@ -82,19 +86,19 @@ class SealMarks:
         self.counting = (frame,)
         for waiting in self._waiting.values():
             while waiting and now_us - waiting[0][1] >= WAITS_US:
-                yield Marked(waiting.popleft()[0], Mark.UNSEALED)
+                yield Marked(waiting.popleft()[0], SealMark.UNSEALED)
         if not isinstance(word, Message) or isinstance(word, _OF_SEALS):
             yield Marked(frame, None)
         if not isinstance(word, Message):
             return
         waiting = self._waiting.setdefault(word.sender, deque())
         if isinstance(word, Seal):
-            yield from (Marked(one, Mark.SEALED) for one, *_ in waiting)
+            yield from (Marked(one, SealMark.SEALED) for one, *_ in waiting)
             waiting.clear()
         elif not isinstance(word, _OF_SEALS):
             # The seal of a sign of life stands right behind it.
             while waiting and (waiting[0][2] or len(waiting) >= MOST_WAITING):
-                yield Marked(waiting.popleft()[0], Mark.UNSEALED)
+                yield Marked(waiting.popleft()[0], SealMark.UNSEALED)
             waiting.append((frame, now_us, isinstance(word, Heartbeat)))
 
 
@@ -111,13 +115,13 @@ class _Proof(SealListener):
 
     def proved(self, frame: Frame, now_us: int) -> list[Frame]:
         for node in [node for node, (_, us) in self._unchanged.items() if now_us - us >= WAITS_US]:
-            self._end_unchanged(node, Mark.UNCHANGED)
+            self._end_unchanged(node, SealMark.UNCHANGED)
         word = self._reading(frame)
         if not isinstance(word, Message) or isinstance(word, _OF_SEALS) or word.sender not in self._nodes:
             is_word = isinstance(word, Message) and not isinstance(word, _OF_SEALS)
-            self._settled.append(Marked(frame, Mark.UNSEALED if is_word else None))
+            self._settled.append(Marked(frame, SealMark.UNSEALED if is_word else None))
             return self._seal_proved(word, frame, now_us) if isinstance(word, Seal) else super().proved(frame, now_us)
-        self._end_unchanged(word.sender, Mark.UNCHANGED)
+        self._end_unchanged(word.sender, SealMark.UNCHANGED)
         handed = super().proved(frame, now_us)
         if isinstance(word, Heartbeat) and frame in handed:
             self._unchanged[word.sender] = frame, now_us
@@ -130,7 +134,7 @@ class _Proof(SealListener):
         if heard is not None and self.faults[false] > before[0]:
             self._belied.update((id(one.frame), one.frame) for one in heard.waiting)
         elif heard is not None and heard.last != before[1]:
-            self._end_unchanged(seal.sender, Mark.RIGHT)
+            self._end_unchanged(seal.sender, SealMark.RIGHT)
         return handed
 
     def settled(self) -> list[Marked]:
@@ -141,25 +145,25 @@ class _Proof(SealListener):
     def end(self) -> None:
         """What still waits for a seal has none."""
         for heard in self._nodes.values():
-            self._settle(list(heard.waiting), Mark.UNSEALED)
+            self._settle(list(heard.waiting), SealMark.UNSEALED)
             heard.waiting.clear()
         for node in tuple(self._unchanged):
-            self._end_unchanged(node, Mark.UNCHANGED)
+            self._end_unchanged(node, SealMark.UNCHANGED)
 
-    def _end_unchanged(self, node: int, mark: Mark) -> None:
+    def _end_unchanged(self, node: int, mark: SealMark) -> None:
         frame, _ = self._unchanged.pop(node, (None, 0))
         if frame is not None:
             self._settled.append(Marked(frame, mark))
 
     def _accept(self, heard: HeardNode, found: Sequence[WaitingFrame]) -> list[Frame]:
-        self._settle(found, Mark.RIGHT)
+        self._settle(found, SealMark.RIGHT)
         return super()._accept(heard, found)
 
     def _count(self, node: int, why: SealWord, frames: Sequence[WaitingFrame]) -> None:
         super()._count(node, why, frames)
         self._settle(frames, _FALLEN[why])
 
-    def _settle(self, frames: Sequence[WaitingFrame], mark: Mark) -> None:
+    def _settle(self, frames: Sequence[WaitingFrame], mark: SealMark) -> None:
         for one in frames:
             is_belied = self._belied.pop(id(one.frame), None) is not None
-            self._settled.append(Marked(one.frame, Mark.WRONG if is_belied and mark is Mark.UNSEALED else mark))
+            self._settled.append(Marked(one.frame, SealMark.WRONG if is_belied and mark is SealMark.UNSEALED else mark))

@@ -15,7 +15,7 @@ from onboard.history.calls import CallHistory
 from onboard.history.history import Fact
 from onboard.history.lives import SILENT_BEATS
 from onboard.seal.keys import Keys
-from onboard.seal.marks import Mark, SealMarks
+from onboard.seal.marks import SealMark, SealMarks
 from onboard.trace.frame_bits import frame_bits
 from onboard.trace.indicators import Indicators
 from onboard.trace.scene.scenes import scene_of
@@ -157,7 +157,7 @@ class LivePicture:
             }
         if self._marks is not None:
             counts = self._marks.counts
-            told["seals"] = {mark.value: counts[node, mark] for mark in Mark if counts[node, mark]}
+            told["seals"] = {mark.value: counts[node, mark] for mark in SealMark if counts[node, mark]}
         return told
 
     def _state(self, node: int) -> str:

@@ -8,7 +8,7 @@ from onboard.config.keys import load_keys
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.seal.keys import Keys
-from onboard.seal.marks import Mark, SealMarks
+from onboard.seal.marks import SealMark, SealMarks
 from onboard.seal.subjects import Reading
 from onboard.systems.contract import codecs_for
 from onboard.trace.commands.common import TraceError
@@ -16,10 +16,10 @@ from onboard.trace.raw import RawFrame
 
 #: What of a node did not count, in the words of the verdict.
 _WRONG = {
-    Mark.UNSEALED: "without a seal",
-    Mark.WRONG: "with false seals",
-    Mark.AGAIN: "said again",
-    Mark.NOT_FRESH: "under a number that the log does not tell",
+    SealMark.UNSEALED: "without a seal",
+    SealMark.WRONG: "with false seals",
+    SealMark.AGAIN: "said again",
+    SealMark.NOT_FRESH: "under a number that the log does not tell",
 }
 
 
@@ -31,13 +31,13 @@ class LogProof:
 
     def __init__(self, nodes: Iterable[int], reading: Reading, keys: Keys | None) -> None:
         """``nodes``: those of the site; a key file tells of tools too."""
-        self.mark: Mark | None = None
+        self.mark: SealMark | None = None
         self._nodes = frozenset(nodes) if keys is None else frozenset((*keys.pairs, keys.node))
         self._reading, self._keys = reading, keys
         self._channels: dict[str, SealMarks] = {}
         #: Frames in the order of the log that wait for a mark: theirs, or that of one before them.
         self._order: deque[tuple[RawFrame, Frame | None]] = deque()
-        self._marks: dict[int, Mark | None] = {}
+        self._marks: dict[int, SealMark | None] = {}
 
     def counting(self, frame: RawFrame) -> Iterator[RawFrame]:
         """The frames that are known to count by now, at the time of this one."""
@@ -69,7 +69,7 @@ class LogProof:
         self.end(self._marks)
         yield from self._ready()
 
-    def end(self, marked: dict[int, Mark | None] | None = None) -> None:
+    def end(self, marked: dict[int, SealMark | None] | None = None) -> None:
         """The log is over: what still waits has no seal; ``marked`` takes marks by the ``id`` of their frames."""
         for marks in self._channels.values():
             for frame, mark in marks.end():
@@ -92,16 +92,16 @@ class LogProof:
             marks = self._channels[channel] = SealMarks(self._nodes, self._reading, group)
         return marks
 
-    def counts(self) -> Counter[tuple[int, Mark]]:
+    def counts(self) -> Counter[tuple[int, SealMark]]:
         """Frames by sender and mark, of all channels."""
-        return sum((one.counts for one in self._channels.values()), Counter[tuple[int, Mark]]())
+        return sum((one.counts for one in self._channels.values()), Counter[tuple[int, SealMark]]())
 
     def lines(self, name: Callable[[int], str]) -> list[str]:
         """A line for each node with its frames by mark; with keys also one for each that did not count."""
         counts = self.counts()
         told = [
             f"seals: {name(node)}: "
-            + ", ".join(f"{counts[node, mark]} {mark.value}" for mark in Mark if counts[node, mark])
+            + ", ".join(f"{counts[node, mark]} {mark.value}" for mark in SealMark if counts[node, mark])
             for node in sorted({node for node, _ in counts})
         ]
         if self._keys is None:
