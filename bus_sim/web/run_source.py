@@ -13,7 +13,7 @@ from onboard.contract.messages import Message
 from onboard.core.frame import Frame
 from onboard.core.site import Machine
 from onboard.web.app import CommandError, number
-from onboard.web.picture import LivePicture
+from onboard.web.picture import LivePicture, marks_of
 from onboard.wire.decoder import Decoder
 
 #: Fastest pace that a page may ask for, simulated seconds a second.
@@ -34,7 +34,7 @@ class RunSource:
 
     def __init__(self, run: BusRun[Any], zero: datetime | None = None, acts: Mapping[str, Act] | None = None) -> None:
         """``zero`` is the local time of loop time 0, None where the site's day has no clock."""
-        self.picture = LivePicture(run.site)
+        self.picture = LivePicture(run.site, marks_of(run.site, run.codecs, None))
         self.chance = random.Random(f"page:{run.options.seed}")
         self._run = run
         self._zero_s = zero.hour * 3600 + zero.minute * 60 + zero.second if zero is not None else 0
@@ -53,8 +53,9 @@ class RunSource:
         for node, medium in run.devices.items():
             medium.tap(self._device_tap(node), errors=False)
 
-    def _count(self, frame: Frame, _time_us: int, _sender: str) -> None:
+    def _count(self, frame: Frame, time_us: int, _sender: str) -> None:
         self.picture.count_frame(frame)
+        self.picture.mark_frame(frame, time_us)
 
     def _device_tap(self, node: int) -> Tap:
         decoder = Decoder(self._run.codecs.device)
