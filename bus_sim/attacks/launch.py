@@ -54,6 +54,8 @@ class _Attacker:
     def _hear(self, frame: Frame, time_us: int) -> None:
         if self._keys is not None:
             self._keys.hear(frame)
+            for answer in self._keys.answer(frame, time_us) if self._is_begun else ():
+                self._bus.send(answer)
         self._attack.hear_frame(frame, time_us)
         message = self._decoder.feed(frame, time_us)
         for word in singles(message) if message is not None else ():

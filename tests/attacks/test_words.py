@@ -119,3 +119,16 @@ def test_an_insider_seals_as_its_machine_and_as_others_all_but_what_has_a_taker(
     assert wire.heard[11] == [grant, held]
     # Node 5 itself hears what was said in its name.
     assert grant in wire.heard[5]
+
+
+def test_a_thief_of_a_node_that_is_not_there_answers_for_it() -> None:
+    wire, held = Wire({node: gate_of(node) for node in (1, 11)}), TokenHeld(5, TokenKind.SEGMENT, 259, 7)
+    thief = StolenKeys(_Keys(), 5, CODEC.decode_part)
+    wire.begin()
+    for _ in range(2):
+        heard = len(wire.log)
+        wire.put(thief.sealed(CODEC.encode(held)[0], wire.now_us))
+        for frame in wire.log[heard:]:
+            wire.put(thief.answer(frame, wire.now_us))
+        wire.wait(500_000)
+    assert wire.heard[11] == [held]
