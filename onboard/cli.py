@@ -73,6 +73,8 @@ examples:
       a live picture on a page of this computer; see onboard web --help
   onboard operate status -i socketcan -c can0 --site site.toml
       who stands and why; stop, go, block, clear, hold, release; see onboard operate --help
+  onboard conform -i socketcan -c can0 --site bench.toml --node 11 --kind robot
+      play a fleet's part against one node, and judge its duties; see onboard conform --help
   onboard keys make site.toml
       keys for a site with seals (docs/seals.md); see onboard keys --help
 """
@@ -193,6 +195,12 @@ def _operate(words: list[str]) -> int:
     return operate(words)
 
 
+def _conform(words: list[str]) -> int:
+    from onboard.conform.cli import main as conform  # noqa: PLC0415  # a controller must not carry it
+
+    return conform(words)
+
+
 def _keys(words: list[str]) -> int:
     from onboard.keys.cli import main as keys  # noqa: PLC0415  # a controller must not carry it
 
@@ -205,6 +213,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "web": _web,
     "gateway": _gateway,
     "operate": _operate,
+    "conform": _conform,
     "keys": _keys,
 }
 

@@ -54,6 +54,7 @@ WRITTEN = {
     "--draw",
     "--folder",
     "--json",
+    "--junit",
     "--networkd",
     "--out",
     "--parquet",

@@ -101,7 +101,9 @@ def _parts_of(system: str) -> Iterator[tuple[str, Layer]]:
         (*CORE_TYPES, own, "onboard.gateway", "onboard.history", "onboard.trace.view"),
         not_stdlib=frozenset({"random", "socket", "threading", "time"}),
     )
+    kit = (*CORE_TYPES, own, "onboard.conform", "onboard.core.token_keys")
     parts = {
+        "conform": Layer(kit, only_stdlib=PURE_STDLIB, pure=True),
         "gateway": edge,
         "history": fold,
         "words": words,
@@ -215,6 +217,18 @@ LAYERS: dict[str, Layer] = {
             "onboard.wire",
         )
     ),
+    # The kit decides as machines do, from frames and times alone; it knows no controller that it may judge.
+    "onboard.conform": Layer(
+        (*CORE_TYPES, *REGISTRY, "onboard.core.token_keys", "onboard.wire"), only_stdlib=PURE_STDLIB, pure=True
+    ),
+    "onboard.conform.report": Layer(("onboard.conform", "onboard.core.frame"), only_stdlib=PURE_STDLIB | {"xml"}),
+    # Its command line is a composition root: it opens the bus, the site file and what switches the node.
+    "onboard.conform.cli": Layer(
+        (
+            *(*CORE_TYPES, "onboard", "onboard.config", "onboard.conform", "onboard.io", "onboard.ports.bus"),
+            *("onboard.systems", "onboard.wire"),
+        )
+    ),
     # What a person says is decided from the history of the bus alone; the gateway's words for a held machine are its
     # own.
     "onboard.operate": Layer(
@@ -246,7 +260,14 @@ LAYERS: dict[str, Layer] = {
     "onboard": Layer(
         (
             *ALL_OF_ONBOARD,
-            *("onboard.cli", "onboard.entry", "onboard.keys.cli", "onboard.life", "onboard.operate.cli"),
+            *(
+                "onboard.cli",
+                "onboard.conform.cli",
+                "onboard.entry",
+                "onboard.keys.cli",
+                "onboard.life",
+                "onboard.operate.cli",
+            ),
             "onboard.trace.cli",
             *("onboard.web.address", "onboard.web.cli"),
             *(f"onboard.gateway.{name}" for name in ("cli", "gateway", "options", "settings")),

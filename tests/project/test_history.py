@@ -37,6 +37,8 @@ LOOK = {
     "onboard/operate/regenerate.py": "a conversation, whose statements count since all stand only",
     "onboard/operate/stops.py": "a conversation",
     "onboard/trace/commands/replay.py": "finds where a life begins",
+    # It shares nothing with what it may judge, and answers as machines do.
+    "onboard/conform/*.py": "a judge that plays all other machines",
     # Machines of other methods, machines that lie, and machines with a bug in them.
     "bus_sim/attacks/*.py": "an attacker",
     "bus_sim/systems/*/forged.py": "an attacker",

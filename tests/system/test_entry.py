@@ -49,4 +49,4 @@ def test_an_unknown_command_is_named(capsys: pytest.CaptureFixture[str]) -> None
         importlib.import_module("onboard.__main__").main(["watch"])
     told = capsys.readouterr().err
     assert caught.value.code == 2 and told.count("\n") == 1
-    assert '"watch" is no command; write trace, web, gateway, operate, keys, or --machine FILE' in told
+    assert '"watch" is no command; write trace, web, gateway, operate, conform, keys, or --machine FILE' in told

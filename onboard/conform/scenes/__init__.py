@@ -1,0 +1,1 @@
+"""What is played before the node under test, a file for each part of docs/protocol.md."""

@@ -1,0 +1,104 @@
+"""What is judged of every plan and place that a robot tells: chapters 7 and 8 of docs/protocol.md."""
+
+from itertools import pairwise
+
+from onboard.conform.cast import Cast
+from onboard.conform.checks import Check
+from onboard.conform.stage import Stage, Word
+from onboard.contract.codes import Grade, LegAction, TokenKind
+from onboard.contract.messages import Itinerary, Leg, Progress, TaskReport
+from onboard.core.token_keys import TokenKey
+from onboard.systems.car_park.conform.desk import Desk
+from onboard.systems.car_park.site import car_park
+
+#: Duty P13.
+_MOST_LEGS = 31
+_FOLLOW = "The legs follow each other in time and place: leg n begins when and where leg n - 1 ends"
+
+PLANS = (
+    Check("legs-follow-in-place", "P1", _FOLLOW),
+    Check("legs-follow-in-time", "P1", _FOLLOW),
+    Check("plan-has-few-legs", "P13", "At most 31 legs"),
+    Check(
+        "runs-take-their-time",
+        "P4",
+        ("A run over d mm with the site's top speed v and acceleration a lasts d/v + v/a seconds"),
+    ),
+    Check("runs-keep-to-the-track", "P3", "TRAVEL runs from rest to rest on one track"),
+    Check("works-at-a-station", "P3", "WORK is at the station beside `to_index` on `side`."),
+    Check("stands-where-it-is", "P3", "STAND waits."),
+    Check("plan-ends-in-a-refuge", "P5", "A plan ends in a refuge: a segment that is before no compartment"),
+    Check("place-names-its-plan", "P10", "`itinerary_version` and `leg` are of the plan in hand."),
+    Check("place-names-a-leg", "P10", "`itinerary_version` and `leg` are of the plan in hand."),
+    Check("is-only-where-it-may-be", "K2", "I move, or let move, only within segments whose tokens I hold"),
+    Check("reports-only-what-was-awarded", "B9", "I act on a task only when `Award` names me with AWARDED."),
+)
+
+
+class Plans:
+    """The judge of plans and places; made once for a play."""
+
+    def __init__(self, stage: Stage, cast: Cast) -> None:
+        self.stage, self.cast, self.site = stage, cast, car_park(stage.site)
+        self.desk = Desk(stage, cast)
+        stage.hearers.append(self.hear)
+
+    def hear(self, word: Word) -> None:
+        """One word of the node."""
+        if isinstance(word.message, Itinerary):
+            self._on_plan(word, word.message)
+        elif isinstance(word.message, Progress):
+            self._on_place(word, word.message)
+        elif isinstance(word.message, TaskReport):
+            is_known = word.message.task in self.stage.awarded or word.message.reason != 0
+            self.stage.judge("reports-only-what-was-awarded", is_known, "nobody awarded it", word)
+
+    def _on_plan(self, word: Word, plan: Itinerary) -> None:
+        if plan.grade is not Grade.FIRM or not plan.legs:
+            return
+        stage, pairs = self.stage, list(pairwise(plan.legs))
+        joined = all((a.track, a.to_index) == (b.track, b.from_index) for a, b in pairs)
+        stage.judge("legs-follow-in-place", joined, "a leg begins where none ends", word)
+        ordered = all((b.end_ms - a.end_ms) % 2**32 < 2**31 for a, b in pairs)
+        stage.judge("legs-follow-in-time", ordered, "a leg ends before the one before it", word)
+        stage.judge("plan-has-few-legs", len(plan.legs) <= _MOST_LEGS, f"{len(plan.legs)} legs", word)
+        short = [b for a, b in pairs if b.action is LegAction.TRAVEL and not self._lasts(a, b)]
+        stage.judge("runs-take-their-time", not short, f"too short: {short}", word)
+        for leg in plan.legs:
+            self._on_leg(word, leg)
+        last = plan.legs[-1]
+        if len(plan.legs) > 1:
+            is_refuge = (last.track, last.to_index) not in {bay.segment for bay in self.site.compartments.values()}
+            stage.judge("plan-ends-in-a-refuge", is_refuge, "ends before a compartment", word)
+
+    def _lasts(self, before: Leg, leg: Leg) -> bool:
+        lasts_us = (leg.end_ms - before.end_ms) % 2**32 * 1000
+        return lasts_us >= self.desk.run_us(leg.from_index, leg.to_index) - 2_000
+
+    def _on_leg(self, word: Word, leg: Leg) -> None:
+        stage, site = self.stage, self.site
+        if leg.action is LegAction.TRAVEL:
+            length = site.tracks[leg.track].length if leg.track in site.tracks else 0
+            inside = all(0 <= index <= length + 1 for index in (leg.from_index, leg.to_index))
+            stage.judge("runs-keep-to-the-track", length and inside, f"{leg}", word)
+        elif leg.action is LegAction.STAND:
+            stage.judge("stands-where-it-is", leg.from_index == leg.to_index, f"{leg}", word)
+        elif leg.action is LegAction.WORK:
+            here = (leg.track, leg.to_index, leg.side)
+            is_one = here in (*site.places, *site.compartments.values())
+            stage.judge("works-at-a-station", is_one, f"no station at {here}", word)
+
+    def _on_place(self, word: Word, at: Progress) -> None:
+        stage, plan = self.stage, self.stage.last(Itinerary)
+        if plan is not None and at.itinerary_version:
+            is_its = at.itinerary_version == plan.message.version
+            stage.judge("place-names-its-plan", is_its, f"the plan is {plan.message.version}", plan, word)
+            stage.judge("place-names-a-leg", at.leg <= len(plan.message.legs), "no such leg", plan, word)
+        holder = self.cast.holder(TokenKey(TokenKind.SEGMENT, at.track << 8 | at.index))[0]
+        if stage.means.power:
+            stage.judge("is-only-where-it-may-be", holder == stage.node, f"node {holder} has the segment", word)
+
+
+def watch(stage: Stage, cast: Cast) -> None:
+    """Judge plans and places from now on."""
+    Plans(stage, cast)
