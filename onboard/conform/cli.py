@@ -25,6 +25,7 @@ from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError, BusSettings, add_site_arguments, bus_settings, open_bus, parse_with_bus
 from onboard.ports.bus import Bus
 from onboard.systems.contract import codecs_for
+from onboard.systems.registry import part
 
 MISTAKE = 2
 EXAMPLES = """\
@@ -104,8 +105,12 @@ def _player(args: argparse.Namespace, site: Site) -> Player:
         raise ConformError(f"--node {args.node}: no machine of site {site.name}; it has {known}")
     if machine.kind.name.lower() != args.kind:
         raise ConformError(f"--kind {args.kind}: {machine.name} is a {machine.kind.name.lower()} by the site file")
-    if machine.kind is not KindCode.ROBOT or not any(one.station is not None for one in site.machines.values()):
+    if machine.kind is not KindCode.ROBOT or part(site.system, "conform") is None:
         raise ConformError(f"--kind {args.kind}: only robots of a car park can be judged yet; name a robot's node")
+    others = [one.name for one in site.machines.values() if one is not machine and one.station is None]
+    if others:
+        what = "only compartments are played yet; take a site of one floor with this robot alone"
+        raise ConformError(f"--site {site.name}: it has {', '.join(others)} beside {machine.name}; {what}")
     scenes = scenes_of(site)
     unknown = [name for name in args.scene if name not in {scene.name for scene in scenes}]
     if unknown:

@@ -23,6 +23,7 @@ COMMANDS = [
     ("trace", "replay", "LOG", "--machine", "MR1", "--site", "NAME"),
     ("trace", "dissector", "NAME"),
     ("operate", "status", "--site", "NAME", *NO_BUS),
+    ("conform", "--node", "11", "--kind", "robot", "--site", "NAME", *NO_BUS),
     ("gateway", "--mqtt", "mqtt://127.0.0.1:1", "--site", "NAME", *NO_BUS),
     ("web", "LOG", "--site", "NAME", "--web", "no-host-of-this-name.invalid:1"),
 ]

@@ -177,6 +177,12 @@ MISTAKES = [
 ]
 
 
+def test_a_site_with_lifts_and_further_robots_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["conform", "--node", "11", "--kind", "robot", "--site", "small", "-i", "virtual", "-c", "none"]
+    assert onboard(words) == 2
+    assert "--site small: it has ER1, ER2, MR2 beside MR1; only compartments are played" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(("words", "told"), MISTAKES)
 def test_a_mistake_is_one_line_with_the_remedy(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert onboard(["conform", *words, "-i", "virtual", "-c", "none", "--site", str(BENCH)]) == 2

@@ -1,0 +1,40 @@
+"""What ``python -m tests.conform.mutants`` does to a line, and that the play tells it."""
+
+import ast
+
+import pytest
+
+from tests.conform.mutants import mutated, mutations
+from tests.project.rows import ROOT
+
+PARTICIPANT = "onboard/core/negotiation/participant.py"
+
+
+def changed(line_of: str, what: str) -> str:
+    """The first line with these words, mutated so."""
+    text = (ROOT / PARTICIPANT).read_text(encoding="utf-8").splitlines()
+    number = next(number for number, line in enumerate(text, 1) if line_of in line)
+    found = [one for one in mutations(PARTICIPANT, {number}) if one.what == what]
+    assert found, (text[number - 1], what)
+    assert mutated(found[0]).co_filename.endswith(PARTICIPANT)
+    return found[0].what
+
+
+@pytest.mark.parametrize(
+    ("line", "what"),
+    [
+        ("if now_us > self.cut_off_us:", "contrary"),
+        ("self.counters.late_bids_ignored += 1", "one more"),
+        ("if no_account or not self.is_sound", "no not"),
+        ("self.is_stale = False", "contrary"),
+    ],
+)
+def test_each_kind_of_mutation_compiles(line: str, what: str) -> None:
+    assert changed(line, what) == what
+
+
+def test_all_lines_of_a_function_and_none_outside_are_drawn_from() -> None:
+    text = (ROOT / PARTICIPANT).read_text(encoding="utf-8")
+    lines = {one.line for one in mutations(PARTICIPANT, set(range(1, 1_000)))}
+    outside = {one.lineno for one in ast.parse(text).body if isinstance(one, ast.Import | ast.ImportFrom)}
+    assert len(lines) > 40 and not lines & outside
