@@ -35,7 +35,7 @@ class Shown(NamedTuple):
 
 
 @dataclass(slots=True)
-class Finding:
+class CheckResult:
     """What is known of one check so far: the first failure stands, whatever is seen later."""
 
     check: Check
@@ -57,15 +57,15 @@ class Finding:
 class Findings:
     """All checks of a play by name, in the order of the scenes."""
 
-    by_name: dict[str, Finding] = field(default_factory=dict)
+    by_name: dict[str, CheckResult] = field(default_factory=dict)
 
     def add(self, scene: str, checks: tuple[Check, ...]) -> None:
         """The checks of one scene. Raises ``ValueError`` for a name that is there already."""
         for check in checks:
             if check.name in self.by_name:
                 raise ValueError(f"two checks are named {check.name}")
-            self.by_name[check.name] = Finding(check, scene)
+            self.by_name[check.name] = CheckResult(check, scene)
 
-    def of(self, verdict: Verdict) -> list[Finding]:
+    def of(self, verdict: Verdict) -> list[CheckResult]:
         """Those with this verdict, in the order of the scenes."""
         return [one for one in self.by_name.values() if one.verdict is verdict]

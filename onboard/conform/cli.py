@@ -16,7 +16,7 @@ from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.conform.checks import Verdict
 from onboard.conform.player import Player
-from onboard.conform.report import Subject, frame_words, junit, lines_of, protocol, status, totals
+from onboard.conform.report import NodeUnderTest, frame_words, junit, lines_of, protocol, status, totals
 from onboard.conform.stage import Means
 from onboard.conform.suite import scenes_of, watchers_of
 from onboard.contract.codes import CONTRACT_VERSION, KindCode
@@ -205,7 +205,9 @@ def _tell(args: argparse.Namespace, site: Site, player: Player, bus: str) -> int
     machine, findings = site.machines[args.node], player.findings
     date = datetime.now(UTC).isoformat(timespec="seconds")
     program = f"onboard {__version__}"
-    subject = Subject(args.node, machine.name, args.kind, site.name, site.digest, CONTRACT_VERSION, program, bus, date)
+    subject = NodeUnderTest(
+        args.node, machine.name, args.kind, site.name, site.digest, CONTRACT_VERSION, program, bus, date
+    )
     for one in findings.of(Verdict.FAILED):
         print("\n".join(lines_of(one, frame_words)))
     print(totals(findings))

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from xml.sax.saxutils import escape, quoteattr
 
-from onboard.conform.checks import Finding, Findings, Shown, Verdict
+from onboard.conform.checks import CheckResult, Findings, Shown, Verdict
 
 #: Status of the program: all that was reached is kept; something is broken, or nothing was reached.
 CONFORMS, BREAKS = 0, 1
@@ -13,7 +13,7 @@ _UNPRINTABLE = {code: "?" for code in range(32) if code not in (9, 10, 13)}
 
 
 @dataclass(frozen=True, slots=True)
-class Subject:
+class NodeUnderTest:
     """What was judged, where and by which versions; ``date`` in ISO 8601, all for people."""
 
     node: int
@@ -38,7 +38,7 @@ def totals(findings: Findings) -> str:
     return f"{len(findings.by_name)} checks: {counts}"
 
 
-def lines_of(finding: Finding, words: Callable[[Shown], str]) -> list[str]:
+def lines_of(finding: CheckResult, words: Callable[[Shown], str]) -> list[str]:
     """A check that was broken, with its sentence and the frames that show it."""
     check = finding.check
     head = f"{finding.verdict.value.upper()}  {check.name}: {finding.why}"
@@ -53,7 +53,7 @@ def frame_words(shown: Shown) -> str:
     return f"({shown.time_us / 1e6:.6f}) {number}#{data}"
 
 
-def junit(findings: Findings, subject: Subject, words: Callable[[Shown], str]) -> str:
+def junit(findings: Findings, subject: NodeUnderTest, words: Callable[[Shown], str]) -> str:
     """A test suite with a case for each check; those that were not reached are skipped."""
     failed, skipped = len(findings.of(Verdict.FAILED)), len(findings.of(Verdict.NOT_REACHED))
     suite = f"onboard conform {subject.name} (node {subject.node})"
@@ -66,7 +66,7 @@ def junit(findings: Findings, subject: Subject, words: Callable[[Shown], str]) -
     return "\n".join(['<?xml version="1.0" encoding="UTF-8"?>', head, *cases, "</testsuite>", ""])
 
 
-def _case(finding: Finding, words: Callable[[Shown], str]) -> list[str]:
+def _case(finding: CheckResult, words: Callable[[Shown], str]) -> list[str]:
     check = finding.check
     start = f"  <testcase classname={_attribute(finding.scene)} name={_attribute(f'{check.name} [{check.duty}]')}"
     if finding.verdict is Verdict.PASSED:
@@ -81,7 +81,7 @@ def _attribute(text: str) -> str:
     return quoteattr(text.translate(_UNPRINTABLE))
 
 
-def protocol(findings: Findings, subject: Subject, words: Callable[[Shown], str]) -> str:
+def protocol(findings: Findings, subject: NodeUnderTest, words: Callable[[Shown], str]) -> str:
     """Markdown to be printed and signed: what was judged, each check and its result, those that failed in full."""
     rows = [
         f"| {name} | {value} |"

@@ -8,9 +8,9 @@ from xml.etree import ElementTree
 import pytest
 
 from onboard.cli import main as onboard
-from onboard.conform.checks import Check, Finding, Findings, Verdict
+from onboard.conform.checks import Check, CheckResult, Findings, Verdict
 from onboard.conform.player import Player
-from onboard.conform.report import Subject, frame_words, junit, lines_of, protocol, status, totals
+from onboard.conform.report import NodeUnderTest, frame_words, junit, lines_of, protocol, status, totals
 from onboard.conform.stage import Means
 from onboard.conform.suite import scenes_of, watchers_of
 from onboard.contract.messages import Heartbeat
@@ -27,7 +27,9 @@ CHECKS: tuple[Check, ...] = (
     *(check for scene in scenes_of(SITE) for check in scene.checks),
     *(check for checks, _ in watchers_of(SITE) for check in checks),
 )
-SUBJECT = Subject(11, "MR1", "robot", "bench", 0xABCD, 254, "onboard 0", "virtual bench", "2026-01-01T00:00:00+00:00")
+SUBJECT = NodeUnderTest(
+    11, "MR1", "robot", "bench", 0xABCD, 254, "onboard 0", "virtual bench", "2026-01-01T00:00:00+00:00"
+)
 
 
 @cache
@@ -157,7 +159,7 @@ def test_the_protocol_has_all_that_is_signed() -> None:
 
 
 def test_the_first_failure_stands() -> None:
-    finding = Finding(CHECKS[0], "a scene")
+    finding = CheckResult(CHECKS[0], "a scene")
     finding.judge("", (), is_kept=True)
     finding.judge("first", (), is_kept=False)
     finding.judge("second", (), is_kept=False)

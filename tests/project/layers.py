@@ -305,6 +305,9 @@ LAYERS: dict[str, Layer] = {
                 "onboard.entry",
                 *CORE_TYPES,
                 "onboard.io.journal",
+                # Which kinds keep secrets that must not be said on the fleet bus.
+                "onboard.systems.registry",
+                "onboard.systems.system",
                 "onboard.wire",
             ),
             *("hil.guest.effort", "hil.guest.initrd", "hil.guest.kernel"),

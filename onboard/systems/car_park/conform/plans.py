@@ -35,7 +35,7 @@ PLANS = (
 )
 
 
-class Plans:
+class PlanJudge:
     """The judge of plans and places; made once for a play."""
 
     def __init__(self, stage: Stage, cast: Cast) -> None:
@@ -101,4 +101,4 @@ class Plans:
 
 def watch(stage: Stage, cast: Cast) -> None:
     """Judge plans and places from now on."""
-    Plans(stage, cast)
+    PlanJudge(stage, cast)
