@@ -62,8 +62,11 @@ name = "MR2"
 node = 12
 home = "p(3,2)"
 """
-CAR = ["--one-car", "1", "--seed", "3", "--for", "60"]
-CHANGES = ["--join", "MR2=4", "--kill", "MR1=3", "--join", "MR1=6", "--leave", "MR2=12"]
+#: Bus time is that of the wall here, and on a busy machine a start takes seconds: MR1 has 10 s to be heard in before
+#: its power fails, and 16 s to come back in, MR2 16 s between coming and going. With this seed the car is called for
+#: after 30 s and parked after 50; its driver would have it back after 75.
+CAR = ["--one-car", "1", "--seed", "19", "--for", "60"]
+CHANGES = ["--join", "MR2=8", "--kill", "MR1=10", "--join", "MR1=14", "--leave", "MR2=24"]
 
 
 def heard(trace: Path) -> list[tuple[float, Message]]:
@@ -141,9 +144,13 @@ def test_p58_machines_join_leave_and_come_back_while_the_site_runs(processes: Pa
         if isinstance(message, Heartbeat):
             beats.setdefault(message.sender, []).append((at_s, message.boot))
     joined, left = beats[12][0][0], beats[12][-1][0]
-    assert joined >= 3.5 and left <= 13, "MR2 came late and went early"
+    assert joined >= beats[1][0][0] + 4 and left <= 25, "MR2 came late and went early"
     assert {boot for _, boot in beats[11]} == {1, 2}, "MR1 was killed and came back with its journal"
-    assert not [at_s for at_s, _ in beats[11] if 3.5 <= at_s < 6], "nothing is said between death and return"
+    last, back = (
+        max(at_s for at_s, boot in beats[11] if boot == 1),
+        min(at_s for at_s, boot in beats[11] if boot == 2),
+    )
+    assert back - last >= 3.5, "nothing is said between death and return"
     assert {boot for node in (1, 5) for _, boot in beats[node]} == {1}
     shown = (processes / "shown.txt").read_text()
     assert "MR1 was killed" in shown and "MR2 has left" in shown
