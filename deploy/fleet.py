@@ -2,18 +2,30 @@
 
 from pathlib import Path
 
-from deploy.wheels import DeployError
 from onboard.config.machine_text import BusTable, machine_text
 from onboard.config.shipped import site_source
 from onboard.config.site import parse_site
-from onboard.core.site import Site
+from onboard.core.site import Machine, Site
 from onboard.systems.registry import factory_for
 from onboard.systems.system import WithSecrets
 
+#: The device bus of a machine that may not share a wire.
+OWN_WIRE = "can1"
+
+
+def keeps_secrets(machine: Machine, site: Site) -> bool:
+    """Whether its devices say what nobody on the fleet bus may read."""
+    return isinstance(factory_for(site, machine.kind), WithSecrets)
+
 
 def machine_file(site: Site, node: int, fleet: str, device: str) -> str:
-    """The machine file of one node; one interface may carry both buses. Raises ``KeyError``."""
+    """The machine file of one node; one interface may carry both buses, but of a desk, as tickets are read on its own.
+
+    Raises ``KeyError``.
+    """
     machine = site.machines[node]
+    if device == fleet and keeps_secrets(machine, site):
+        device = OWN_WIRE if fleet != OWN_WIRE else "can0"
     kind = machine.kind.name.lower().replace("_", " ")
     head = f"# {machine.name}, a {kind} of site {site.name}, node {node}. All keys: docs/machine-file.md\n"
     devices = BusTable("socketcan", device) if device != fleet else None
@@ -21,17 +33,9 @@ def machine_file(site: Site, node: int, fleet: str, device: str) -> str:
 
 
 def write_fleet(site_file: Path, to: Path, fleet: str = "can0", device: str = "can1") -> list[Path]:
-    """Write ``to/NAME/machine.toml`` and ``site.toml`` for every machine.
-
-    Raises ``ConfigError``, ``OSError``, and ``DeployError`` where one wire would carry the secrets of a machine.
-    """
+    """Write ``to/NAME/machine.toml`` and ``site.toml`` for every machine. Raises ``ConfigError``, ``OSError``."""
     text, name = site_source(site_file)
     site = parse_site(text, name)
-    told = [one.name for one in site.machines.values() if isinstance(factory_for(site, one.kind), WithSecrets)]
-    if device == fleet and told:
-        raise DeployError(
-            f"{name}: tickets at {', '.join(told)} would be read on the fleet bus; give --device another channel"
-        )
     folders = []
     for node, machine in site.machines.items():
         folder = to / machine.name

@@ -29,7 +29,10 @@ ADVICE: dict[Reason, Advice] = {
     ),
     Reason.PARK_FULL: _KEPT,
     Reason.CAR_TOO_LARGE: _KEPT,
-    Reason.UNKNOWN_TICKET: _KEPT,
+    Reason.UNKNOWN_TICKET: Advice(
+        "a desk read a wrong ticket: another site's, or somebody guesses",
+        "nothing for a few; a customer with a right one is helped from afar (docs/operate.md)",
+    ),
     Reason.TOKEN_HELD_BY_OTHER: Advice("whoever was asked for a token does not hold it", _NOTHING),
     Reason.TOKEN_NOT_GRANTABLE_YET: Advice(
         "the holder needs the token itself, or another machine passes first",
@@ -37,7 +40,8 @@ ADVICE: dict[Reason, Advice] = {
     ),
     Reason.TOKEN_STALE_VERSION: _KEPT,
     Reason.NOT_AUTHORISED: Advice(
-        "the machine waits for a token that it has asked for", "nothing; if it stays so, find the token's holder"
+        "the machine waits for a token that it has asked for; or five wrong tickets have locked a desk for a minute",
+        "nothing; if it stays so, find the token's holder; at a desk, see who stands there",
     ),
     Reason.MIRROR_BEHIND: Advice(
         "two machines know different plans; they ask each other for what is missing",
