@@ -10,7 +10,8 @@ from bus_sim.options import RunOptions
 from bus_sim.run import FLEET, BusRun
 from bus_sim.serve.bridge import Bridge, open_bridge, parse_bus_specs
 from bus_sim.serve.socketcand import ServeError, SocketcandServer
-from onboard.io.kept_token import TokenFileError, kept_token
+from onboard.io.kept_token import kept_token
+from onboard.io.owned_file import OwnedFileError
 
 #: Of TCP.
 MOST_PORT = 65_535
@@ -83,7 +84,7 @@ class Outside:
         epoch_us = self._simulation.options.epoch_us
         try:
             token = kept_token(self._token_file) if self._token_file is not None else None
-        except TokenFileError as error:
+        except OwnedFileError as error:
             raise ServeError(f"--serve-token {error}") from error
         server = SocketcandServer(
             self._simulation.join, lambda time_us: epoch_us + time_us, host or "127.0.0.1", int(port), token

@@ -23,9 +23,10 @@ from onboard.io.broker_address import is_mqtt_installed
 from onboard.io.console import ConsoleTelemetry, ManyTelemetry
 from onboard.io.endings import ExitStatus
 from onboard.io.journal import FileJournal
-from onboard.io.kept_secrets import SecretsFileError, kept_secrets, secrets_path
+from onboard.io.kept_secrets import kept_secrets, secrets_path
 from onboard.io.networkd import write_network_files
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings
+from onboard.io.owned_file import OwnedFileError
 from onboard.io.seal_lives import SealLivesError
 from onboard.io.sealed_bus import sealed_bus
 from onboard.io.signals import terminated_as_interrupted
@@ -138,7 +139,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         gateway = _beside(args, config) if args.mqtt is not None else None
         secrets = _secrets(config, journal)
         return asyncio.run(run(config, fleet_settings, journal, gateway, keys, secrets))
-    except (ConfigError, BusOpenError, BrokerError, GatewayError, SealLivesError, SecretsFileError) as error:
+    except (ConfigError, BusOpenError, BrokerError, GatewayError, SealLivesError, OwnedFileError) as error:
         print(error if isinstance(error, ConfigError) else f"onboard: {error}", file=sys.stderr)
         return 2
     except OSError as error:
@@ -162,7 +163,7 @@ def _unfit(config: MachineConfig, fleet_settings: BusSettings) -> str:
 
 
 def _secrets(config: MachineConfig, journal: Path) -> tuple[bytes, ...]:
-    """What its kind keeps. A new one is told: other desks do not know it. Raises ``SecretsFileError``."""
+    """What its kind keeps. A new one is told: other desks do not know it. Raises ``OwnedFileError``."""
     if not _keeps_secrets(config):
         return ()
     path = secrets_path(journal)

@@ -164,18 +164,16 @@ class Bench:
         self._carry_out()
 
     def _carry_out(self) -> None:
-        for on in self.player.power:
-            self.switching = self.loop.create_task(self._switch(self.switching, on=on))
-        self.player.power.clear()
-        for frame in self.player.frames:
-            self.bus.send(frame)
-        self.player.frames.clear()
+        self.player.hand_out(self.bus.send, self._begin_switch)
         if self.player.is_over:
             self.over.set()
             return
         if self.timer is not None:
             self.timer.cancel()
         self.timer = self.loop.call_at(self.player.next_us() / 1_000_000, self._wake)
+
+    def _begin_switch(self, on: bool) -> None:
+        self.switching = self.loop.create_task(self._switch(self.switching, on=on))
 
     async def _switch(self, before: "asyncio.Task[None] | None", *, on: bool) -> None:
         if before is not None:

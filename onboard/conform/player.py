@@ -66,15 +66,14 @@ class Player:
         self._play: Play = self._all()
         self._wait = Wait(0)
 
-    @property
-    def frames(self) -> list[Frame]:
-        """What is to be sent, in this order; cleared by whoever sends it."""
-        return self.stage.out
-
-    @property
-    def power(self) -> list[bool]:
-        """How the node is to be switched, in this order."""
-        return self.stage.power
+    def hand_out(self, send: Callable[[Frame], object], switch: Callable[[bool], object]) -> None:
+        """Switch the node as the play wants it, then send what it says, each in its order."""
+        for on in self.stage.power:
+            switch(on)
+        self.stage.power.clear()
+        for frame in self.stage.out:
+            send(frame)
+        self.stage.out.clear()
 
     def start(self, now_us: int) -> None:
         """Begin the play at this time, with the fleet still away from the bus."""

@@ -3,12 +3,12 @@
 One line of 64 hexadecimal digits each, the newest first; lines with # are for people.
 """
 
-import os
 import re
 import secrets
-import stat
 from pathlib import Path
 from typing import NamedTuple
+
+from onboard.io.owned_file import OwnedFileError, make_owned, read_owned
 
 #: 256 bits: the longest key of BLAKE2s.
 SECRET_BYTES = 32
@@ -16,10 +16,6 @@ SECRET_BYTES = 32
 MOST_SECRETS = 2
 _LINE = re.compile(rf"[0-9a-f]{{{2 * SECRET_BYTES}}}")
 _MOST_BYTES = 4_096
-
-
-class SecretsFileError(Exception):
-    """A file of secrets that cannot be used; ``str`` is one line: file, what is wrong, what to do. It holds none."""
 
 
 class KeptSecrets(NamedTuple):
@@ -35,46 +31,28 @@ def secrets_path(journal: Path) -> Path:
 
 
 def kept_secrets(path: Path) -> KeptSecrets:
-    """The secrets in a file; without a file one is drawn, and is durable. Raises ``SecretsFileError``."""
+    """The secrets in a file; without a file one is drawn, and is durable. Raises ``OwnedFileError``."""
     try:
         return KeptSecrets((_made(path),), is_new=True)
     except FileExistsError:
         return KeptSecrets(_read(path), is_new=False)
     except OSError as error:
-        raise SecretsFileError(f"{path}: {error.strerror or error}; name another folder with --journal") from error
+        raise OwnedFileError(f"{path}: {error.strerror or error}; name another folder with --journal") from error
 
 
 def _made(path: Path) -> bytes:
     path.parent.mkdir(parents=True, exist_ok=True)
     secret = secrets.token_bytes(SECRET_BYTES)
-    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as file:
-        file.write(f"{secret.hex()}\n")
-        file.flush()
-        os.fsync(file.fileno())
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
+    make_owned(path, secret.hex())
     return secret
 
 
 def _read(path: Path) -> tuple[bytes, ...]:
-    try:
-        # Without waiting: a pipe that nobody writes into is no file.
-        with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
-            state = os.fstat(file.fileno())
-            if not stat.S_ISREG(state.st_mode):
-                raise SecretsFileError(f"{path}: is not a file; put the desks' file there, or move it away")
-            if state.st_mode & 0o077:
-                raise SecretsFileError(f"{path}: others may read it; chmod 600 {path}")
-            text = file.read(_MOST_BYTES).decode("ascii", "replace")
-    except OSError as error:
-        raise SecretsFileError(f"{path}: {error.strerror or error}; name a file that can be read") from error
-    lines = [line.strip() for line in text.splitlines()]
+    told = read_owned(path, _MOST_BYTES, "put the desks' file there, or move it away")
+    lines = [line.strip() for line in told]
     lines = [line for line in lines if line and not line.startswith("#")]
     if not 1 <= len(lines) <= MOST_SECRETS or not all(_LINE.fullmatch(line) for line in lines):
         digits = 2 * SECRET_BYTES
         what = f"is not one line of {digits} hexadecimal digits, or two"
-        raise SecretsFileError(f"{path}: {what}; write it again with onboard keys tickets, or move it away")
+        raise OwnedFileError(f"{path}: {what}; write it again with onboard keys tickets, or move it away")
     return tuple(bytes.fromhex(line) for line in lines)

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import ClassVar
 
 from onboard.core.frame import Frame
-from onboard.io.kept_token import TokenFileError, read_token
+from onboard.io.kept_token import read_token
+from onboard.io.owned_file import OwnedFileError
 from onboard.io.settings import BusOpenError, BusSettings
 from onboard.io.socketcand_protocol import DEFAULT_PORT, Splitter, format_send, parse_frame
 from onboard.io.subscribers import Subscribers
@@ -253,7 +254,7 @@ async def open_socketcand(settings: BusSettings) -> SocketcandBus:
     if token_file is not None:
         try:
             channel = f"{channel}:{read_token(Path(str(token_file)))}"
-        except TokenFileError as error:
+        except OwnedFileError as error:
             raise BusOpenError(f"interface {settings.interface}: token_file = {error}") from error
     bus = SocketcandBus(str(host), port, channel, give_up_s)
     await bus.start()

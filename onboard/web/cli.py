@@ -12,8 +12,9 @@ from onboard.config.keys import load_keys
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Site
-from onboard.io.kept_token import TokenFileError, kept_token
+from onboard.io.kept_token import kept_token
 from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
+from onboard.io.owned_file import OwnedFileError
 from onboard.io.signals import ended_by
 from onboard.seal.keys import Keys
 from onboard.systems.contract import codecs_for
@@ -89,7 +90,7 @@ def web_token(path: Path | None) -> str | None:
     """The token that is kept in a file; None for none. Raises ``WebError``."""
     try:
         return None if path is None else kept_token(path)
-    except TokenFileError as error:
+    except OwnedFileError as error:
         raise WebError(f"--web-token {error}") from error
 
 

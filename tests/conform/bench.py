@@ -51,12 +51,7 @@ class VirtualBench:
             self.carry_out()
 
     def carry_out(self) -> None:
-        for on in self.player.power:
-            self.switch(on)
-        self.player.power.clear()
-        for frame in self.player.frames:
-            self.bus.send(frame)
-        self.player.frames.clear()
+        self.player.hand_out(self.bus.send, self.switch)
         if self.player.is_over:
             self.over.set()
             return

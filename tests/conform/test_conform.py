@@ -201,9 +201,9 @@ def test_the_player_takes_up_frames_and_times_only() -> None:
     """No bus: whoever calls it says what time it is, and what it is to hear."""
     player = Player(SITE, 11, fleet_codec(), scenes_of(SITE)[:1], ALL, watchers_of(SITE))
     player.start(1_000)
-    assert player.power == [False] and player.frames == []
+    assert player.stage.power == [False] and player.stage.out == []
     player.wake(player.next_us())
-    while not player.frames:
+    while not player.stage.out:
         player.wake(player.next_us())
-    assert player.stage.now_us == 4_001_000 and player.power == [False, True]
+    assert player.stage.now_us == 4_001_000 and player.stage.power == [False, True]
     assert totals(player.findings).startswith(f"{len(player.findings.by_name)} checks: 1 passed, 0 failed")

@@ -1,12 +1,10 @@
 """docs/protocol.md and the DBC files are enough: a robot written from them, importing nothing of ours, parks cars."""
 
 import ast
-from asyncio import TimerHandle
 from functools import partial
 from pathlib import Path
 
 from bus_sim.can.faults import FaultKind, InjectedFault
-from bus_sim.run import FLEET
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import CallResult, TaskPhase
@@ -20,53 +18,16 @@ from onboard.contract.messages import (
     TaskReport,
     TokenDispute,
 )
-from onboard.core.frame import Frame
 from onboard.systems.car_park.site import car_park
-from tests.foreign.robot import Robot
-from tests.foreign.site import Alley
+from tests.conform.foreign import joins
 from tests.system.scene import play, stays
 
 SITE = car_park(find_site("level1"))
 ROBOT = SITE.machine("MR1")
-#: From one wake to the next, so that a robot that is wrong does not stop time.
-AT_LEAST_US = 1_000
-
-
-class Harness:
-    """The foreign robot's two buses and its clock, in virtual time."""
-
-    def __init__(self, simulation: Simulation) -> None:
-        self.loop, (bay,) = simulation.loop, SITE.compartments.values()
-        places = tuple(place.number for place in SITE.places)
-        site = tuple(SITE.machines), SITE.digest, SITE.bitrate, SITE.stewards[1], SITE.tracks[1].length
-        self.robot = Robot(Alley(ROBOT.node_id, *site, ROBOT.home.index, bay.number, places))
-        self.buses = {
-            FLEET: simulation.fleet.attach("foreign", ROBOT.node_id),
-            "device": simulation.devices[ROBOT.node_id].attach("foreign", ROBOT.node_id),
-        }
-        self.timer: TimerHandle | None = None
-        for name, bus in self.buses.items():
-            bus.subscribe(partial(self.on_frame, name))
-        self.carry_out(self.robot.start())
-
-    def on_frame(self, name: str, frame: Frame, _: int) -> None:
-        self.carry_out(self.robot.receive(name, frame.arbitration_id, frame.data, self.loop.now_us()))
-
-    def wake(self) -> None:
-        self.carry_out(self.robot.wake(self.loop.now_us()))
-
-    def carry_out(self, frames: list[tuple[str, int, bytes]]) -> None:
-        for name, number, data in frames:
-            self.buses[name].send(Frame(number, data))
-        if self.timer is not None:
-            self.timer.cancel()
-        due_us = self.robot.next_due()
-        if due_us is not None:
-            self.timer = self.loop.call_at(max(due_us, self.loop.now_us() + AT_LEAST_US) / 1e6, self.wake)
 
 
 def join(simulation: Simulation) -> None:
-    Harness(simulation)
+    joins(simulation)(True)
 
 
 def test_it_imports_nothing_of_ours() -> None:

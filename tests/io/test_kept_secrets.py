@@ -6,7 +6,8 @@ import pytest
 
 from bus_sim.sites import site_text
 from onboard.cli import main
-from onboard.io.kept_secrets import KeptSecrets, SecretsFileError, kept_secrets, secrets_path
+from onboard.io.kept_secrets import KeptSecrets, kept_secrets, secrets_path
+from onboard.io.owned_file import OwnedFileError
 
 FIRST, SECOND = "ab" * 32, "cd" * 32
 BUS = 'interface = "virtual"\nchannel = "{}"\n'
@@ -39,7 +40,7 @@ def test_a_secret_is_drawn_once_for_its_owner_alone(tmp_path: Path) -> None:
     ids=["open", "empty", "short", "too many"],
 )
 def test_a_file_that_is_none_is_refused_and_never_told(tmp_path: Path, text: str, mode: int, why: str) -> None:
-    with pytest.raises(SecretsFileError, match=why) as error:
+    with pytest.raises(OwnedFileError, match=why) as error:
         kept_secrets(written(tmp_path / "secret", text, mode))
     assert FIRST[:16] not in str(error.value)
 

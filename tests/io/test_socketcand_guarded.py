@@ -9,8 +9,9 @@ import pytest
 from bus_sim.cli import main as bus_sim
 from bus_sim.serve.socketcand import SocketcandServer
 from onboard.core.frame import Frame
-from onboard.io.kept_token import TokenFileError, kept_token, read_token
+from onboard.io.kept_token import kept_token, read_token
 from onboard.io.open_bus import BusOpenError, BusSettings, open_bus
+from onboard.io.owned_file import OwnedFileError
 from tests.io.hub import Ears, Hub
 from tests.tools import DEADLINE_S
 
@@ -99,18 +100,18 @@ def test_a_token_is_made_once_for_its_owner_alone(tmp_path: Path) -> None:
     assert kept.stat().st_mode & 0o077 == 0
     assert kept_token(tmp_path / "other") != word
     kept.chmod(0o644)
-    with pytest.raises(TokenFileError, match="others may read it; chmod 600"):
+    with pytest.raises(OwnedFileError, match="others may read it; chmod 600"):
         kept_token(kept)
     kept.chmod(0o600)
     for wrong in ("", "short", "a" * 129, "sixteen letters and a blank"):
         kept.write_text(wrong, encoding="ascii")
-        with pytest.raises(TokenFileError, match="its first line needs 16 to 128"):
+        with pytest.raises(OwnedFileError, match="its first line needs 16 to 128"):
             kept_token(kept)
     for place in (Path("/dev/zero"), tmp_path, tmp_path / "none" / "token"):
-        with pytest.raises(TokenFileError) as told:
+        with pytest.raises(OwnedFileError) as told:
             kept_token(place)
         assert "\n" not in str(told.value)
-    with pytest.raises(TokenFileError, match="does not exist"):
+    with pytest.raises(OwnedFileError, match="does not exist"):
         read_token(tmp_path / "none")
 
 
