@@ -12,7 +12,7 @@ All times are bus time in us. Pure: plans, progress and grants in, an order out.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import takewhile
+from itertools import pairwise, takewhile
 from typing import NamedTuple
 
 from onboard.contract.codes import LegAction, Reason
@@ -100,6 +100,12 @@ class _Way:
                 return
             elif leg.from_index == segment.index:
                 yield self.to_come(number)
+
+    def stays(self, segment: Segment, first: int, last: int) -> bool:
+        """Whether it is in a segment without a break from its turn ``first`` moving legs before the end to ``last``."""
+        stay = [turn for turn in self.turns.get(segment, ()) if last <= turn.to_come <= first]
+        ends = [stay[0].to_come, stay[-1].to_come] if stay else []
+        return ends == [first, last] and all(one.to_us >= two.from_us for one, two in pairwise(stay))
 
     def to_come(self, leg: int) -> int:
         """How many moving legs come behind leg number ``leg``."""
@@ -327,7 +333,8 @@ class PassingOrder:
     def _is_in_front(self, node: int, other: int, segment: Segment, mine: Turn, theirs: Turn) -> bool:
         """Whether ``other`` passes before ``node`` by where it is: in my next run, from where it goes on or leaves.
 
-        Whatever was agreed, no plan leads through a body. Who stands there for ever gives way.
+        Whatever was agreed, no plan leads through a body. Who stands there for ever gives way. Where my run ends in a
+        segment I come behind it with all that I do there until I leave: not into it behind the other, out of it before.
         """
         there = self.place(other)
         number = self._run_through(node, there)
@@ -335,7 +342,9 @@ class PassingOrder:
             return False
         way, run = self._ways[node], self._ways[node].itinerary.legs[number]
         step = _step(run)
-        if mine.to_come != way.to_come(number) or segment.index not in range(there.index, run.to_index + step, step):
+        if segment.index not in range(there.index, run.to_index + step, step):
+            return False
+        if not way.stays(segment, way.to_come(number), mine.to_come):
             return False
         if self._run_through(other, self.place(node)) is not None:
             return False

@@ -51,6 +51,18 @@ def test_who_stands_between_goes_first_whatever_rights_the_other_has_beyond() ->
     assert firsts(one, two, BEYOND) == {SECOND, 0}
 
 
+def test_who_comes_to_where_another_stands_also_leaves_after_it() -> None:
+    """Else each would wait for the other to leave first, and put that off again with each plan (seed 8109)."""
+    site = line_site(9, 10, QUICK, 10)
+    one = robot(site, FIRST, [travel(8, BETWEEN, 0, 80), travel(BETWEEN, 8, 80, 160)], award_ms=1)
+    two = robot(site, SECOND, [work(BETWEEN, 0, 20), travel(BETWEEN, 1, 90, 120)], award_ms=2)
+    tell_all([one, two])
+    order = two.fleet.mirror.order
+    found = order.meetings(SECOND, FIRST)
+    assert {meeting.theirs.to_come for meeting in found if meeting.mine.to_come == 0} == {0, 1}
+    assert {order.in_front(SECOND, FIRST, meeting) for meeting in found} == {SECOND}
+
+
 def test_of_two_that_stand_in_each_others_way_neither_is_in_front() -> None:
     one, _ = met([stand(BETWEEN, 0, 150), travel(BETWEEN, 9, 150, 350)])
     order = one.fleet.mirror.order
