@@ -8,7 +8,9 @@ from onboard.contract.messages import (
     CarAt,
     Itinerary,
     Leg,
+    Reference,
     Stamp,
+    SyncRequest,
     TaskReport,
     TokenRefusal,
     TokenRequest,
@@ -58,6 +60,33 @@ def test_a_winner_of_which_nothing_shows_is_told_again_that_it_has_the_task() ->
     bay.hears(coming(CHEAP))
     bay, deeds = after_a_while(bay)
     assert not [word for word in deeds if isinstance(word, Award)], "its plan leads here"
+
+
+def called(deeds: list[Deed]) -> list[Reference]:
+    return [word.task for word in deeds if isinstance(word, CallForProposals)]
+
+
+def test_a_winner_that_plans_no_work_and_has_no_right_to_the_car_is_not_waited_for() -> None:
+    """It says that it has the task, and stands: the customer waited until that was seen by its place, half a minute."""
+    away = Leg(LegAction.TRAVEL, HERE.track, HERE.index, HERE.index + 1, HERE.side, 600_000)
+    elsewhere = coming(CHEAP).legs[0]._replace(from_index=HERE.index + 1, to_index=HERE.index + 1)
+    for leg, expected in ((away, [TASK]), (elsewhere, [])):
+        bay = waiting()
+        bay.hears(Itinerary(CHEAP, 1, Grade.FIRM, Stamp(1_000, BAY, 1), (leg,)))
+        bay, deeds = after_a_while(bay)
+        assert called(deeds) == []
+        assert called(after_a_while(bay)[1]) == expected
+
+
+def test_what_nobody_could_do_is_called_for_as_soon_as_a_robot_is_back() -> None:
+    bay = waiting()
+    bay.hears(GIVEN_BACK)
+    deeds: list[Deed] = []
+    while not any(isinstance(word, Award) and word.result is CallResult.REFUSED for word in deeds):
+        bay, deeds = after_a_while(bay)
+    assert called(after_a_while(bay)[1]) == [], "that waits for half a minute"
+    bay.hears(SyncRequest(CHEAP, BAY, 0))
+    assert called(after_a_while(bay)[1]) == [TASK]
 
 
 def test_what_a_robot_does_not_know_it_gives_back_and_it_is_called_for_anew() -> None:

@@ -194,7 +194,7 @@ class AtWork:
             self.fleet.mirror.admit(word.sender, NOW_US)
             self.fleet.tokens.begin_anew(NOW_US)
             self.fleet.negotiation.begin_anew(NOW_US)
-        return self._statements(NOW_US)
+        return [*self.behaviour.hear(word, NOW_US), *self._statements(NOW_US)]
 
     def _takes_up(self, word: Message) -> list[Effect]:
         mirror = self.fleet.mirror

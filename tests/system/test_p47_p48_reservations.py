@@ -171,7 +171,9 @@ def test_p47_being_outbid_frees_what_was_pre_engaged(outbid: tuple[Scene, Rival]
     bid_us, _ = scene.first(Bid, lambda m: m.sender == 11)
     award_us, award = scene.first(Award, lambda m: (m.sender, m.call) == rival.call)
     assert (award.winner, award.result) == (200, CallResult.AWARDED) and award_us > bid_us
-    assert not [t for t, m in scene.all(TaskReport) if m.sender == 11 and m.task == award.task]
+    # The better one does nothing, so that the car is called for once more.
+    anew_us, _ = scene.first(CallForProposals, lambda m: m.task == award.task, after_us=award_us)
+    assert not [t for t, m in scene.all(TaskReport) if m.sender == 11 and m.task == award.task and t < anew_us]
 
 
 def test_p47_the_next_bid_is_as_if_the_lost_one_had_never_been(outbid: tuple[Scene, Rival]) -> None:

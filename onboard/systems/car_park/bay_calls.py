@@ -9,7 +9,16 @@ from dataclasses import dataclass
 
 from onboard.contract.codes import CallResult, KindCode, LegAction, Operation, Reason, TaskPhase
 from onboard.contract.constants import ANY_STATION, NOBODY, TASK_VERSION_BITS
-from onboard.contract.messages import Award, CallForProposals, Leg, Reference, TaskReport, TokenRefusal, TokenRequest
+from onboard.contract.messages import (
+    Award,
+    CallForProposals,
+    Leg,
+    Reference,
+    SyncRequest,
+    TaskReport,
+    TokenRefusal,
+    TokenRequest,
+)
 from onboard.core.authority import TokenKey
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.negotiation import EVENT_TYPES
@@ -21,11 +30,15 @@ from onboard.systems.car_park.bay_task import REMINDERS, RETRY_US, SETTLING_US, 
 from onboard.systems.car_park.site import open_end
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.ways.mirror import WayFleet
+from onboard.ways.retreats import has_work
 from onboard.ways.tokens import car_token
 
 #: A winner of whose task nothing shows is told after this that it has it, and again, us: a plan is told within a second
 #: of its award, and who finds no way for longer than this is asked once, or gives the task back.
 ASK_AGAIN_US = 10_000_000
+#: A winner whose plan has no work at all, and whose car is another's, has lost the task after this, us: one that finds
+#: no way gives it back sooner (``going_around.KEEP_US``), and one that has not heard of it has been told meanwhile.
+NOTHING_SHOWN_US = 13_000_000
 
 
 @dataclass
@@ -62,8 +75,16 @@ class BayCalls:
 
     # --- what is heard -----------------------------------------------------------------------------------------
 
-    def remind(self, request: TokenRequest) -> list[Effect]:
-        """Who asks for the car of a task hears whose that is, where it may not know."""
+    def on_request(self, request: TokenRequest | SyncRequest, now_us: int) -> list[Effect]:
+        """Who asks for the car of a task hears whose that is, where it may not know; a robot that is back is called.
+
+        Who asks what others know has just come, or was without bus time: of no bid before does it tell anything.
+        """
+        if isinstance(request, SyncRequest):
+            machine = self.fleet.site.machines.get(request.sender)
+            for task in self.in_hand() if machine is not None and machine.kind is KindCode.ROBOT else ():
+                task.may_be_served(now_us)
+            return []
         wanted = TokenKey(request.token_kind, request.token)
         found = (task for task in self.in_hand() if wanted == car_token(*task.car))
         return [effect for task in found for effect in task.remind(self.fleet.node_id, request.sender)]
@@ -229,13 +250,22 @@ class BayCalls:
             # Whoever brings it here has it, whomever a word was believed that came late.
             return [] if self._work_here(record.custodian) is None else self.won_by(task, record.custodian, 0)
         if self.is_shown(task):
-            task.asked_us = None
+            task.unshown_us = task.ask_at_us = None
             return []
-        asked_us = task.asked_us = now_us if task.asked_us is None else task.asked_us
-        if now_us < asked_us + ASK_AGAIN_US:
+        if task.unshown_us is None or task.ask_at_us is None:
+            task.unshown_us, task.ask_at_us = now_us, now_us + ASK_AGAIN_US
+        lost_us = task.unshown_us + NOTHING_SHOWN_US
+        if now_us >= lost_us and not self._may_work(task):
+            return self.call_again(task, now_us)
+        if now_us < task.ask_at_us:
             return []
-        task.asked_us = now_us
+        task.ask_at_us = lost_us if now_us < lost_us else now_us + ASK_AGAIN_US
         return [Send(task.award(self.fleet.node_id))]
+
+    def _may_work(self, task: BayTask) -> bool:
+        """Whether the winner has work, or a right to the car: then it may be about this task, whatever it shows."""
+        plan, holder = self.fleet.mirror.itineraries.get(task.winner), self.fleet.tokens.holder_of(car_token(*task.car))
+        return holder == task.winner or (plan is not None and has_work(plan))
 
     def is_shown(self, task: BayTask) -> bool:
         """Whether the winner has the task by its plan, or its car by its word; or nobody can be asked, or need be."""
@@ -251,7 +281,7 @@ class BayCalls:
         """When a call is made again, or a winner counts as lost; the job's call only where its phase waits for it."""
         tasks = [self.ahead, self.job if is_job_asked else None]
         times = [task.retry_at_us for task in tasks if task is not None]
-        times += [task.asked_us + ASK_AGAIN_US for task in self.in_hand() if task.asked_us is not None]
+        times += [task.ask_at_us for task in self.in_hand()]
         return min([one for one in (*times, self.stewardship.next_wake()) if one is not None], default=None)
 
     def taken_at_us(self, now_us: int) -> int | None:

@@ -77,8 +77,9 @@ class BayTask:
     call: int = 0
     was_granted: bool = False
     retry_at_us: int | None = None
-    #: Since when nothing shows that its winner has it, or when that was last told so; None while something does.
-    asked_us: int | None = None
+    #: Since when nothing shows that its winner has it, and when that is told so next; None while something does.
+    unshown_us: int | None = None
+    ask_at_us: int | None = None
     reminders: int = 0
     #: How often nobody could, one after the other, and why the last time; its driver may leave before anybody is asked.
     refusals: int = 0
@@ -102,6 +103,11 @@ class BayTask:
     def wait(self, now_us: int) -> None:
         """Its next call is made a whole pause from now, us."""
         self.retry_at_us = now_us + min(LONGEST_RETRY_US, RETRY_US << min(self.refusals - 1, 10))
+
+    def may_be_served(self, now_us: int) -> None:
+        """A robot has come back: where nobody could before, this is called for as soon as it may bid."""
+        if self.refusals and self.retry_at_us is not None:
+            self.retry_at_us = min(self.retry_at_us, now_us + SETTLING_US)
 
     def terms(self, source: int, sink: int, floor: Callable[[CallForProposals, int], int]) -> RequestedTerms:
         """The call for it, between two stations by number; no robot can be better than ``floor``."""

@@ -33,6 +33,7 @@ from onboard.contract.messages import (
     Message,
     OperatorOrder,
     Reference,
+    SyncRequest,
     TaskReport,
     TicketRead,
     TokenRefusal,
@@ -169,13 +170,10 @@ class Compartment:
         if isinstance(message, TaskReport):
             is_starting, heard = self.phase is BayPhase.STARTING, self.stewardship.hear(message, now_us)
             return heard + self.calls.on_report(message, now_us, is_starting=is_starting)
-        if isinstance(message, TokenRequest) and self.calls.in_hand():
-            return self.calls.remind(message)
-        if isinstance(message, TokenRefusal):
-            answer = self.calls.refused_to_winner(message, now_us)
-            if answer is not None:
-                return answer
-        return self.stewardship.hear(message, now_us)
+        if isinstance(message, TokenRequest | SyncRequest) and self.calls.in_hand():
+            return self.calls.on_request(message, now_us)
+        answer = self.calls.refused_to_winner(message, now_us) if isinstance(message, TokenRefusal) else None
+        return self.stewardship.hear(message, now_us) if answer is None else answer
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """An own call closed: note the winner, or tell why not. Awarded a RECEIVE: the car is fetched to this bay."""
