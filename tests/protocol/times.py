@@ -74,7 +74,7 @@ TIMES: dict[str, tuple[Time, ...]] = {
         Time("T_away", winners.LOST_AFTER_US, _FIXED, "a winner that is an obstacle for so long is lost"),
         Time("T_idle", winners.STANDS_AFTER_US, _FIXED, "a winner of which nothing changes for so long is lost"),
         Time("T_out", trust.OUT_OF_TASK_US, _FIXED, "out of calls for a task; doubled with each time"),
-        Time("T_out_all", trust.OUT_OF_ALL_US, _FIXED, "out of all calls after two; doubled with each time"),
+        Time("T_out_all", trust.OUT_OF_ALL_US, _FIXED, "out of all calls after two; four times as long with each more"),
         Time("T_out_most", trust.MOST_OUT_US, _FIXED, "nobody is out for longer"),
         Time("T_late", trust.LATE_MS * 1000, _FIXED, "mean lateness beyond twice the others' that counts as a fail"),
     ),
@@ -106,6 +106,12 @@ TIMES: dict[str, tuple[Time, ...]] = {
         Time("T_retry", bay_task.RETRY_US, _FIXED, "a task that nobody could do is called for again; doubled"),
         Time("T_retry_most", bay_task.LONGEST_RETRY_US, _FIXED, "it grows no longer"),
         Time("T_ask", bay_calls.ASK_AGAIN_US, _FIXED, "an award is said again to a winner that shows nothing of it"),
+        Time(
+            "T_shown",
+            bay_calls.NOTHING_SHOWN_US,
+            _FIXED,
+            "a winner that plans no work has lost its task: longer than one without a way keeps it",
+        ),
         Time("T_claim", bay_task.SETTLING_US, _FIXED, "after a restart, time for a winner to say that it is one"),
     ),
     "restart": (

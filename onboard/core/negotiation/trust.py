@@ -1,8 +1,8 @@
 """Who is left out of an initiator's calls, because it won tasks and did not do them (docs/protocol.md, A8).
 
 Who forfeits a task is out of its next calls; who forfeits several in a row, with nothing done in between, is out of all
-calls of this initiator, each time for twice as long. A task that is done ends that. So does a restart of the initiator:
-whoever fails again is found again.
+calls of this initiator, each time for four times as long. A task that is done ends that. So does a restart of the
+initiator: whoever fails again is found again.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from onboard.core.serial import to_bus_ms
 
 #: How long who failed once is out of the calls for that task, us, doubled with each time: one call goes by without it.
 OUT_OF_TASK_US = 120_000_000
-#: How long who failed twice in a row is out of all calls, us, doubled with each time more: others serve meanwhile.
+#: How long who failed twice in a row is out of all calls, us, four times as long with each time more: others serve.
 OUT_OF_ALL_US = 120_000_000
 #: No longer than this, us: a machine that was repaired needs nobody to say so.
 MOST_OUT_US = 3_600_000_000
@@ -101,7 +101,7 @@ class Trust:
         record = self._records.setdefault(node, _Record())
         record.fails += 1
         if record.fails > 1:
-            record.out_until_us = now_us + min(MOST_OUT_US, OUT_OF_ALL_US << record.fails - 2)
+            record.out_until_us = now_us + min(MOST_OUT_US, OUT_OF_ALL_US << 2 * (record.fails - 2))
 
     def _is_liar(self, node: int) -> bool:
         """Whether it is late by far more than anybody else: where all are late, the park is full, not one a liar."""

@@ -2,8 +2,8 @@
 
 With drivers one behind the other outside, cars go in and out by turns: the robot that brings one finds the bay locked
 and empty behind the robot that took the other. Without a queue the next car is called for while a driver still gets
-into his own; drivers, who cannot be seen outside, are invited after ``MOST_OUT`` cars at the latest. ``call_at =
-"key"`` in the site file leaves all this out (row P50's order).
+into his own; drivers, who cannot be seen outside, are invited after ``MOST_OUT`` cars at the latest. With ``call_at =
+"key"`` in the site file nothing is called for ahead (row P50's order), and they are invited after each car.
 """
 
 from collections import deque
@@ -26,6 +26,9 @@ QUEUED_US = 2_500_000
 #: So many cars go out one behind the other while nobody looked for drivers: a look costs ``QUEUED_US`` and the lead of
 #: the next car's robot, some 25 s, a tenth of three of the 53 to 99 s that a car takes a bay (docs/decisions.md).
 MOST_OUT = 3
+#: And where the key calls, so that a look costs no more than ``QUEUED_US``: who waited behind three cars waited twice
+#: as long as anybody else (docs/decisions.md).
+MOST_OUT_BY_KEY = 1
 #: From driving in until the input door begins to lock, us: a drive of 10 to 30 s and a walk of 4 to 8 s on average.
 ENTERED_US = 26_000_000
 #: Who drives in has pressed the key within this, us: the longest drive, and a person's patience once.
@@ -70,17 +73,18 @@ class Pipeline:
     def _is_drivers_turn(self) -> bool:
         """Drivers come one behind the other, or might: nobody has looked for long."""
         is_exit = self.park.bay_uses.get(self.fleet.node_id) is BayUse.EXIT
-        return self.is_queued or (self.outs >= MOST_OUT and not is_exit)
+        most = MOST_OUT if self.is_on else MOST_OUT_BY_KEY
+        return self.is_queued or (self.outs >= most and not is_exit)
 
     # --- a driver comes in -------------------------------------------------------------------------------------
 
     def enters(self, now_us: int) -> list[Effect]:
         """Somebody is in the free bay: call for a robot before the car is measured, where any place will do."""
-        if not self.is_on:
-            return []
         if self.free_from_us is not None:
             self.is_queued, self.free_from_us = now_us - self.free_from_us <= QUEUED_US, None
             self.outs = 0
+        if not self.is_on:
+            return []
         is_told_by_size = bool(self.park.classes) or self.park.measures_width
         if self.entering_until_us or is_told_by_size or not bay_task.has_room(ANY_CLASS, self.park, self.fleet.mirror):
             return []
@@ -94,18 +98,16 @@ class Pipeline:
     def is_out_next(self, now_us: int) -> tuple[bool, list[Effect]]:
         """The bay is empty: whether it is locked for a car that is to come out, and what is said to have it fetched."""
         bay_task.forget_tickets(self.tickets, self.fleet.mirror)
-        if not self.is_on:
-            # After a restart the journal may know of a task whose bay was not noted yet.
-            has_task = self.calls.ahead is not None
-            return has_task or (bool(self.tickets) and custody.place_of(self.fleet, self.tickets[0]) is not None), []
         self.entering_until_us = 0
         self.free_from_us = now_us if self.free_from_us is None else self.free_from_us
         was_open_for_all = now_us - self.free_from_us >= QUEUED_US
         if self._is_drivers_turn and not was_open_for_all:
             return False, []
         self.is_queued, self.outs = False, 0 if was_open_for_all else self.outs
-        called = [] if self.calls.ahead is not None else self.call(now_us, now_us)
-        is_out = self.calls.ahead is not None
+        # After a restart the journal may know of a task whose bay was not noted yet.
+        called = self.call(now_us, now_us) if self.is_on and self.calls.ahead is None else []
+        is_asked_for = bool(self.tickets) and custody.place_of(self.fleet, self.tickets[0]) is not None
+        is_out = self.calls.ahead is not None or (is_asked_for and not self.is_on)
         self.outs += is_out
         return is_out, called
 
