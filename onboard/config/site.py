@@ -66,6 +66,8 @@ def site_digest(site: Site) -> int:
     text = json.dumps(
         _meaning(site, {"digest", "time_zone", *site.demand}), sort_keys=True, separators=(",", ":"), default=_plain
     )
+    words = getattr(part(site.system, "frames"), "WORDS", None)
+    text += "" if words is None else f"{words:08X}"
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:2], "big") or 1
 
 

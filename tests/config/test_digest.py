@@ -1,12 +1,15 @@
 """The site's digest: what makes two machines strangers, and what does not."""
 
 from dataclasses import dataclass, field, fields, make_dataclass, replace
+from zlib import crc32
 
 import pytest
 
 from bus_sim.sites import find_site, site_text
+from dbc import system_dbc_text, systems
 from onboard.config.site import parse_site, site_digest
 from onboard.core.site import Site
+from onboard.systems.registry import part
 from tests.mapd.sites import made
 
 #: What is added to a shipped file: one more thing that comes to the site while it runs.
@@ -39,6 +42,19 @@ def test_a_field_that_a_later_version_adds_changes_nothing_until_it_is_used() ->
     later = make_dataclass("Later", [("doors", int, field(default=1))], bases=(type(site),), frozen=True, kw_only=True)
     assert site_digest(later(**names)) == site.digest
     assert site_digest(later(**names, doors=2)) != site.digest
+
+
+@pytest.mark.parametrize("system", systems())
+def test_builds_that_mean_other_things_by_a_systems_own_words_are_strangers(
+    system: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = system_dbc_text(system)
+    assert text is not None
+    lines = [line for line in text.splitlines() if line.startswith(("BO_ ", " SG_ "))]
+    module, site = part(system, "frames"), made(2, []) if system == "mapd" else find_site(system)
+    assert module is not None and crc32("\n".join(lines).encode()) == module.WORDS
+    monkeypatch.setattr(module, "WORDS", module.WORDS ^ 1)
+    assert site_digest(site) != site.digest
 
 
 def test_defaults_are_left_out_at_any_depth() -> None:

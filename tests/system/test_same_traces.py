@@ -20,8 +20,8 @@ RUNS = {
     "small --random 40 15 --cars 3 --fault crash:target=MR1,at_s=80,restart_s=5": "ff154d3d04f7e0c4",
     "standard --random 30 15 --cars 3": "13bc7793fc9e5464",
     "large --random 30 15 --cars 2": "f6744d200d67a19d",
-    "graph --for 150": "1a4438a05bd81180",
-    "terminal --for 150": "7faf3d03b6ad3d8d",
+    "graph --for 150": "4949031e170ebb8e",
+    "terminal --for 150": "99cccf65bcc7a6c0",
 }
 
 

@@ -24,14 +24,19 @@ def _enumeration(table: ValueTable) -> str:
 
 def version(contract: DbcFile) -> str:
     """The numbers by which machines of one contract know each other."""
-    lines = [line for line in contract.text.splitlines() if line.startswith(("BO_ ", " SG_ "))]
-    digest = zlib.crc32("\n".join(lines).encode()) & 0x7F | 0x80
+    digest = words_digest(contract) & 0x7F | 0x80
     return (
         f"#: The contract of dbc/{contract.name}.dbc.\nCONTRACT = {contract.version}\n"
         "#: What heartbeats say of it; a machine with another number joins as an obstacle and never bids. While the\n"
         "#: contract is open: 128 plus the low 7 bits of a CRC-32 over the DBC (docs/protocol.md), so that builds\n"
         f"#: of different days are strangers.\nCONTRACT_VERSION = 0x{digest:02X}\n"
     )
+
+
+def words_digest(contract: DbcFile) -> int:
+    """CRC-32 (as of zlib) over the lines that say how its messages are laid out (docs/protocol.md, chapter 16)."""
+    lines = [line for line in contract.text.splitlines() if line.startswith(("BO_ ", " SG_ "))]
+    return zlib.crc32("\n".join(lines).encode())
 
 
 def message_class(frame: DbcMessage) -> str:

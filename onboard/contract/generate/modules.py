@@ -9,7 +9,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from dbc import device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text, systems
-from onboard.contract.generate.classes import HEAD, enumerations, message_class, set_classes, uses, version
+from onboard.contract.generate.classes import (
+    HEAD,
+    enumerations,
+    message_class,
+    set_classes,
+    uses,
+    version,
+    words_digest,
+)
 from onboard.contract.generate.decoding import function_name, reader, table_name, unpack_function
 from onboard.contract.generate.encoding import pack_function, tools
 from onboard.contract.generate.model import TUPLES, ContractError, DbcFile, DbcMessage, FrameSet, read_contract
@@ -81,6 +89,8 @@ def generated(every: tuple[DbcFile, ...]) -> dict[str, str]:
             sets = tuple(one for one in contract.sets if one.module == module)
             files[f"{module}.py"] = _classes(contract, module, frames, sets, own)
             files[f"packing/{module}.py"] = _packing(contract, module, frames, sets, own)
+            if module in systems():
+                files[f"packing/{module}.py"] += _words(contract)
             if contract in (fleet, device):
                 names = [frame.layout.name for frame in frames] + [one.name for one in sets]
                 shared[module] = sorted([*names, *(one.repeated for one in sets if one.repeated)])
@@ -154,6 +164,12 @@ def _frames(frames: tuple[DbcMessage, ...], first: dict[str, str]) -> str:
             f"{layout.name}, {says}, ({senders}), {frame.is_device}),"
         )
     return "\n".join([*lines, ")"]) + "\n"
+
+
+def _words(contract: DbcFile) -> str:
+    """By what machines of one system know that they mean the same by its own words."""
+    number = f"WORDS = 0x{words_digest(contract):08X}\n"
+    return f"#: CRC-32 over this system's DBC: part of the digest of its sites (docs/site-file.md).\n{number}"
 
 
 def _every_message(shared: dict[str, list[str]]) -> str:

@@ -388,3 +388,5 @@ FRAMES = (
     ),
     FrameCode("PartAt", 0x0EAD0000, 8, pack_part_at, unpack_part_at, PartAt, PartAt, ("Arm", "Desk"), False),
 )
+#: CRC-32 over this system's DBC: part of the digest of its sites (docs/site-file.md).
+WORDS = 0xF65D75DF

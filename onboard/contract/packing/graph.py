@@ -176,3 +176,5 @@ FRAMES = (
     ),
     FrameCode("RobotAt", 0x0E730000, 8, pack_robot_at, unpack_robot_at, RobotAt, RobotAt, ("Vehicle",), False),
 )
+#: CRC-32 over this system's DBC: part of the digest of its sites (docs/site-file.md).
+WORDS = 0x8C94A3CB

@@ -198,3 +198,5 @@ FRAMES = (
         "StepState", 0x06BE0000, 8, pack_step_state, unpack_step_state, StepState, StepState, ("Vehicle",), False
     ),
 )
+#: CRC-32 over this system's DBC: part of the digest of its sites (docs/site-file.md).
+WORDS = 0x1B29B942

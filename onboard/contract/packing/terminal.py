@@ -315,3 +315,5 @@ FRAMES = (
     ),
     FrameCode("LaneState", 0x0E640000, 8, pack_lane_state, unpack_lane_state, LaneState, LaneState, ("Desk",), False),
 )
+#: CRC-32 over this system's DBC: part of the digest of its sites (docs/site-file.md).
+WORDS = 0xC3D417C5

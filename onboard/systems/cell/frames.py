@@ -3,3 +3,5 @@
 from onboard.contract.packing import cell, cell_device
 
 FRAMES = (*cell.FRAMES, *cell_device.FRAMES)
+#: By what builds of different days are strangers.
+WORDS = cell.WORDS

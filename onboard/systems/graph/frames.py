@@ -3,3 +3,5 @@
 from onboard.contract.packing import graph, graph_device
 
 FRAMES = (*graph.FRAMES, *graph_device.FRAMES)
+#: By what builds of different days are strangers.
+WORDS = graph.WORDS

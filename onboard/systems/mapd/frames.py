@@ -3,3 +3,5 @@
 from onboard.contract.packing import mapd, mapd_device
 
 FRAMES = (*mapd.FRAMES, *mapd_device.FRAMES)
+#: By what builds of different days are strangers.
+WORDS = mapd.WORDS

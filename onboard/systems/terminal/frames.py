@@ -3,3 +3,5 @@
 from onboard.contract.packing import terminal, terminal_device
 
 FRAMES = (*terminal.FRAMES, *terminal_device.FRAMES)
+#: By what builds of different days are strangers.
+WORDS = terminal.WORDS

@@ -3,3 +3,5 @@
 from onboard.contract.packing import turning, turning_device
 
 FRAMES = (*turning.FRAMES, *turning_device.FRAMES)
+#: By what builds of different days are strangers.
+WORDS = turning.WORDS
