@@ -1,6 +1,7 @@
 """Compartments as pipelines: who comes in is called for while he drives, and the next car while the bay still works."""
 
 import asyncio
+from itertools import pairwise
 
 import pytest
 
@@ -124,6 +125,15 @@ def test_drivers_who_cannot_be_seen_outside_are_let_in_between_the_cars_that_go_
     *fetched, comes = (customer.visit for customer in scene.simulation.plant.street.customers)
     gone = [visit.gone_us for visit in fetched if visit.gone_us is not None]
     assert comes.parked_us is not None and sum(gone_us < comes.parked_us for gone_us in gone) == MOST_OUT
+
+
+def test_where_the_key_calls_cars_go_in_and_out_by_turns() -> None:
+    """Two are asked for while two drivers queue: neither side waits for both of the other."""
+    scene = play(at_the_key(one_floor()), stays((0, 300), (100, 300), (300, None), (300, None)), extra_s=30)
+    assert_served(scene, 4, 2)
+    order = [one.operation for _, one in scene.all(CallForProposals, "fleet") if one.attempt == 1]
+    assert order[:2] == [Operation.PARK, Operation.PARK]
+    assert all(one is not other for one, other in pairwise(order[2:]))
 
 
 def restarted(at_s: float, demand: Demand, name: str = "IOC1") -> Scene:

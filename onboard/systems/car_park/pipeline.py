@@ -3,7 +3,7 @@
 With drivers one behind the other outside, cars go in and out by turns: the robot that brings one finds the bay locked
 and empty behind the robot that took the other. Without a queue the next car is called for while a driver still gets
 into his own; drivers, who cannot be seen outside, are invited after ``MOST_OUT`` cars at the latest. With ``call_at =
-"key"`` in the site file nothing is called for ahead (row P50's order), and they are invited after each car.
+"key"`` in the site file nothing is called for ahead (row P50's order), and they take turns in any case.
 """
 
 from collections import deque
@@ -26,8 +26,7 @@ QUEUED_US = 2_500_000
 #: So many cars go out one behind the other while nobody looked for drivers: a look costs ``QUEUED_US`` and the lead of
 #: the next car's robot, some 25 s, a tenth of three of the 53 to 99 s that a car takes a bay (docs/decisions.md).
 MOST_OUT = 3
-#: And where the key calls, so that a look costs no more than ``QUEUED_US``: who waited behind three cars waited twice
-#: as long as anybody else (docs/decisions.md).
+#: And where the key calls, so that a look costs no more than ``QUEUED_US`` (docs/decisions.md).
 MOST_OUT_BY_KEY = 1
 #: From driving in until the input door begins to lock, us: a drive of 10 to 30 s and a walk of 4 to 8 s on average.
 ENTERED_US = 26_000_000
@@ -71,10 +70,10 @@ class Pipeline:
 
     @property
     def _is_drivers_turn(self) -> bool:
-        """Drivers come one behind the other, or might: nobody has looked for long."""
-        is_exit = self.park.bay_uses.get(self.fleet.node_id) is BayUse.EXIT
-        most = MOST_OUT if self.is_on else MOST_OUT_BY_KEY
-        return self.is_queued or (self.outs >= most and not is_exit)
+        """Drivers come one behind the other, or might: nobody has looked for long. Where the key calls: by turns."""
+        if self.park.bay_uses.get(self.fleet.node_id) is BayUse.EXIT:
+            return self.is_queued
+        return self.is_queued or self.outs >= MOST_OUT if self.is_on else self.outs >= MOST_OUT_BY_KEY
 
     # --- a driver comes in -------------------------------------------------------------------------------------
 
