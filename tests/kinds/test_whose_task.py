@@ -1,7 +1,7 @@
 """Compartment and robot come to agree whose a task is, whatever either of them missed, forgot or believed too late."""
 
 from onboard.contract.codes import CallResult, Grade, LegAction, Reason, TaskPhase
-from onboard.contract.constants import ANY_STATION
+from onboard.contract.constants import ANY_STATION, NOBODY
 from onboard.contract.messages import (
     Award,
     CallForProposals,
@@ -17,16 +17,20 @@ from onboard.contract.messages import (
 )
 from onboard.core.records import TokenGivenRecord, TokenGoneRecord
 from onboard.systems.car_park.bay_memory import winner_record
-from onboard.systems.car_park.bay_task import REMINDERS
+from onboard.systems.car_park.bay_task import REMINDERS, BayPhase
+from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.recovery import award_record
 from tests.models.at_work import AtWork, Deed, Entry
 from tests.models.award import BAY, CAR, CHEAP, DEAR, KEY, PLACE, TASK, WHEELBASE_MM, AwardPart
 from tests.models.custody import CALL, HERE
-from tests.models.snapshot import WHILE_US, copied
+from tests.models.snapshot import NOW_US, WHILE_US, copied
 
 PART = AwardPart()
 AGAIN = Award(BAY, 0, CHEAP, TASK, 1, CallResult.AWARDED, Reason.NONE)
 GIVEN_BACK = TaskReport(CHEAP, TASK, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST)
+
+
+GIVEN_TO_THE_DEAR = [made(KEY.kind, KEY.number, 2, DEAR).entry for made in (TokenGivenRecord, TokenGoneRecord)]
 
 
 def started(node: int, *more: Entry) -> AtWork:
@@ -78,6 +82,25 @@ def test_a_winner_that_plans_no_work_and_has_no_right_to_the_car_is_not_waited_f
         assert called(after_a_while(bay)[1]) == expected
 
 
+def came_back(bay: AtWork, *, is_loaded: bool) -> BayPhase | None:
+    behaviour = bay.behaviour
+    assert isinstance(behaviour, Compartment)
+    return behaviour.calls.bay_came_back(NOW_US, is_loaded=is_loaded)[0]
+
+
+def test_a_bay_that_a_robot_had_and_did_nothing_in_waits_for_whoever_has_the_task_now() -> None:
+    """A robot gave the task back before the right reached it: the car was taken for parked, and stayed."""
+    assert came_back(elsewhere(), is_loaded=True) is BayPhase.CLOSING
+    assert came_back(waiting(), is_loaded=False) is BayPhase.CLOSING, "it was fetched, and may be out already"
+    assert came_back(elsewhere(), is_loaded=False) is BayPhase.AWAITING
+    brings = started(BAY, winner_record(CAR, DEAR, TASK, 1).entry, *GIVEN_TO_THE_DEAR)
+    assert came_back(brings, is_loaded=False) is None, "whoever has it gives it, or asks again"
+    bay = started(BAY, winner_record(CAR, NOBODY, TASK, 1).entry, *GIVEN_TO_THE_DEAR)
+    assert came_back(bay, is_loaded=False) is BayPhase.AWAITING
+    bay.hears(CarAt(DEAR, CAR, PLACE.number, 2, WHEELBASE_MM))
+    assert called(after_a_while(bay)[1]) == [TASK], "nobody has it: it is called for"
+
+
 def test_what_nobody_could_do_is_called_for_as_soon_as_a_robot_is_back() -> None:
     bay = waiting()
     bay.hears(GIVEN_BACK)
@@ -103,8 +126,7 @@ def test_a_robot_that_has_the_task_says_so() -> None:
 
 def elsewhere() -> AtWork:
     """The compartment has given the car to the dear robot, and by its journal the cheap one has won the task."""
-    given = [made(KEY.kind, KEY.number, 2, DEAR).entry for made in (TokenGivenRecord, TokenGoneRecord)]
-    return started(BAY, winner_record(CAR, CHEAP, TASK, 1).entry, *given)
+    return started(BAY, winner_record(CAR, CHEAP, TASK, 1).entry, *GIVEN_TO_THE_DEAR)
 
 
 def test_a_winner_whom_the_cars_custodian_does_not_know_is_not_waited_for_after_a_restart() -> None:

@@ -26,7 +26,7 @@ from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Station
 from onboard.systems.car_park import bay_task, custody
 from onboard.systems.car_park.bay_memory import BayMemory, ahead_over_record, ahead_record, job_record
-from onboard.systems.car_park.bay_task import REMINDERS, RETRY_US, SETTLING_US, BayTask
+from onboard.systems.car_park.bay_task import REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask
 from onboard.systems.car_park.site import open_end
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.ways.mirror import WayFleet
@@ -230,6 +230,24 @@ class BayCalls:
         if ahead is not None and ahead.retry_at_us is not None and ahead.retry_at_us <= now_us:
             effects += self.call_for(ahead, now_us)
         return effects
+
+    def bay_came_back(self, now_us: int, *, is_loaded: bool) -> tuple[BayPhase | None, list[Effect]]:
+        """The robot that had the bay gives it back: the next phase, None while it has the car or sensors are behind.
+
+        One that did nothing there had lost the task before it had the right: whoever has it now is waited for.
+        """
+        job = self.job
+        assert job is not None
+        is_mine = custody.is_mine(self.fleet, job.car)
+        is_parked = job.operation is Operation.PARK
+        # A car that was fetched may be out already: its driver took it while this machine was off.
+        if not is_loaded if is_parked else is_loaded or is_mine:
+            return BayPhase.CLOSING, []
+        if not is_mine and (is_parked or self.fleet.tokens.holder_of(car_token(*job.car)) == job.winner):
+            return None, []
+        job.was_granted = False
+        is_nobodys = not job.winner and job.retry_at_us is None and not self._is_open(job)
+        return BayPhase.AWAITING, self.settle(job, now_us) if is_nobodys else []
 
     def settle(self, task: BayTask, now_us: int) -> list[Effect]:
         """Taken up from the journal without a winner: whoever has it says so first.

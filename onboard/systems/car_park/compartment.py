@@ -387,8 +387,7 @@ class Compartment:
         if self.bay.person_inside:
             # Who presses again has no ticket: the power failed before it was printed.
             asked, self._key = self._key is not None, None
-            is_new = self.job.operation is Operation.PARK
-            return self.outputs.reprint(self.job.car) if asked and is_new else []
+            return self.outputs.reprint(self.job.car) if asked and self.job.operation is Operation.PARK else []
         return self.outputs.door(DoorName.INPUT, DoorAction.CLOSE)
 
     def _when_reserving(self, now_us: int) -> list[Effect]:
@@ -427,11 +426,12 @@ class Compartment:
 
     def _when_serving(self, now_us: int) -> list[Effect]:
         """The robot has had the bay and gave it back: steps 13 and 14."""
-        assert self.job is not None
+        assert self.job is not None and self.bay is not None
         if not self.job.was_granted or not self.fleet.tokens.holds(station_token(self.station)):
             return []
-        self._go(BayPhase.CLOSING)
-        return self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
+        phase, effects = self.calls.bay_came_back(now_us, is_loaded=bool(self.bay.load_kg))
+        self._robot_waits &= phase is not BayPhase.AWAITING
+        return effects + self._shut(phase) if phase is not None else []
 
     def _when_closing(self, now_us: int) -> list[Effect]:
         job = self.job
@@ -468,8 +468,7 @@ class Compartment:
         refused = TaskReport(self.fleet.node_id, job.task, TaskPhase.REFUSED, self.station.number, job.reason)
         effects: list[Effect] = [Send(refused)] if job.operation is Operation.PARK else []
         effects += custody.state(self.fleet, job.car, OUTSIDE, job.wheelbase_mm)
-        effects.append(self.outputs.show(DeskText.WELCOME, Reference(0, 0)))
-        return effects + self._to_free()
+        return [*effects, self.outputs.show(DeskText.WELCOME, Reference(0, 0)), *self._to_free()]
 
     # --- inner works -------------------------------------------------------------------------------------------
 
@@ -483,10 +482,12 @@ class Compartment:
         return [Report(said), *(self._give_back(job) if job.operation is Operation.PARK else [])]
 
     def _give_back(self, job: BayTask) -> list[Effect]:
-        if self.phase is not BayPhase.HANDOVER:
-            self._go(BayPhase.CLOSING)
-            return self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
-        return [self.outputs.show(DeskText.CAR_READY, job.car)]
+        is_out = self.phase is BayPhase.HANDOVER
+        return [self.outputs.show(DeskText.CAR_READY, job.car)] if is_out else self._shut(BayPhase.CLOSING)
+
+    def _shut(self, phase: BayPhase) -> list[Effect]:
+        self._go(phase)
+        return self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
 
     def _is(self, door: DoorName, position: DoorPosition) -> bool:
         assert self.doors is not None

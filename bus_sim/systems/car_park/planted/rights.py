@@ -136,7 +136,9 @@ def _all_is_mine(simulation: Simulation) -> None:
 BUGS = (
     PlantedBug("never-given", "one-holder", "a right is stated under a version that nobody gave", _never_given),
     PlantedBug("steward-for-ever", "one-holder", "a steward takes others' slots for its own", _others_are_mine),
-    PlantedBug("keeps-what-it-gives", "doors", "a compartment gives its bay and does not erase it", _without_erasing),
+    PlantedBug(
+        "keeps-what-it-gives", "one-holder", "a compartment gives its bay and does not erase it", _without_erasing
+    ),
     PlantedBug("drives-unasked", "inside-authority", "a robot drives to its goal, whatever it holds", _unasked),
     PlantedBug("body-is-a-point", "inside-authority", "a robot gives slots back while its rear is in", _a_point),
     PlantedBug("all-is-mine", "one-body", "robots take every slot for their own", _all_is_mine),
