@@ -109,7 +109,7 @@ AWARD = {
 
 LEAVING = {
     "a grant is said before it is written": Planted(TokenBook, "give", _turned, TWO),
-    "the place of a car is not written": Planted(custody, "before_taking", _unwritten, LOST),
+    "the place of a car is not written": Planted(custody, "before_taking", _unwritten, TRAP),
     "a car is taken before its place is known": Planted(custody, "before_taking", _never_refused, LOST),
     "where a car is left is said once": Planted(custody, "before_grant", _nothing, TRAP),
     "a keeper forgets where its cars stand": Planted(custody, "replay", _nothing, TRAP),

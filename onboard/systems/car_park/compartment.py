@@ -430,8 +430,11 @@ class Compartment:
         if not self.job.was_granted or not self.fleet.tokens.holds(station_token(self.station)):
             return []
         phase, effects = self.calls.bay_came_back(now_us, is_loaded=bool(self.bay.load_kg))
+        if phase is None:
+            return []
         self._robot_waits &= phase is not BayPhase.AWAITING
-        return effects + self._shut(phase) if phase is not None else []
+        self._go(BayPhase.AWAITING if phase is BayPhase.AWAITING else BayPhase.CLOSING)
+        return effects + self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
 
     def _when_closing(self, now_us: int) -> list[Effect]:
         job = self.job
@@ -482,11 +485,9 @@ class Compartment:
         return [Report(said), *(self._give_back(job) if job.operation is Operation.PARK else [])]
 
     def _give_back(self, job: BayTask) -> list[Effect]:
-        is_out = self.phase is BayPhase.HANDOVER
-        return [self.outputs.show(DeskText.CAR_READY, job.car)] if is_out else self._shut(BayPhase.CLOSING)
-
-    def _shut(self, phase: BayPhase) -> list[Effect]:
-        self._go(phase)
+        if self.phase is BayPhase.HANDOVER:
+            return [self.outputs.show(DeskText.CAR_READY, job.car)]
+        self._go(BayPhase.CLOSING)
         return self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
 
     def _is(self, door: DoorName, position: DoorPosition) -> bool:
