@@ -243,7 +243,8 @@ class BayCalls:
         # A car that was fetched may be out already: its driver took it while this machine was off.
         if not is_loaded if is_parked else is_loaded or is_mine:
             return BayPhase.CLOSING, []
-        if not is_mine and (is_parked or self.fleet.tokens.holder_of(car_token(*job.car)) == job.winner):
+        holder = self.fleet.tokens.holder_of(car_token(*job.car))
+        if not is_mine and (is_parked or (holder == job.winner and holder != NOBODY)):
             return None, []
         job.was_granted = False
         is_nobodys = not job.winner and job.retry_at_us is None and not self._is_open(job)
