@@ -236,7 +236,9 @@ class Regenerating:
     def _forget_own(self) -> list[Effect]:
         """The lost machine has what the list gives it, and nothing of what its journal or the site file says."""
         book, effects = self.tokens, list[Effect]()
-        first = [key for key in self.mirror.site_tokens() if book.is_mine_by_journal(key)]
+        # What others took from this node since is no token of the site, and would be its own by an empty journal.
+        known = {*self.mirror.site_tokens(), *(TokenKey(*pair) for pair in book.beliefs.verified)}
+        first = {key for key in known if book.is_mine_by_journal(key)}
         for key in sorted({*book.held, *book.leaving, *first} - set(self._list)):
             version = max(book.seen.get(key, 0), book.beliefs.of(key).version)
             holder = book.beliefs.latest(key).holder

@@ -9,10 +9,10 @@ from bus_sim.systems.car_park.compare.optimum import OptimumError, is_available,
 from bus_sim.systems.car_park.compare.plays import POLICIES
 from bus_sim.systems.car_park.compare.small_case import Case, Visitor, earliest_finish, play_case
 from bus_sim.systems.car_park.compare.small_table import RULES, SmallTable, small_demand, solve_case
-from onboard.systems.car_park.site import car_park
+from tests.sites import at_the_key
 from tests.thinned import is_long
 
-SITE = car_park(find_site("small"))
+SITE = at_the_key(find_site("small"))
 needs_solver = pytest.mark.skipif(not is_available(), reason="OR-Tools is not installed (extra: optimum)")
 
 

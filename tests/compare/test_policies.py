@@ -11,9 +11,10 @@ from bus_sim.systems.car_park.compare.plays import MIP, POLICIES, Play, play
 from bus_sim.systems.car_park.compare.policies import AnyFirst, JointChoice, NearestFirst
 from bus_sim.systems.car_park.compare.table import BOUND, tabulate
 from bus_sim.systems.car_park.demand import Demand
+from tests.sites import at_the_key
 from tests.thinned import is_long
 
-SITE = find_site("small")
+SITE = at_the_key(find_site("small"))
 #: One car a minute in and one out: the compartment of this site serves fewer, so queues grow.
 SEEDS = (1, 2, 3) if is_long() else (1,)
 CARS, APART_S = (8, 60.0) if is_long() else (5, 40.0)
@@ -53,7 +54,7 @@ def test_p56_the_joint_choice_beats_nearest_first_and_random() -> None:
 
 def test_p56_the_joint_choice_is_far_better_where_there_is_more_to_choose() -> None:
     """Three compartments and four robots: nearest-first and random took 1.3 times as long over ten seeds."""
-    site = find_site("standard")
+    site = at_the_key(find_site("standard"))
     seeds, cars, apart_s = ((1, 3), 8, 30.0) if is_long() else ((1,), 5, 20.0)
 
     def mean_of(policy: str) -> float:

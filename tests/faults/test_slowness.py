@@ -13,6 +13,7 @@ from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.messages import Bid, CallForProposals, DriveOrder, DriveState, Message
 from onboard.core.serial import from_bus_ms
 from tests.faults.world import Seen, watch
+from tests.sites import at_the_key
 from tests.system.scene import Scene, play, stays
 
 ROBOT = 11
@@ -64,7 +65,7 @@ def test_motion_is_served_between_slices(monkeypatch: pytest.MonkeyPatch, slice_
     monkeypatch.setattr(slowness, "SLICE_STEPS", slice_steps)
     faults = [parse_injection("slow:target=MR1|MR2,factor=150")]
     cars = stays(*[(20.0 * number, 150.0 + 20 * number) for number in range(5)])
-    scene = play(find_site("small"), cars, plant=lambda run: arm(run, faults), limit_s=400, extra_s=0)
+    scene = play(at_the_key(find_site("small")), cars, plant=lambda run: arm(run, faults), limit_s=400, extra_s=0)
     refresh_us = scene.simulation.site.timing.drive_refresh_us
     late_us = [us - refresh_us for name in ("MR1", "MR2") for us in waits_for_order(scene, name)]
     assert len(late_us) > 100

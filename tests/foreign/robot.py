@@ -204,7 +204,7 @@ class Robot(Talk):
             return False
         if self.actions:
             number = (self.shuttle_order["sequence"] + 1) % 256 or 1
-            wheelbase_mm = call.wheelbase_mm or self.cars[call.car][3]
+            wheelbase_mm = self.cars[call.car][3] if call.car in self.cars else call.wheelbase_mm
             side = {"side": side_of(step.station), "wheelbase_mm": wheelbase_mm}
             self.shuttle_order = {"sequence": number, "action": self.actions.pop(0), **side}
             self.rights.journal.append(("step", dict(self.shuttle_order)))

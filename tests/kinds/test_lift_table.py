@@ -124,7 +124,10 @@ def meant_at_start(words: Words) -> LiftFinding:
     if words.in_journal:
         return LiftFinding.RIDE_AT_END if words.index == LEAVE else LiftFinding.RIDE_BEGUN
     plans_from_here = words.plan is not None and words.plan[0] == words.index
-    return LiftFinding.RIDE_PLANNED if plans_from_here else LiftFinding.NOTHING
+    if plans_from_here:
+        return LiftFinding.RIDE_PLANNED
+    is_carried = words.is_aboard and not words.is_crossing and not words.is_gate_out and words.plan is not None
+    return LiftFinding.RIDE_BEGUN if is_carried else LiftFinding.NOTHING
 
 
 def expected(phase: LiftPhase, words: Words) -> tuple[LiftPhase, list[object]]:

@@ -16,6 +16,7 @@ from onboard.contract.messages import (
     TokenRequest,
 )
 from onboard.core.records import TokenGivenRecord, TokenGoneRecord
+from onboard.systems.car_park import custody
 from onboard.systems.car_park.bay_memory import winner_record
 from onboard.systems.car_park.bay_task import REMINDERS, BayPhase
 from onboard.systems.car_park.compartment import Compartment
@@ -91,7 +92,11 @@ def came_back(bay: AtWork, *, is_loaded: bool) -> BayPhase | None:
 def test_a_bay_that_a_robot_had_and_did_nothing_in_waits_for_whoever_has_the_task_now() -> None:
     """A robot gave the task back before the right reached it: the car was taken for parked, and stayed."""
     assert came_back(elsewhere(), is_loaded=True) is BayPhase.CLOSING
-    assert came_back(waiting(), is_loaded=False) is BayPhase.CLOSING, "it was fetched, and may be out already"
+    assert came_back(waiting(), is_loaded=False) is BayPhase.AWAITING, "its car stands in its place"
+    fetched = waiting()
+    assert isinstance(fetched.behaviour, Compartment)
+    custody.state(fetched.behaviour.fleet, CAR, fetched.behaviour.station.number, WHEELBASE_MM)
+    assert came_back(fetched, is_loaded=False) is BayPhase.CLOSING, "it was fetched, and may be out already"
     assert came_back(elsewhere(), is_loaded=False) is BayPhase.AWAITING
     brings = started(BAY, winner_record(CAR, DEAR, TASK, 1).entry, *GIVEN_TO_THE_DEAR)
     assert came_back(brings, is_loaded=False) is None, "whoever has it gives it, or asks again"

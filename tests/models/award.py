@@ -18,9 +18,9 @@ from onboard.ways.tokens import car_token
 from tests.models.at_work import LEFT_OUT, AtWork, Entry
 from tests.models.bays import BayBody, DoorsState
 from tests.models.robots import PricedFactory, RobotBody, RobotState, stand_still
-from tests.sites import one_floor
+from tests.sites import at_the_key, one_floor
 
-SITE = one_floor(2)
+SITE = at_the_key(one_floor(2))
 BAY, CHEAP, DEAR = 1, 11, 12
 CAR, TASK, WHEELBASE_MM = Reference(BAY, 1), Reference(BAY, 7), 2_600
 PLACE, KEY = SITE.places[0], car_token(*CAR)

@@ -11,6 +11,7 @@ from onboard.systems.car_park import custody
 from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.lift import Lift
+from onboard.systems.car_park.lift_steps import LiftFinding
 from onboard.systems.car_park.records import AwardRecord, HandledRecord
 from onboard.systems.car_park.recovery import JournalRecovery
 from onboard.systems.car_park.riding import Riding
@@ -39,8 +40,8 @@ def _nothing(method: Method) -> Method:
     return lambda *_: []
 
 
-def _none(method: Method) -> Method:
-    return lambda *_: None
+def _waits(method: Method) -> Method:
+    return lambda *_: (LiftFinding.NOTHING, None)
 
 
 def _under_no_gate(method: Method) -> Method:
@@ -129,8 +130,8 @@ BOARDING = {
 RIDING = {
     "a grant is said before it is written": Planted(TokenBook, "give", _turned, GATES),
     "what was given away is held again after a restart": Planted(TokenBook, "replay", _keeps_given, GATES),
-    "a ride is not written": Planted(Lift, "_do", _unwritten, TRAP),
-    "a lift forgets its ride": Planted(Lift, "_ride_in_journal", _none, TRAP),
+    # That a ride is not written, or forgotten, is healed: whoever is aboard tells where it is carried.
+    "a lift forgets its ride, and asks nobody": Planted(Lift, "_found_of_ride", _waits, TRAP),
     "a lift does not say under which gate it stands": Planted(Lift, "_word", _under_no_gate, TRAP),
     "gate and slots are given back on the way": Planted(Carriage, "occupied", _nothing, TRAP),
 }

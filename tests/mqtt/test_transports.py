@@ -9,7 +9,7 @@ from onboard.contract.codes import CallResult, Operation, OperatorAction
 from onboard.contract.messages import Award, CallForProposals, OperatorOrder, Reference
 from tests.mqtt.ordered import FatalJournal, Ordered, park_and_order, said
 from tests.mqtt.played import MemoryJournal
-from tests.sites import one_floor
+from tests.sites import at_the_key, one_floor
 from tests.system.scene import Scene
 
 ORDERS = "onboard/{}/orders/desk"
@@ -21,7 +21,7 @@ FETCH = {"id": "A7", "car": "1.1", "to": "IOC1"}
 def fetched() -> tuple[Scene, Ordered]:
     """One car is fetched; the order comes three times, and a different one under its name."""
     orders = [(200, SMALL, FETCH), (200.2, SMALL, FETCH), (215, SMALL, FETCH), (216, SMALL, FETCH | {"car": "1.2"})]
-    return park_and_order(find_site("small"), 1, [*orders, (420, SMALL, FETCH)], extra_s=400)
+    return park_and_order(at_the_key(find_site("small")), 1, [*orders, (420, SMALL, FETCH)], extra_s=400)
 
 
 def retrievals(scene: Scene) -> list[Reference]:
@@ -82,7 +82,7 @@ def test_an_urgent_order_overtakes_those_that_wait() -> None:
     """Ask 14: of three tickets at one desk the urgent one, which came last, is served first."""
     waiting = [(280 + car / 10, SMALL, {"id": f"o{car}", "car": f"1.{car}", "to": "IOC1"}) for car in (1, 2)]
     urgent = (281, SMALL, {"id": "now", "car": "1.3", "to": "IOC1", "priority": 5})
-    scene, _ = park_and_order(find_site("small"), 3, [*waiting, urgent], extra_s=130)
+    scene, _ = park_and_order(at_the_key(find_site("small")), 3, [*waiting, urgent], extra_s=130)
     fetched = [call.car.number for _, call in scene.all(CallForProposals) if call.operation is Operation.RETRIEVE]
     assert fetched[0] == 3
     pressed = [one.action for one in said(scene, OperatorOrder) if isinstance(one, OperatorOrder)]

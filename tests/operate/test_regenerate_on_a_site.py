@@ -8,20 +8,22 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import Reason, RegenerationPhase, TaskPhase
 from onboard.contract.messages import Halted, Heartbeat, Regeneration, TaskReport
+from onboard.core.site import Site
+from tests.sites import at_arrival, at_the_key
 from tests.system.scene import Scene, play, stays
 from tests.thinned import some
 
-SITE = find_site("small")
+SITE = at_the_key(find_site("small"))
 CARS = stays((0, 320), (60, 380), (120, 440), (300, None))
 #: A machine loses its journal, and when; its person comes 20 s later and sees where it stands.
 LOSSES = [("MR1", 50, "p(1;5)"), ("MR2", 20, "p(3;8)"), ("IOC1", 50, ""), ("IOC1", 190, ""), ("ER1", 50, "")]
 
 
-def played(*faults: str) -> Scene:
+def played(*faults: str, site: Site = SITE) -> Scene:
     def plant(simulation: Simulation) -> None:
         arm(simulation, [parse_injection(fault) for fault in faults])
 
-    return play(SITE, CARS, plant=plant, limit_s=1_500)
+    return play(site, CARS, plant=plant, limit_s=1_500)
 
 
 @pytest.mark.parametrize(("name", "at_s", "body"), some(LOSSES, 3))
@@ -41,6 +43,38 @@ def test_a_lost_journal_is_a_matter_of_minutes(name: str, at_s: int, body: str) 
     assert set(epochs.values()) == {1}
     log = [line for _, who, line in scene.simulation.log.lines if who == "operator"]
     assert f"{name} is in epoch 1" in log
+
+
+@pytest.mark.parametrize(
+    ("name", "at_s", "site"),
+    [("IOC1", 60, SITE), ("IOC1", 70, at_arrival(SITE)), ("IOC1", 372, at_arrival(SITE)), ("ER1", 104, SITE)],
+    ids=[
+        "a robot has its car aboard",
+        "somebody drives in",
+        "a car is brought",
+        "a robot is aboard between two floors",
+    ],
+)
+def test_rights_are_made_anew_in_the_middle_of_work(name: str, at_s: int, site: Site) -> None:
+    """By an empty journal a car that a robot has is the compartment's own, no number was given, and nobody rides."""
+    scene = regenerated(name, at_s, site)
+    street = scene.simulation.plant.street.summary()
+    assert (street.parked, street.served, street.queueing, street.asking) == (4, 3, 0, 0)
+
+
+@pytest.mark.parametrize("at_s", [396, 424])
+def test_nobody_is_given_anothers_car_though_it_is_not_known_who_waits(at_s: int) -> None:
+    """A car in the bay that was fetched, or was taken meanwhile; who had put a ticket in has to do so again."""
+    scene = regenerated("IOC1", at_s, at_arrival(SITE))
+    street = scene.simulation.plant.street.summary()
+    assert street.parked == 4 and street.served >= 1 and street.queueing == 0
+
+
+def regenerated(name: str, at_s: int, site: Site) -> Scene:
+    lost = f"crash:target={name},at_s={at_s},restart_s=5,journal=lost"
+    scene = played(lost, f"operate:do=regenerate,at_s={at_s + 20},target={name}", site=site)
+    scene.assert_sound()
+    return scene
 
 
 def test_a_dead_robot_is_towed_regenerated_and_its_slot_is_nobodys() -> None:

@@ -8,9 +8,10 @@ from onboard.contract.codes import Reason
 from onboard.contract.messages import DriveState, EmergencyStop, Go, Halted
 from onboard.operate.commands import CommandRequest, maker_of
 from tests.operate.played import Played, operates
+from tests.sites import at_the_key
 from tests.system.scene import Scene, play, stays
 
-SITE = find_site("small")
+SITE = at_the_key(find_site("small"))
 CARS = stays((0, 300), (40, 400), (80, None))
 
 

@@ -10,9 +10,10 @@ from onboard.contract.codes import MachineState, TaskPhase
 from onboard.contract.messages import Award, Heartbeat, Progress, TaskReport
 from onboard.operate.commands import CommandRequest, maker_of
 from tests.operate.played import Played, operates
+from tests.sites import at_the_key
 from tests.system.scene import Scene, play, stays
 
-SITE = find_site("small")
+SITE = at_the_key(find_site("small"))
 MR1, MR2 = SITE.machine("MR1").node_id, SITE.machine("MR2").node_id
 #: Its drive sticks on the way to its first car, between the compartment and the lift by which it came; somebody comes
 #: soon, pushes it to the end of the alley, and brings it back into service ten minutes later.

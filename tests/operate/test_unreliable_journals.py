@@ -22,10 +22,11 @@ from onboard.contract.messages import (
     TokenSeen,
 )
 from onboard.core.journal_state import JournalState
+from tests.sites import at_the_key
 from tests.system.scene import Scene, play, stays
 from tests.thinned import some
 
-SITE = find_site("small")
+SITE = at_the_key(find_site("small"))
 CARS = stays((0, 320), (60, 380), (120, 440), (300, None))
 MR2 = SITE.machine("MR2").node_id
 

@@ -19,9 +19,10 @@ from onboard.contract.messages import (
     ShuttleOrder,
 )
 from onboard.wire.codec import fleet_codec
+from tests.sites import at_the_key
 from tests.system.scene import Scene, play, stays
 
-SITE = find_site("small")
+SITE = at_the_key(find_site("small"))
 GHOST, OPERATOR = 240, 251
 #: The first robot is on its way with the car then, and is not after it has braked.
 STOP_S, AT_REST_S = 45.0, 48.0

@@ -22,18 +22,18 @@ from onboard.contract.messages import (
     TaskReport,
 )
 from onboard.core.site import Segment
-from onboard.systems.car_park.site import car_park
 from onboard.trace.story.why import WaitingStory
 from onboard.trace.view import SiteView
 from onboard.ways.lifts import lift_at
 from onboard.ways.site import TrackKind, WaySite
 from onboard.wire.codec import fleet_codec
+from tests.sites import at_the_key
 from tests.system.scene import Scene, play, stays
 from tests.system.test_spurs import alley
 from tests.thinned import some
 
 PERSON = 254
-SITE = car_park(find_site("small"))
+SITE = at_the_key(find_site("small"))
 #: The robot that wins the first task: on its way from 20 s, at the bay at 24 s, aboard the lift at 33 s, at the place
 #: at 51 s, back in a refuge after 70 s.
 FIRST, OTHER = 11, 12

@@ -21,6 +21,7 @@ from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.robot import ParkingRobot
 from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.ways.mirror import way_mirror
+from tests.sites import at_the_key
 from tests.system.scene import Scene, play, stays
 
 #: The robots of the small site; the first one wins the first task and comes down by the left lift at 46 s.
@@ -40,7 +41,7 @@ def scene_with(
         if before_start is not None:
             simulation.before_start.append(before_start)
 
-    return play(replace(car_park(find_site("small")), rides=rides), stays(*CARS), plant=plant, limit_s=900)
+    return play(replace(at_the_key(find_site("small")), rides=rides), stays(*CARS), plant=plant, limit_s=900)
 
 
 @cache

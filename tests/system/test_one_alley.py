@@ -6,10 +6,10 @@ from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import CallResult, DriveMode, Grade, LegAction, TaskPhase
 from onboard.contract.messages import Award, Bid, CallForProposals, DriveState, Heartbeat, Itinerary, TaskReport
 from onboard.core.site import Segment
-from tests.sites import one_floor
+from tests.sites import at_the_key, one_floor
 from tests.system.scene import Scene, play, stays
 
-SITE = one_floor(robots=2)
+SITE = at_the_key(one_floor(robots=2))
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_p45_who_is_shut_in_counts_the_calls_and_says_nothing() -> None:
 
 def test_p44_a_robot_follows_another_at_speed_and_at_a_distance() -> None:
     """Both drive down the alley to a bay each: the second sets off while the first still drives before it."""
-    site = one_floor(robots=2, extra='[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,8)"\n')
+    site = at_the_key(one_floor(robots=2, extra='[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,8)"\n'))
     scene = play(site, stays((0, None), (0, None)), limit_s=60, extra_s=0)
     scene.assert_sound()
     sensed: dict[int, DriveState] = {}

@@ -14,7 +14,7 @@ from onboard.core.site import Station
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.ways.mirror import way_mirror
 from tests.config.support import ROOT, changed
-from tests.sites import telling
+from tests.sites import at_the_key, telling
 from tests.system.scene import Scene, play, stays
 
 SMALL = car_park(find_site("small"))
@@ -76,7 +76,7 @@ def narrow() -> CarPark:
     text = (ROOT / "bus_sim" / "sites" / "small.toml").read_text(encoding="utf-8")
     gone = "".join(f'"p(1,{index})", ' for index in range(1, 5))
     text = changed('sides = ["near", "far"]', f'sides = ["near"]\nwithout = [{gone}]', text)
-    return car_park(parse_site(text + '[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,6)"\n', "narrow.toml"))
+    return at_the_key(parse_site(text + '[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,6)"\n', "narrow.toml"))
 
 
 def aims(itinerary: Itinerary) -> Station | None:

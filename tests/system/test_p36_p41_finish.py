@@ -15,13 +15,14 @@ from onboard.contract.messages import (
     TaskReport,
 )
 from onboard.core.serial import from_bus_ms
+from tests.sites import at_the_key
 from tests.system.scene import Scene, play, stays
 
 
 @pytest.fixture(scope="module")
 def entry() -> Scene:
     """One car on the small site, parked by one of two robots."""
-    scene = play(find_site("small"), stays((0, None)))
+    scene = play(at_the_key(find_site("small")), stays((0, None)))
     scene.assert_sound()
     return scene
 

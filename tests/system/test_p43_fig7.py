@@ -19,7 +19,7 @@ from onboard.systems.car_park.site import CarPark
 from onboard.ways.occupancy import itinerary_windows
 from onboard.ways.reservations import Reservations
 from onboard.wire.codec import fleet_codec
-from tests.sites import telling
+from tests.sites import at_the_key, telling
 from tests.system.scene import Scene, play, stays
 
 LAMBDA, ALPHA = 11, 12
@@ -45,7 +45,7 @@ def park(clearance: int) -> CarPark:
         {{name = "MRalpha", node = {ALPHA}, home = "p(2,6)"}},
     ]
     """
-    return telling(parse_site(text, "figure.toml", crowded=True))
+    return telling(at_the_key(parse_site(text, "figure.toml", crowded=True)))
 
 
 def alpha_plan(deadline_ms: int) -> Itinerary:

@@ -25,14 +25,14 @@ from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.indicators import FleetIndicators, Indicators
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
-from tests.sites import one_floor
+from tests.sites import at_the_key, one_floor
 from tests.system.scene import Scene, play, stays
 
 
 @pytest.fixture(scope="module")
 def run() -> tuple[Scene, FleetIndicators]:
     """Three cars in, two out, on one floor."""
-    site = one_floor()
+    site = at_the_key(one_floor())
     indicators = Indicators(site)
     scene = play(
         site,

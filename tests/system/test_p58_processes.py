@@ -45,6 +45,8 @@ acceleration_mm_s2 = 3_000
 [timing]
 door_ms = 500
 grip_ms = 300
+[negotiation]
+call_at = "key"
 [[compartments]]
 name = "IOC1"
 node = 1

@@ -52,7 +52,7 @@ from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.program import CarHandling, CarStep, Program, StationWork
 from onboard.ways.mirror import WayMirror
 from onboard.wire.codec import fleet_codec
-from tests.sites import one_floor
+from tests.sites import at_the_key, one_floor
 from tests.system.scene import car, play, stays
 
 SITE = one_floor(robots=2)
@@ -165,7 +165,7 @@ def test_p33_small_and_large_cars_are_parked_and_what_cannot_be_gripped_is_turne
     grips = {order.wheelbase_mm for _, order in scene.all(ShuttleOrder) if order.action is ShuttleAction.GRIP}
     assert grips == {1_850, 3_350}
     scene.first(DeskOrder, lambda order: order.text is DeskText.CAR_TOO_LARGE, after_us=400_000_000)
-    assert [call.wheelbase_mm for _, call in scene.all(CallForProposals)] == [1_850, 3_350]
+    assert {award.winner for _, award in scene.all(Award) if award.result is CallResult.AWARDED} == {11}
     summary = scene.simulation.plant.street.summary()
     assert (summary.parked, summary.inside, summary.refused_too_large) == (2, 2, 1)
 
@@ -185,7 +185,7 @@ def test_p12_nobody_can_so_the_call_is_opened_again_then_refused_and_the_custome
         fail = getattr(holon.behaviour, "_fail")  # noqa: B009  # a failed actuator, as its sensor would tell it
         simulation.loop.call_at(9.0, fail, Reason.ACTUATOR_FAULT, 9_000_000)
 
-    scene = play(one_floor(), stays((0, None)), before=stop_the_robot)
+    scene = play(at_the_key(one_floor()), stays((0, None)), before=stop_the_robot)
     calls = [call for _, call in scene.all(CallForProposals)]
     assert [call.attempt for call in calls] == [1, 2, 3, 4, 5]
     assert len({call.call for call in calls}) == 5 and len({call.task for call in calls}) == 1

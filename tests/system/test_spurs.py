@@ -24,10 +24,10 @@ from onboard.contract.messages import (
 )
 from onboard.core.authority import segment_token
 from onboard.core.site import Segment
-from onboard.systems.car_park.site import CarPark, car_park
+from onboard.systems.car_park.site import CarPark
 from onboard.trace.view import SiteView
 from onboard.ways.site import WaySite, way_site
-from tests.sites import ONE_FLOOR
+from tests.sites import ONE_FLOOR, at_the_key
 from tests.system.scene import Scene, play, stays
 
 MR1, MR2 = 11, 12
@@ -43,7 +43,7 @@ def alley(homes: tuple[str, ...], spurs: tuple[str, ...], without: tuple[str, ..
     )
     for number, home in enumerate(homes, start=1):
         text += f'[[robots]]\nname = "MR{number}"\nnode = {10 + number}\nhome = "{home}"\n'
-    return car_park(parse_site(text, "alley.toml", crowded=True))
+    return at_the_key(parse_site(text, "alley.toml", crowded=True))
 
 
 def idle(simulation: Simulation) -> None:

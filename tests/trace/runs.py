@@ -26,6 +26,18 @@ def run_log(*words: str, stay_s: int = 60) -> Path:
     return once("-".join(["small", *options]), play) / "run.log"
 
 
+def key_log() -> Path:
+    """The same where the key calls: the order of the paper's figure (row P50)."""
+
+    def play(folder: Path) -> None:
+        site = folder / "small.toml"
+        site.write_text(SITE_FILE.read_text(encoding="utf-8") + '\n[negotiation]\ncall_at = "key"\n', encoding="utf-8")
+        words = ["--one-car", "60", "--speed", "max", "--devices", "--trace", str(folder / "run.log")]
+        assert main(["run", str(site), *words]) == 0
+
+    return once("small-key", play) / "run.log"
+
+
 def fleet_of(path: Path) -> list[LoggedMessage]:
     """All messages of the fleet bus."""
     with Log(str(path)) as log:

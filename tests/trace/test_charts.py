@@ -15,14 +15,14 @@ from onboard.trace.readers.open_log import Log
 from onboard.ways.site import way_site
 from onboard.wire.codec import codecs
 from tests.tools import require_tool
-from tests.trace.runs import SITE, SITE_FILE, fleet_of, run_log
+from tests.trace.runs import SITE, SITE_FILE, fleet_of, key_log, run_log
 
 _SVG = "{http://www.w3.org/2000/svg}"
 _PANEL_NAMES_X = 8
 
 
-def _chart(number: int = 1) -> SequenceChart:
-    with Log(str(run_log())) as log:
+def _chart(number: int = 1, path: Path | None = None) -> SequenceChart:
+    with Log(str(path or run_log())) as log:
         found = chart(SITE, Listener(codecs()).messages(log), Reference(1, number))
     assert found is not None
     return found
@@ -33,7 +33,7 @@ def _picture() -> TrackDiagram:
 
 
 def test_the_steps_of_an_entry_are_numbered_in_the_order_of_the_figure() -> None:
-    arrows = _chart().arrows
+    arrows = _chart(path=key_log()).arrows
     first = {step: min(one.time_us for one in arrows if one.step == step) for step in {one.step for one in arrows}}
     # Fig. 9 has 5 and 6 before the bids; the output door waits for the locked input door and the robot (flag 5), and
     # this robot takes its lift before it loads. Step 1 comes before the call, and so does the story. The itinerary is

@@ -7,10 +7,9 @@ its robot is on its way, or there, when the bay is empty; what it is and who won
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from onboard.contract.codes import CallResult, KindCode, LegAction, Operation, Reason, TaskPhase
+from onboard.contract.codes import KindCode, LegAction, Operation, Reason, TaskPhase
 from onboard.contract.constants import ANY_STATION, NOBODY, TASK_VERSION_BITS
 from onboard.contract.messages import (
-    Award,
     CallForProposals,
     Leg,
     Reference,
@@ -207,7 +206,7 @@ class BayCalls:
         job, self.job = self.job, None
         assert job is not None
         outcome = self.fleet.negotiation.abandon(job.task, Reason.CANCELLED, now_us)
-        over = Award(self.fleet.node_id, 0, 0, job.task, 0, CallResult.WITHDRAWN, Reason.CANCELLED)
+        over = bay_task.void_award(self.fleet.node_id, job.task)
         return [*(item for item in outcome if not isinstance(item, EVENT_TYPES)), Send(over)]
 
     def review(self, now_us: int) -> list[Effect]:
@@ -241,7 +240,8 @@ class BayCalls:
         is_mine = custody.is_mine(self.fleet, job.car)
         is_parked = job.operation is Operation.PARK
         # A car that was fetched may be out already: its driver took it while this machine was off.
-        if not is_loaded if is_parked else is_loaded or is_mine:
+        is_fetched = is_loaded or (is_mine and custody.place_of(self.fleet, job.car) is None)
+        if not is_loaded if is_parked else is_fetched:
             return BayPhase.CLOSING, []
         holder = self.fleet.tokens.holder_of(car_token(*job.car))
         if not is_mine and (is_parked or (holder == job.winner and holder != NOBODY)):
@@ -249,6 +249,14 @@ class BayCalls:
         job.was_granted = False
         is_nobodys = not job.winner and job.retry_at_us is None and not self._is_open(job)
         return BayPhase.AWAITING, self.settle(job, now_us) if is_nobodys else []
+
+    def has_another(self, robot: int) -> bool:
+        """Whether the car of the task that has the bay, to be brought here, is neither this robot's nor here."""
+        job = self.job
+        record = None if job is None else self.fleet.mirror.cars.get(job.car)
+        if job is None or job.operation is Operation.PARK or record is None:
+            return False
+        return record.custodian not in (robot, self.fleet.node_id)
 
     def settle(self, task: BayTask, now_us: int) -> list[Effect]:
         """Taken up from the journal without a winner: whoever has it says so first.

@@ -31,6 +31,9 @@ from onboard.systems.car_park.site import ANY_CLASS
 from onboard.ways.mirror import WayFleet
 from onboard.ways.tokens import car_token
 
+#: How far behind the last known car the numbers of a lost journal go on: more tasks than there are between two cars.
+BEYOND_LOST = 16_384
+
 
 def car_record(statement: CarAt) -> Record:
     """Where a car in my custody stands, as it is told."""
@@ -77,8 +80,12 @@ def job_over_record() -> Record:
 def _next_reference(last: int, fleet: WayFleet) -> Reference:
     """The next number of a car or task of this node; one under which a token was ever heard of is passed over.
 
-    It goes to the journal before its token: whatever happens between the two writes, it is never used again.
+    It goes to the journal before its token: whatever happens between the two writes, it is never used again. A journal
+    that gave none though there are cars was lost: others may have tasks of numbers that were given since the last car.
     """
+    if last == 0:
+        known = max((car.number for car in fleet.mirror.cars if car.origin == fleet.node_id), default=0)
+        last = (known + BEYOND_LOST) % (1 << 16) if known else 0
     for _ in range(1 << 16):
         last = successor(last, 16)
         if not fleet.tokens.is_known(car_token(fleet.node_id, last)):

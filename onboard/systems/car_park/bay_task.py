@@ -162,9 +162,14 @@ def queue_ticket(tickets: deque[Reference], car: Reference, *, urgent: bool) -> 
 
 def withdrawal(node: int, report: TaskReport) -> list[Effect]:
     """The answer of ``node`` to who takes one of its tasks in hand that is another's, or over: it was away for long."""
-    if report.task.origin != node or report.phase not in (TaskPhase.AWARDED, TaskPhase.STARTED):
+    if report.task.origin != node or report.phase not in (TaskPhase.AWARDED, TaskPhase.STARTED, TaskPhase.FORFEITED):
         return []
-    return [Send(Award(node, 0, 0, report.task, 0, CallResult.WITHDRAWN, Reason.CANCELLED))]
+    return [Send(void_award(node, report.task))]
+
+
+def void_award(node: int, task: Reference) -> Award:
+    """The word of ``node`` that it wants nobody to do a task of its own any more, in whatever call it was."""
+    return Award(node, 0, 0, task, 0, CallResult.WITHDRAWN, Reason.CANCELLED)
 
 
 def fits(bay: BayState, limits: CarLimits) -> bool:

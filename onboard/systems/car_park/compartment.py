@@ -206,7 +206,7 @@ class Compartment:
         if self.job is not None and key in (station_token(self.station), car_token(*self.job.car)):
             if key.kind is TokenKind.CAR and self.fleet.mirror.car_station(self.job.car) != self.station:
                 return self.stewardship.may_grant(key, requester, now_us)
-            if requester != self.job.winner:
+            if requester != self.job.winner or self.calls.has_another(requester):
                 return Reason.TOKEN_NOT_GRANTABLE_YET
             self._robot_waits = True
             is_open = self._is(DoorName.OUTPUT, DoorPosition.OPEN) and self._is(DoorName.INPUT, DoorPosition.LOCKED)
@@ -215,7 +215,7 @@ class Compartment:
             self.job.was_granted |= key.kind is TokenKind.STATION
             return Reason.NONE
         is_bay = key == station_token(self.station)
-        return Reason.TOKEN_NOT_GRANTABLE_YET if is_bay else self.stewardship.may_grant(key, requester, now_us)
+        return self.pipeline.wants(requester) if is_bay else self.stewardship.may_grant(key, requester, now_us)
 
     def advance(self, now_us: int) -> list[Effect]:
         """One step of the phase table, where its condition is met."""
@@ -274,14 +274,15 @@ class Compartment:
         effects = self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
         if not self._is(DoorName.OUTPUT, DoorPosition.LOCKED):
             return effects
-        return effects + self._to_free()
+        return effects + self.pipeline.void() + self._to_free()
 
     def _park_again(self, left: CarAt, now_us: int) -> list[Effect]:
         """My journal is lost and my rights are new: whatever was meant with the car in my bay, it is parked."""
         self.stewardship.left, self.memory.car_class = None, bay_task.class_in(self.bay, self._park)
-        self.memory.job = (left.car, Operation.PARK, left.car, left.wheelbase_mm)
+        task, number = self.memory.next_reference(self.fleet)
+        self.memory.job = (task, Operation.PARK, left.car, left.wheelbase_mm)
         noted = job_record(*self.memory.job, self.memory.car_class)
-        return [noted, *self._take_up_job(now_us), self.outputs.light_up(LightColour.RED)]
+        return [number, noted, *self._take_up_job(now_us), self.outputs.light_up(LightColour.RED)]
 
     def _take_up_job(self, now_us: int) -> list[Effect]:
         """After a restart in the middle of a task: journal, tokens and sensors tell how far it has come."""
@@ -311,8 +312,8 @@ class Compartment:
         assert self.bay is not None and self.doors is not None
         if not self._is(DoorName.INPUT, DoorPosition.OPEN):
             return []
-        if self.stewardship.left is not None and self.bay.load_kg:
-            return self._park_again(self.stewardship.left, now_us)
+        if self.stewardship.left is not None:
+            return self._park_again(self.stewardship.left, now_us) if self.bay.load_kg else self.stewardship.gone()
         if self._key is not None:
             key, self._key = self._key, None
             return self._admit(key, now_us)
@@ -420,8 +421,7 @@ class Compartment:
         return self.outputs.door(DoorName.OUTPUT, DoorAction.OPEN)
 
     def _when_opening(self, now_us: int) -> list[Effect]:
-        if self._is(DoorName.OUTPUT, DoorPosition.OPEN):
-            self._go(BayPhase.SERVING)
+        self._go(BayPhase.SERVING if self._is(DoorName.OUTPUT, DoorPosition.OPEN) else BayPhase.OPENING)
         return []
 
     def _when_serving(self, now_us: int) -> list[Effect]:

@@ -89,14 +89,21 @@ class CarParkOrders(NoBusOrders):
         return call.task if is_it else None
 
     def is_done(self, order: GatewayOrder, fact: Fact | None) -> bool:
-        """The car has left; or it stands in a place, and its parking was the task, which has the car's own name."""
-        if not isinstance(fact, LoadTold) or order.task is None:
+        """The car has left; or it stands in a place, and its parking was the task, which has the car's own name.
+
+        Where the call was not heard, as the gateway was off: the car stands in the bay that it was asked for at.
+        """
+        if not isinstance(fact, LoadTold):
             return False
-        word = fact.word
+        word, bays = fact.word, {node: one.number for node, one in way_site(self._site).compartments.items()}
         if order.request.car is not None:
-            return word.car == order.request.car and word.station == OUTSIDE
-        bays = {station.number for station in way_site(self._site).compartments.values()}
-        return word.car == order.task and word.station not in (*bays, ANY_STATION, OUTSIDE)
+            is_there = order.task is None and word.station == bays[order.request.node]
+            return word.car == order.request.car and (is_there or word.station == OUTSIDE)
+        return (
+            order.task is not None
+            and word.car == order.task
+            and word.station not in (*bays.values(), ANY_STATION, OUTSIDE)
+        )
 
     def _desk(self, name: str, path: str) -> int:
         if name not in self._desks:

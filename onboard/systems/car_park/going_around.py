@@ -97,7 +97,7 @@ class GoingAround:
         return min((due_us for _, _, due_us in self.given_back.values()), default=None)
 
     def advance(self, now_us: int) -> list[Effect]:
-        """Look whether the plan leads through an obstacle, where anything about them has changed."""
+        """Look whether the plan leads through an obstacle, where anything about them has changed, or a task was won."""
         effects = self.say_again(now_us) + self._return_rights(now_us)
         if self.fleet.admissions != self._admissions:
             self._admissions = self.fleet.admissions
@@ -180,6 +180,10 @@ class GoingAround:
         """The program does not end where a machine may stand for ever: make it anew as soon as that is possible."""
         self._since_us = now_us if self._since_us is None else self._since_us
         self._retry_at_us = now_us + RETRY_US
+
+    def won(self) -> None:
+        """A task was taken on by its bid, which may be older than an obstacle that it leads through."""
+        self._seen = -1
 
     def hear(self, message: Message) -> None:
         """What was given back is called or awarded anew: enough was said of it. A place may have been taken."""
@@ -349,9 +353,9 @@ class GoingAround:
 
     def _is_hindered(self, steps: Sequence[CarStep], now_us: int) -> bool:
         """Whether steps lead through an obstacle, but for slots whose tokens I hold myself."""
-        if not steps:
-            return False
         obstacles, tokens = self.fleet.mirror.obstacles, self.fleet.tokens
+        if not steps or not (obstacles.machines or obstacles.blocked):
+            return False
         told = to_itinerary(self.fleet.node_id, 1, Grade.FIRM, self.program.stamp, list(steps))
         windows = itinerary_windows(self.fleet.site, told, now_us, steps[0].begin_us)
         slots = {window.segment for window in windows}

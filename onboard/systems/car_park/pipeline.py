@@ -9,9 +9,10 @@ into his own; drivers, who cannot be seen outside, are invited after ``MOST_OUT`
 from collections import deque
 from dataclasses import dataclass
 
-from onboard.contract.codes import Operation
+from onboard.contract.codes import Operation, Reason
+from onboard.contract.constants import ANY_STATION, NOBODY
 from onboard.contract.messages import Reference
-from onboard.core.effects import Effect
+from onboard.core.effects import Effect, Send
 from onboard.systems.car_park import bay_task, custody
 from onboard.systems.car_park.bay_calls import BayCalls
 from onboard.systems.car_park.bay_generation import DRIVER_US
@@ -20,6 +21,7 @@ from onboard.systems.car_park.bay_task import BayPhase, BayTask
 from onboard.systems.car_park.site import ANY_CLASS, CallAt, CarPark
 from onboard.ways.mirror import WayFleet
 from onboard.ways.site import BayUse
+from onboard.ways.tokens import car_token
 
 #: A driver who waits outside drives in within this once he is invited, us: a second to see it, and one to begin.
 QUEUED_US = 2_500_000
@@ -51,6 +53,8 @@ class Pipeline:
     #: Cars that have gone out since drivers were last invited.
     outs: int = 0
     _looked_us: int = 0
+    #: Who asked for the bay though nothing is known of a task for it.
+    _wanted_by: int = NOBODY
 
     @property
     def is_on(self) -> bool:
@@ -75,6 +79,19 @@ class Pipeline:
             return self.is_queued
         return self.is_queued or self.outs >= MOST_OUT if self.is_on else self.outs >= MOST_OUT_BY_KEY
 
+    def void(self) -> list[Effect]:
+        """After a restart: who was driving in was called for without a record, and is called for anew by the key.
+
+        What was called last is known by its record or its car's right, or was such a call; or a task long over, of
+        which nobody minds to hear so again.
+        """
+        if not self.is_on:
+            return []
+        node, last, tokens = self.fleet.node_id, self.memory.number, self.fleet.tokens
+        called = [Reference(node, number) for number in (last, last - 1) if number > 0]
+        lost = [one for one in called if self.calls.named(one) is None and not tokens.is_known(car_token(*one))]
+        return [Send(bay_task.void_award(node, one)) for one in lost]
+
     # --- a driver comes in -------------------------------------------------------------------------------------
 
     def enters(self, now_us: int) -> list[Effect]:
@@ -82,7 +99,8 @@ class Pipeline:
         if self.free_from_us is not None:
             self.is_queued, self.free_from_us = now_us - self.free_from_us <= QUEUED_US, None
             self.outs = 0
-        if not self.is_on:
+        if not self.is_on or not self.fleet.tokens.is_synced:
+            # Who does not know yet whether its journal is whole gives no number away.
             return []
         is_told_by_size = bool(self.park.classes) or self.park.measures_width
         if self.entering_until_us or is_told_by_size or not bay_task.has_room(ANY_CLASS, self.park, self.fleet.mirror):
@@ -100,15 +118,33 @@ class Pipeline:
         self.entering_until_us = 0
         self.free_from_us = now_us if self.free_from_us is None else self.free_from_us
         was_open_for_all = now_us - self.free_from_us >= QUEUED_US
+        brought = self._take_up_brought()
         if self._is_drivers_turn and not was_open_for_all:
-            return False, []
+            return False, brought
         self.is_queued, self.outs = False, 0 if was_open_for_all else self.outs
         # After a restart the journal may know of a task whose bay was not noted yet.
         called = self.call(now_us, now_us) if self.is_on and self.calls.ahead is None else []
         is_asked_for = bool(self.tickets) and custody.place_of(self.fleet, self.tickets[0]) is not None
         is_out = self.calls.ahead is not None or (is_asked_for and not self.is_on)
         self.outs += is_out
-        return is_out, called
+        return is_out, brought + called
+
+    def wants(self, robot: int) -> Reason:
+        """A robot asks for the bay, of which it has no task here; it may have had one before the journal was lost."""
+        self._wanted_by = robot
+        return Reason.TOKEN_NOT_GRANTABLE_YET
+
+    def _take_up_brought(self) -> list[Effect]:
+        """The car that such a robot has aboard was asked for here: it is the next to go out."""
+        robot, self._wanted_by = self._wanted_by, NOBODY
+        cars = self.fleet.mirror.cars.items() if robot != NOBODY and self.calls.ahead is None else ()
+        aboard = [car for car, record in cars if (record.custodian, record.station) == (robot, ANY_STATION)]
+        if not aboard:
+            return []
+        task, number = self.memory.next_reference(self.fleet)
+        car, wheelbase_mm = aboard[0], self.fleet.mirror.cars[aboard[0]].wheelbase_mm
+        ahead = self.calls.ahead = BayTask(task, Operation.RETRIEVE, car, wheelbase_mm)
+        return [number, ahead_record(task, car, wheelbase_mm), *self.calls.won_by(ahead, robot, 0)]
 
     def look_ahead(self, phase: BayPhase, now_us: int) -> list[Effect]:
         """Call for the next car while the bay still works, once it is known when it can take it."""

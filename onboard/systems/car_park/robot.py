@@ -390,9 +390,9 @@ class ParkingRobot:
             # It came behind what was won or lasts longer since: no plan holds both.
             return self.going_around.forfeit(call.task, Reason.IMPOSSIBLE, now_us)
         kept = self.program.remaining[: solution.kept]
-        if not kept:
-            self._begun = False
+        self._begun = self._begun and bool(kept)
         self.program.replace([*kept, *solution.steps], Stamp(call.deadline_ms, call.sender, call.call & 0xFF))
+        self.going_around.won()
         effects: list[Effect] = [
             award_record(call, *self.generation.ends(call, solution.place), version),
             Report("program: " + "; ".join(str(step) for step in solution.steps)),

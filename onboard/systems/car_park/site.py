@@ -126,7 +126,7 @@ class CarPark(WaySite):
     shuttle_reach_mm: int
     cars: CarLimits
     rides: RideCalls = RideCalls.PLANNED
-    call_at: CallAt = CallAt.KEY
+    call_at: CallAt = CallAt.ARRIVAL
     #: Whether a bid brings its tentative itinerary: to be seen, as in the paper; nobody plans around it.
     tells_offers: bool = False
     #: In the order in which a car is tried against them; numbers are from 1.

@@ -139,6 +139,14 @@ class Stewardship:
             return True
         return award.task_version == version and self.winners.get(car) not in (None, award.winner)
 
+    def gone(self) -> list[Effect]:
+        """The car that by others' words stands in my bay is not there: its driver has taken it while I was off."""
+        car, self.left = self.left, None
+        record = None if car is None else self.fleet.mirror.cars.get(car.car)
+        if car is None or record is None or record.station != car.station:
+            return []
+        return custody.state(self.fleet, car.car, OUTSIDE, car.wheelbase_mm)
+
     def review(self, now_us: int) -> list[Effect]:
         """Take the right to fetch a car from winners that are lost, and say so until it is awarded anew."""
         if self.fleet.admissions != self._admissions:

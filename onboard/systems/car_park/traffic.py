@@ -152,6 +152,7 @@ _OPERATION = (
             TrafficBound(part, (), _rides, _window, "rides that bidders ask for first"),
         )
     ),
+    TrafficBound("CallParent", _COMPARTMENT, _one, _window, "with a call that says when the bay is ready"),
     TrafficBound("CallParent", (), _rides, _window, "with each ride's call"),
     TrafficBound("Award", _COMPARTMENT, _two, _window, "one for each call, said again once"),
     TrafficBound("Award", (), lambda n: 2 * _rides(n), _window, "one for each ride asked for, said again once"),

@@ -33,7 +33,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
     timing = read_timing(root.table("timing"), robots, len(fleet.by_node), common.bitrate)
     negotiation = root.table("negotiation")
     rides = RideCalls(negotiation.choice("rides", [one.value for one in RideCalls], "planned"))
-    call_at = CallAt(negotiation.choice("call_at", [one.value for one in CallAt], "key"))
+    call_at = CallAt(negotiation.choice("call_at", [one.value for one in CallAt], "arrival"))
     tells_offers = negotiation.choice("offers", ["kept", "told"], "kept") == "told"
     timing = replace(timing, sub_call_percent=negotiation.integer("sub_call_percent", 20, 80, 50))
     root.check_unknown()
