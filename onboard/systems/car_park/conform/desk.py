@@ -55,10 +55,15 @@ class Desk:
         """The token of the car."""
         return TokenKey(TokenKind.CAR, self.car.origin << 16 | self.car.number)
 
+    @property
+    def wheelbase_mm(self) -> int:
+        """That of the car, rounded down as it travels."""
+        return self.stage.means.wheelbase_mm // 10 * 10
+
     def place_car(self) -> None:
         """The compartment says that the car stands in its bay, once (duty Q1)."""
         if self.car not in self.cast.cars:
-            at = CarAt(self.stage.caller, self.car, self.bay.number, 1, self.stage.means.wheelbase_mm // 10 * 10)
+            at = CarAt(self.stage.caller, self.car, self.bay.number, 1, self.wheelbase_mm)
             self.cast.cars[self.car] = at
             self.stage.say(at)
 
@@ -79,7 +84,7 @@ class Desk:
             from_station=self.bay.number,
             to_station=ANY_STATION,
             car=self.car,
-            wheelbase_mm=self.stage.means.wheelbase_mm // 10 * 10,
+            wheelbase_mm=self.wheelbase_mm,
         )
         return replace(made, **changes)
 
@@ -112,9 +117,9 @@ class Desk:
             yield from self.stage.pause(0.4)
         return bid
 
-    def wins(self) -> Generator[Wait, None, tuple[CallForProposals, Word | None]]:
-        """Open a call and award it to the node under test, where it bids."""
-        call = self.call()
+    def wins(self, **changes: Any) -> Generator[Wait, None, tuple[CallForProposals, Word | None]]:
+        """Open a call and award it to the node under test, where it bids; ``changes`` are those of the call."""
+        call = self.call(**changes)
         bid = yield from self.asks(call, withdraws=False)
         if bid is None:
             self.withdraw(call)

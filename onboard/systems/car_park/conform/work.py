@@ -23,7 +23,14 @@ _AGAIN = (
 )
 _VERSION = "`CarAt` says where a car is, under the version of its token: by its custodian only."
 
+_COMES = "a compartment calls when somebody drives in (PARK, wheelbase 1500, raw 0: not measured)"
+_NO_SOONER = "Who bids plans its work there no sooner, and sets its shuttle to the wheelbase of `CarAt`"
+#: Who drives in has pressed the key by then, ms behind the deadline.
+_READY_MS = 30_000
+
 PARKED = (
+    Check("bids-for-who-drives-in", "Q4", _COMES),
+    Check("bids-no-sooner-than-the-bay-is-ready", "Q4", _NO_SOONER),
     Check("starts-before-the-bay", "U2", _STARTED),
     Check("start-names-the-bay", "U2", _STARTED),
     Check("says-that-it-works", "U2", _STARTED),
@@ -65,12 +72,16 @@ def _report(stage: Stage, call: CallForProposals, phase: TaskPhase, within_s: fl
 def parked(stage: Stage, cast: Cast) -> Play:
     """It parks the car that stands in the bay."""
     desk = Desk(stage, cast, 0x0B00, 1_000)
-    desk.place_car()
     held_back = {TokenKind.STATION, TokenKind.CAR}
     cast.answer = lambda key, _: Reason.TOKEN_NOT_GRANTABLE_YET if key.kind in held_back else Reason.NONE
-    call, bid = yield from desk.wins()
+    call, bid = yield from desk.wins(wheelbase_mm=0, ready_ms=_READY_MS)
+    stage.judge("bids-for-who-drives-in", bid, "no bid", bid)
+    desk.place_car()
     if bid is None:
         return
+    least_ms = _READY_MS + desk.handling_us(desk.bay) // 1000
+    is_late = desk.over_ms(call, bid) >= least_ms
+    stage.judge("bids-no-sooner-than-the-bay-is-ready", is_late, f"not {least_ms} ms behind the deadline", bid)
     begin_us = stage.now_us
     started = yield from _report(stage, call, TaskPhase.STARTED, 60.0, begin_us)
     stage.judge("starts-before-the-bay", started, "no STARTED within 60 s", started)
@@ -107,8 +118,8 @@ def _held_back(stage: Stage, cast: Cast, held_back: set[TokenKind]) -> Play:
 def _taken(stage: Stage, cast: Cast, desk: Desk, call: CallForProposals, aboard: Word) -> Play:
     version = cast.holder(desk.car_key)[1] & 0xFFFF
     stage.judge("car-is-told-under-its-version", aboard.message.version == version, f"not {version}", aboard)
-    is_same = aboard.message.wheelbase_mm == call.wheelbase_mm
-    stage.judge("car-keeps-its-wheelbase", is_same, f"not {call.wheelbase_mm} mm", aboard)
+    is_same = aboard.message.wheelbase_mm == desk.wheelbase_mm
+    stage.judge("car-keeps-its-wheelbase", is_same, f"not {desk.wheelbase_mm} mm", aboard)
     bay = (TokenKind.STATION, desk.bay.number)
     back = yield from stage.hears(
         TokenGrant, lambda one: (one.token_kind, one.token) == bay, 10.0, aboard.time_us - SECOND
