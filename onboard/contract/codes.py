@@ -246,6 +246,7 @@ class DeskText(IntEnum):
     OUT_OF_ORDER = 8
     NO_CHARGING = 9
     TOO_MANY_TRIES = 10
+    INSERT_AGAIN = 11
 
 
 class DriveMode(IntEnum):

@@ -47,34 +47,23 @@ def test_a_lost_journal_is_a_matter_of_minutes(name: str, at_s: int, body: str) 
 
 @pytest.mark.parametrize(
     ("name", "at_s", "site"),
-    [("IOC1", 60, SITE), ("IOC1", 70, at_arrival(SITE)), ("IOC1", 372, at_arrival(SITE)), ("ER1", 104, SITE)],
-    ids=[
-        "a robot has its car aboard",
-        "somebody drives in",
-        "a car is brought",
-        "a robot is aboard between two floors",
+    [
+        pytest.param("IOC1", 60, SITE, id="a robot has its car aboard"),
+        pytest.param("IOC1", 70, at_arrival(SITE), id="somebody drives in"),
+        pytest.param("IOC1", 340, SITE, id="a ticket was put in"),
+        pytest.param("IOC1", 372, at_arrival(SITE), id="a car is brought"),
+        pytest.param("IOC1", 396, at_arrival(SITE), id="a car that was fetched stands in the bay"),
+        pytest.param("IOC1", 424, at_arrival(SITE), id="its driver takes it meanwhile"),
+        pytest.param("ER1", 104, SITE, id="a robot is aboard between two floors"),
     ],
 )
 def test_rights_are_made_anew_in_the_middle_of_work(name: str, at_s: int, site: Site) -> None:
     """By an empty journal a car that a robot has is the compartment's own, no number was given, and nobody rides."""
-    scene = regenerated(name, at_s, site)
-    street = scene.simulation.plant.street.summary()
-    assert (street.parked, street.served, street.queueing, street.asking) == (4, 3, 0, 0)
-
-
-@pytest.mark.parametrize("at_s", [396, 424])
-def test_nobody_is_given_anothers_car_though_it_is_not_known_who_waits(at_s: int) -> None:
-    """A car in the bay that was fetched, or was taken meanwhile; who had put a ticket in has to do so again."""
-    scene = regenerated("IOC1", at_s, at_arrival(SITE))
-    street = scene.simulation.plant.street.summary()
-    assert street.parked == 4 and street.served >= 1 and street.queueing == 0
-
-
-def regenerated(name: str, at_s: int, site: Site) -> Scene:
     lost = f"crash:target={name},at_s={at_s},restart_s=5,journal=lost"
     scene = played(lost, f"operate:do=regenerate,at_s={at_s + 20},target={name}", site=site)
     scene.assert_sound()
-    return scene
+    street = scene.simulation.plant.street.summary()
+    assert (street.parked, street.served, street.queueing, street.asking) == (4, 3, 0, 0)
 
 
 def test_a_dead_robot_is_towed_regenerated_and_its_slot_is_nobodys() -> None:

@@ -140,7 +140,7 @@ def pack_desk_order(message: DeskOrder) -> bytes:
 def unpack_desk_order(sender: int, data: bytes) -> DeskOrder | None:
     sequence, word_1 = _UNPACK_BIXXX(data)
     text = word_1 & 0xF
-    if text > 10:
+    if text > 11:
         return None
     car_origin = word_1 >> 4 & 0xFF
     car_number = word_1 >> 12 & 0xFFFF

@@ -52,6 +52,8 @@ class BayCalls:
     on_won: Callable[[BayTask], None]
     job: BayTask | None = None
     ahead: BayTask | None = None
+    #: Whether rights were made anew and customers are to hear that no ticket is known any more; None: they never were.
+    forgot: bool | None = None
 
     def in_hand(self) -> list[BayTask]:
         """Both, as far as there are any."""
@@ -213,6 +215,8 @@ class BayCalls:
         """As custodian: winners that are lost; for my own tasks I call anew at once."""
         effects = self.stewardship.review(now_us)
         taken_back = bool(effects)
+        if self.fleet.slots_told and self.forgot is None:
+            self.forgot = True
         for task in self.in_hand():
             # Nobody has a right by an award that was not heard: its car is mine, and goes to the winner only.
             is_lost = (

@@ -104,7 +104,7 @@ class Compartment:
         self.tickets.extend(self.memory.tickets)
         self.calls = BayCalls(self.fleet, self.station, self.stewardship, self.memory, self._robots.floor, self._on_won)
         self.calls.take_up()
-        self.pipeline = Pipeline(self.fleet, self._park, self.calls, self.memory, self.tickets)
+        self.pipeline = Pipeline(self.fleet, self._park, self.calls, self.memory, self.tickets, self.outputs)
         self._table: dict[BayPhase, Callable[[int], list[Effect]]] = {
             BayPhase.STARTING: self._when_starting,
             BayPhase.FREE: self._when_free,

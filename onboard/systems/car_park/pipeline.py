@@ -9,7 +9,7 @@ into his own; drivers, who cannot be seen outside, are invited after ``MOST_OUT`
 from collections import deque
 from dataclasses import dataclass
 
-from onboard.contract.codes import Operation, Reason
+from onboard.contract.codes import DeskText, Operation, Reason
 from onboard.contract.constants import ANY_STATION, NOBODY
 from onboard.contract.messages import Reference
 from onboard.core.effects import Effect, Send
@@ -18,6 +18,7 @@ from onboard.systems.car_park.bay_calls import BayCalls
 from onboard.systems.car_park.bay_generation import DRIVER_US
 from onboard.systems.car_park.bay_memory import BayMemory, ahead_record
 from onboard.systems.car_park.bay_task import BayPhase, BayTask
+from onboard.systems.car_park.outputs import BayOutputs
 from onboard.systems.car_park.site import ANY_CLASS, CallAt, CarPark
 from onboard.ways.mirror import WayFleet
 from onboard.ways.site import BayUse
@@ -45,6 +46,7 @@ class Pipeline:
     calls: BayCalls
     memory: BayMemory
     tickets: deque[Reference]
+    outputs: BayOutputs
     #: Since when drivers are invited, and whether the last one came at once: then there is a queue outside.
     free_from_us: int | None = None
     is_queued: bool = False
@@ -149,6 +151,9 @@ class Pipeline:
     def look_ahead(self, phase: BayPhase, now_us: int) -> list[Effect]:
         """Call for the next car while the bay still works, once it is known when it can take it."""
         self._looked_us = now_us
+        if self.calls.forgot and phase is BayPhase.FREE:
+            self.calls.forgot = False
+            return [self.outputs.show(DeskText.INSERT_AGAIN, Reference(0, 0))]
         job = self.calls.job
         if job is None or self.calls.ahead is not None or not self.tickets or not self.is_on:
             return []

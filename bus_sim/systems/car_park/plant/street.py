@@ -190,6 +190,11 @@ class Street:
 
     def _read(self, node_id: int, text: DeskText, car: Reference) -> None:
         """A text concerns the customer of that ticket; a ticket and texts without a number whoever pressed the key."""
+        if text is DeskText.INSERT_AGAIN:
+            for customer in list(self._waiting[node_id]):
+                if customer.state is CustomerState.AT_DESK:
+                    customer.on(CustomerEvent.UNKNOWN)
+            return
         event = TEXTS.get(text)
         if event is None:
             return
