@@ -133,7 +133,7 @@ class Pipeline:
 
     def wants(self, robot: int) -> Reason:
         """A robot asks for the bay, of which it has no task here; it may have had one before the journal was lost."""
-        self._wanted_by = robot
+        self._wanted_by = robot if self.free_from_us is not None else NOBODY
         return Reason.TOKEN_NOT_GRANTABLE_YET
 
     def _take_up_brought(self) -> list[Effect]:
