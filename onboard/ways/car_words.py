@@ -48,7 +48,10 @@ class CarWords:
         key = car_token(*statement.car)
         held = self.tokens.held.get(key)
         if held is not None and statement.sender != self.node_id:
-            # The giver says again where the car stood, under the version before mine, until it has heard me.
+            # The giver says again where the car stood, under the version before mine, until it has heard me: news only
+            # where my journal has lost what was said of it before it became mine.
+            if statement.car not in self.cars and statement.version == (held - 1) & _MASK:
+                self.take_up(statement)
             self.drops[Reason.RIGHT_CLAIMED] += not is_newer(held & _MASK, statement.version, VERSION_BITS)
             return
         if self._is_proven(key, statement):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bus_sim.campaign.points import SceneCounts, Single, count, points, reference
+from bus_sim.campaign.points import SceneCounts, SceneOccasion, Single, count, points, reference
 from bus_sim.campaign.report import RunVerdict
 from bus_sim.campaign.runner import CampaignSettings, FaultPoint, run_point
 from bus_sim.can.faults import InjectedFault
@@ -100,3 +100,11 @@ def test_a_machine_that_cannot_rely_on_its_journal_holds_and_is_told_of(harm: st
     report = run_point(CampaignSettings(SITE, "journal", 3_600.0), FaultPoint(1, fault)).report
     assert report.verdict is RunVerdict.HELD, report.why()
     assert report.halted == (), "it lives, and comes back by a person's word"
+
+
+def test_a_robot_that_has_lost_the_measure_of_its_car_hears_it_before_it_grips() -> None:
+    """`small`, harm 19878 of three cars that overlap: called for unmeasured, and cut back to before its first step."""
+    fault = parse_injection("crash:target=MR1,at_s=0,restart_s=5,write=36,durable=yes,journal=cut,entries=19")
+    settings = CampaignSettings("small", "journal", 3_600.0, scene=SceneOccasion.OVERLAP)
+    report = run_point(settings, FaultPoint(1, fault)).report
+    assert report.verdict is RunVerdict.SERVED, report.why()

@@ -62,3 +62,15 @@ def test_the_tokens_move_proves_the_word_of_its_taker(proof: Message, is_before:
         ANY_STATION,
         LIAR,
     )
+
+
+def test_whose_journal_has_lost_where_its_car_stands_hears_it_from_who_gave_it() -> None:
+    """The giver says so until it has heard the taker: an unmeasured car has its wheelbase from that alone."""
+    robot = hears(ROBOT)
+    robot.tokens.held[car_token(*CAR)] = robot.tokens.seen[car_token(*CAR)] = 2
+    robot.receive(at(LIAR, THERE, 9), 10)
+    assert CAR not in way_mirror(robot.mirror).cars
+    robot.receive(at(BAY, HERE, 1), 11)
+    robot.receive(at(LIAR, THERE, 1), 12)
+    known = way_mirror(robot.mirror).cars[CAR]
+    assert (known.station, known.custodian, known.wheelbase_mm) == (HERE, BAY, 2_600)

@@ -173,12 +173,12 @@ class ShuttleWork:
         if order is None:
             self.phase = following
             return self._finish(self.work, now_us)
-        permit = self._permit()
-        if not permit:
+        permit, wheelbase_mm, side = self._permit(), self._wheelbase_mm(self.work), self.work.station.side
+        if not permit or (order is ShuttleAction.GRIP and not wheelbase_mm):
+            # A car that is not measured as far as is known would be torn: its custodian tells it.
             return []
         self.phase = following
         self.sequence = successor(self.sequence, 8)
-        side, wheelbase_mm = self.work.station.side, self._wheelbase_mm(self.work)
         self._ordered = ShuttleOrder(self.fleet.node_id, self.sequence, order, side, wheelbase_mm)
         self._unheard.ordered("shuttle")
         self.stall.ordered(now_us)
