@@ -102,9 +102,18 @@ def test_a_machine_that_cannot_rely_on_its_journal_holds_and_is_told_of(harm: st
     assert report.halted == (), "it lives, and comes back by a person's word"
 
 
-def test_a_robot_that_has_lost_the_measure_of_its_car_hears_it_before_it_grips() -> None:
-    """`small`, harm 19878 of three cars that overlap: called for unmeasured, and cut back to before its first step."""
-    fault = parse_injection("crash:target=MR1,at_s=0,restart_s=5,write=36,durable=yes,journal=cut,entries=19")
-    settings = CampaignSettings("small", "journal", 3_600.0, scene=SceneOccasion.OVERLAP)
-    report = run_point(settings, FaultPoint(1, fault)).report
+@pytest.mark.parametrize(
+    ("site", "text"),
+    [
+        # The robot has lost the measure of a car that was called for unmeasured, and must not grip it so.
+        ("small", "crash:target=MR1,at_s=0,restart_s=5,write=36,durable=yes,journal=cut,entries=19"),
+        # The compartment has lost who drives in, but for the number, and his robot has its next task too.
+        ("small", "crash:target=IOC1,at_s=0,restart_s=5,write=139,durable=yes,journal=cut,entries=5"),
+        ("level1", "crash:target=IOC1,at_s=0,restart_s=5,write=31,durable=yes,journal=flipped,entries=1"),
+    ],
+)
+def test_what_a_medium_loses_while_somebody_drives_in_leaves_nobody_waiting(site: str, text: str) -> None:
+    """Harms 19878 and 6865 of `small`, 730 of `level1`, of three cars that overlap."""
+    settings = CampaignSettings(site, "journal", 3_600.0, scene=SceneOccasion.OVERLAP)
+    report = run_point(settings, FaultPoint(1, parse_injection(text))).report
     assert report.verdict is RunVerdict.SERVED, report.why()

@@ -270,7 +270,7 @@ class Compartment:
 
     def _when_starting(self, now_us: int) -> list[Effect]:
         if self.memory.job is not None:
-            return self._take_up_job(now_us)
+            return self._take_up_job(now_us) + self.pipeline.void()
         effects = self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
         if not self._is(DoorName.OUTPUT, DoorPosition.LOCKED):
             return effects

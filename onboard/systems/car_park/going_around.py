@@ -200,13 +200,17 @@ class GoingAround:
         """A task is another's by its initiator's word; nobody need hear of that from me."""
         return [forfeited_record(task), Report(f"task {task.origin}.{task.number} is another's now")]
 
-    def untouched(self) -> list[Reference]:
-        """Tasks in the program whose car was not touched and is in others' custody, in order."""
+    def untouched(self, *, is_void: bool = False) -> list[Reference]:
+        """Tasks in the program whose car was not touched and is in others' custody, in order.
+
+        Of one that is void the right to the station does not count: it may have come for the next task there.
+        """
         tokens = self.fleet.tokens
         found = []
         for work in self.program.works():
             begun = self.shuttle.work == work and self.shuttle.phase not in (HandlingPhase.ACQUIRE, HandlingPhase.DONE)
-            has_right = tokens.holds(car_token(*work.car)) or tokens.holds(station_token(work.station))
+            has_right = tokens.holds(car_token(*work.car))
+            has_right |= tokens.holds(station_token(work.station)) and not is_void
             if work.handling is CarHandling.TAKE and not begun and not has_right:
                 found.append(work.call.task)
         return found
