@@ -43,8 +43,8 @@ class Fleet:
     winners: Winners = field(init=False)
     #: How often this machine was admitted again after it had been an obstacle: its plans of before are old then.
     admissions: int = 0
-    #: After this machine's rights were made anew: the slots that it was given, which are those of its body.
-    slots_told: tuple[Segment, ...] = ()
+    #: After this machine's rights were made anew: the slots that it was given, which are those of its body; else None.
+    slots_told: tuple[Segment, ...] | None = None
     #: Whether nobody knows this machine's rights, and so not where it is.
     has_no_rights: bool = False
     #: Machines whose rights were made anew: of what was promised to them before they know nothing.

@@ -6,14 +6,15 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.contract.codes import Reason, RegenerationPhase, TaskPhase
-from onboard.contract.messages import Halted, Heartbeat, Regeneration, TaskReport
+from onboard.contract.codes import DeskText, Reason, RegenerationPhase, TaskPhase
+from onboard.contract.messages import DeskOrder, Halted, Heartbeat, Regeneration, TaskReport
 from onboard.core.site import Site
 from tests.sites import at_arrival, at_the_key
 from tests.system.scene import Scene, play, stays
 from tests.thinned import some
 
 SITE = at_the_key(find_site("small"))
+AGAIN = DeskText.INSERT_AGAIN
 CARS = stays((0, 320), (60, 380), (120, 440), (300, None))
 #: A machine loses its journal, and when; its person comes 20 s later and sees where it stands.
 LOSSES = [("MR1", 50, "p(1;5)"), ("MR2", 20, "p(3;8)"), ("IOC1", 50, ""), ("IOC1", 190, ""), ("ER1", 50, "")]
@@ -111,3 +112,20 @@ def test_an_operator_that_is_gone_leaves_a_site_that_goes_on() -> None:
     scene.assert_sound()
     assert scene.simulation.plant.street.summary().served == 3
     assert {beat.epoch for _, beat in scene.all(Heartbeat)} == {0}
+
+
+def test_a_desk_that_forgot_its_tickets_asks_for_them_though_it_is_steward_of_nothing() -> None:
+    """IOC2 of `standard` has no slots of its own; its rights were made anew all the same."""
+    site = find_site("standard")
+    faults = ["crash:target=IOC2,at_s=205,restart_s=5,journal=lost", "operate:do=regenerate,at_s=225,target=IOC2"]
+    scene = play(
+        site,
+        stays((0, 190), (10, 195), (20, 200)),
+        plant=lambda simulation: arm(simulation, [parse_injection(one) for one in faults]),
+        limit_s=600,
+    )
+    scene.assert_sound()
+    asked = {bus for bus in ("IOC1", "IOC2", "IOC3") for _, one in scene.all(DeskOrder, bus) if one.text is AGAIN}
+    assert asked == {"IOC2"}
+    street = scene.simulation.plant.street.summary()
+    assert (street.served, street.asking) == (3, 0)

@@ -215,7 +215,7 @@ class BayCalls:
         """As custodian: winners that are lost; for my own tasks I call anew at once."""
         effects = self.stewardship.review(now_us)
         taken_back = bool(effects)
-        if self.fleet.slots_told and self.forgot is None:
+        if self.fleet.slots_told is not None and self.forgot is None:
             self.forgot = True
         for task in self.in_hand():
             # Nobody has a right by an award that was not heard: its car is mine, and goes to the winner only.
