@@ -91,6 +91,17 @@ def test_with_both_it_is_sent_in_and_tells_of_the_turn() -> None:
     assert [(m.token, m.holder) for m in given] == [(MOUTH.number, STEWARD)]
 
 
+def test_arrived_it_keeps_nothing_of_a_way_for_which_it_had_asked_as_a_whole() -> None:
+    # `standard --random 15 5 --cars 100 --seed 4`: a robot in the spur kept the mouth for ten minutes, and the street stood.
+    one = in_mouth()
+    one.whole.begin((MOUTH, MOUTH, INSIDE), 0)
+    get(one, INSIDE)
+    one.advance(0)
+    one.sense(state(0, across=True, sequence=one.sequence), 3)
+    given = [e.message for e in one.advance(3) if isinstance(e, Send) and isinstance(e.message, TokenGrant)]
+    assert [(m.token, m.holder) for m in given] == [(MOUTH.number, STEWARD)]
+
+
 def test_out_it_drives_into_the_mouth_first_and_then_turns() -> None:
     one = in_mouth()
     one.advance(0)

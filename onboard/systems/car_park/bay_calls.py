@@ -231,8 +231,15 @@ class BayCalls:
         if ahead is not None and not (ahead.winner or ahead.call or ahead.retry_at_us or self._is_open(ahead)):
             effects += self.settle(ahead, now_us)
         if ahead is not None and ahead.retry_at_us is not None and ahead.retry_at_us <= now_us:
-            effects += self.call_for(ahead, now_us)
+            effects += (
+                self._drop_ahead() if bay_task.is_gone(ahead.car, self.fleet.mirror) else self.call_for(ahead, now_us)
+            )
         return effects
+
+    def _drop_ahead(self) -> list[Effect]:
+        """The car of the next task has left from another bay."""
+        ahead, self.ahead = self.ahead, None
+        return [] if ahead is None else [ahead_over_record(ahead.task)]
 
     def bay_came_back(self, now_us: int, *, is_loaded: bool) -> tuple[BayPhase | None, list[Effect]]:
         """The robot that had the bay gives it back: the next phase, None while it has the car or sensors are behind.
@@ -319,6 +326,12 @@ class BayCalls:
         """When the winner of the job will have been at the bay, by its plan, bus us; None where it has told of none."""
         leg = None if self.job is None else self._work_here(self.job.winner)
         return None if leg is None else from_bus_ms(leg.end_ms, now_us)
+
+    def brings(self, node: int) -> bool:
+        """Whether the work that a machine has next, by its plan, is at the bay."""
+        plan = self.fleet.mirror.itineraries.get(node)
+        work = None if plan is None else next((leg for leg in plan.legs if leg.action is LegAction.WORK), None)
+        return work is not None and (work.track, work.to_index, work.side) == tuple(self.station)
 
     def _work_here(self, node: int) -> Leg | None:
         """What a machine does first at the bay by its plan."""

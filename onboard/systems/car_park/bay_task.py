@@ -95,6 +95,10 @@ class BayTask:
         """Whether it is a car that nobody came to park: its driver may have it, and while he does not it is a task."""
         return self.operation is Operation.PARK and self.refusals > 0
 
+    def has_left(self, bay: BayState, mirror: WayMirror) -> bool:
+        """Whether its car is gone: out with the driver who brought it, or from another bay."""
+        return is_gone(self.car, mirror) or (self.operation is Operation.PARK and not bay.load_kg)
+
     def refused(self, reason: Reason, now_us: int) -> None:
         """Nobody could; it is called for again later, and ever less often."""
         self.refusals, self.reason = self.refusals + 1, reason
@@ -182,8 +186,13 @@ def fits(bay: BayState, limits: CarLimits) -> bool:
 
 def forget_tickets(tickets: deque[Reference], mirror: WayMirror) -> None:
     """Drop those of cars that have left, here or elsewhere: nobody can fetch them, and others wait behind them."""
-    for car in [car for car in tickets if car in mirror.cars and mirror.cars[car].station == OUTSIDE]:
+    for car in [car for car in tickets if is_gone(car, mirror)]:
         tickets.remove(car)
+
+
+def is_gone(car: Reference, mirror: WayMirror) -> bool:
+    """Whether a car has left the park, by this compartment or another: nobody can fetch it any more."""
+    return car in mirror.cars and mirror.cars[car].station == OUTSIDE
 
 
 def admitted(bay: BayState, park: CarPark, mirror: WayMirror, *, charging: bool) -> int | DeskText:

@@ -413,7 +413,7 @@ class Compartment:
     def _when_awaiting(self, now_us: int) -> list[Effect]:
         assert self.bay is not None and self.job is not None
         if self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
-            has_left = self.job.operation is Operation.PARK and not self.bay.load_kg
+            has_left = self.job.has_left(self.bay, self.fleet.mirror)
             return self._left(self.job) if has_left else self.calls.call_for(self.job, now_us)
         if not self._robot_waits or not self.job.winner or not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []

@@ -100,7 +100,7 @@ class Pipeline:
         """Somebody is in the free bay: call for a robot before the car is measured, where any place will do."""
         if self.free_from_us is not None:
             self.is_queued, self.free_from_us = now_us - self.free_from_us <= QUEUED_US, None
-            self.outs = 0
+            self.outs, self._wanted_by = 0, NOBODY
         if not self.is_on or not self.fleet.tokens.is_synced:
             # Who does not know yet whether its journal is whole gives no number away.
             return []
@@ -133,7 +133,9 @@ class Pipeline:
 
     def wants(self, robot: int) -> Reason:
         """A robot asks for the bay, of which it has no task here; it may have had one before the journal was lost."""
-        self._wanted_by = robot if self.free_from_us is not None else NOBODY
+        ahead = self.calls.ahead
+        is_its = ahead is not None and ahead.winner == robot
+        self._wanted_by = NOBODY if is_its or self.free_from_us is None else robot
         return Reason.TOKEN_NOT_GRANTABLE_YET
 
     def _take_up_brought(self) -> list[Effect]:
@@ -141,7 +143,7 @@ class Pipeline:
         robot, self._wanted_by = self._wanted_by, NOBODY
         cars = self.fleet.mirror.cars.items() if robot != NOBODY and self.calls.ahead is None else ()
         aboard = [car for car, record in cars if (record.custodian, record.station) == (robot, ANY_STATION)]
-        if not aboard:
+        if not aboard or not self.calls.brings(robot):
             return []
         task, number = self.memory.next_reference(self.fleet)
         car, wheelbase_mm = aboard[0], self.fleet.mirror.cars[aboard[0]].wheelbase_mm

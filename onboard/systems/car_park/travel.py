@@ -346,9 +346,9 @@ class Carriage:
         self.refresh_at_us = None
         if self.sensed is None or self.sensed.mode is not DriveMode.STANDING:
             return []
-        self.target = None
+        self.target = self.blocked = None
         self.stall.rests()
-        self.blocked = None
+        self.whole.passed(self.occupied())
         effects: list[Effect] = []
         for segment in self.occupied():
             effects += self.fleet.tokens.want(segment_token(segment), now_us)
