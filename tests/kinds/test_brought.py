@@ -1,5 +1,7 @@
 """A compartment and a robot that asks for its bay with a car aboard; and a task whose car has left meanwhile."""
 
+import pytest
+
 from onboard.contract.codes import (
     DoorAction,
     DoorName,
@@ -27,7 +29,8 @@ from onboard.contract.messages import (
 from onboard.core.effects import Actuate, Effect
 from onboard.core.site import Station
 from onboard.core.token_keys import station_token
-from tests.kinds.test_tickets import BAY, CAR, ROBOT, SITE, WHEELBASE_MM, Desk
+from onboard.systems.car_park.bay_memory import BEYOND_LOST
+from tests.kinds.test_tickets import BAY, CAR, OTHER, ROBOT, SITE, WHEELBASE_MM, Desk
 
 HERE = SITE.compartments[BAY]
 OTHER_PLACE = SITE.places[5]
@@ -84,10 +87,14 @@ def test_it_is_not_for_one_that_has_a_car_for_another_bay_aboard() -> None:
     assert asked_for_the_bay(OTHER_PLACE).ordered(5) == []
 
 
-def test_a_task_whose_car_has_left_from_another_bay_holds_the_bay_up_no_longer() -> None:
+@pytest.mark.parametrize("seconds", [0, 40], ids=["as the next", "as the one in hand"])
+def test_a_task_whose_car_has_left_from_another_bay_holds_the_bay_up_no_longer(seconds: int) -> None:
     bay = asked_for_the_bay(HERE)
     assert bay.ordered(1) == [(DoorName.INPUT, DoorAction.CLOSE)]
-    bay.hears(TaskReport(ROBOT, Reference(BAY, 1), TaskPhase.FORFEITED, 0, Reason.CANCELLED))
+    # The one after its two cars, and beyond the numbers that it may have lost.
+    task = Reference(BAY, BEYOND_LOST + OTHER.number + 1)
     bay.hears(CarAt(ROBOT, CAR, OUTSIDE, 4, WHEELBASE_MM))
+    bay.hears(TaskReport(ROBOT, task, TaskPhase.FORFEITED, 0, Reason.CANCELLED))
+    assert bay.ordered(40 - seconds) == []
     bay.sees(DoorState(BAY, DoorPosition.LOCKED, DoorPosition.LOCKED, LightColour.RED))
-    assert bay.ordered(40) == [(DoorName.INPUT, DoorAction.OPEN)]
+    assert bay.ordered(seconds) == [(DoorName.INPUT, DoorAction.OPEN)]

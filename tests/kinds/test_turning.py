@@ -92,7 +92,7 @@ def test_with_both_it_is_sent_in_and_tells_of_the_turn() -> None:
 
 
 def test_arrived_it_keeps_nothing_of_a_way_for_which_it_had_asked_as_a_whole() -> None:
-    # `standard --random 15 5 --cars 100 --seed 4`: a robot in the spur kept the mouth for ten minutes, and the street stood.
+    # `standard --random 15 5 --cars 100 --seed 4`: a robot in the spur kept its mouth, and the street stood.
     one = in_mouth()
     one.whole.begin((MOUTH, MOUTH, INSIDE), 0)
     get(one, INSIDE)
