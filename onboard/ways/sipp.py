@@ -194,7 +194,7 @@ class _IntervalSearch:
         self._queue: list[_Entry] = []
         self.expansions = 0
         self._goal_tracks = [{goal.track for goal in goals} for goals in self._targets]
-        #: By phase: the best label of each state.
+        #: By phase: the best label of each state by its key.
         self._best: list[dict[int, _Label]] = [{} for _ in self._targets]
         #: By phase: intervals of its visit that are not reached yet. When there are none the phase is over.
         self._open = [{state for state in edges.states(visit.segment) if _fits(state, visit)} for visit in visits]
@@ -211,7 +211,8 @@ class _IntervalSearch:
             if not pops % PAUSE_POPS:
                 yield PAUSE_POPS * POP_STEPS
             phase, state = node.phase, node.state
-            if self._best[phase][state.number] != node.label or self._is_over(phase):
+            key = self._key(node)
+            if self._best[phase][key] != node.label or self._is_over(phase):
                 continue
             if self._is_goal(phase, state):
                 finish_us = node.visit_ends_us[-1] if node.visit_ends_us else node.time_us
@@ -221,7 +222,7 @@ class _IntervalSearch:
             self.expansions += 1
             # From now on one has to be earlier; until now it was enough to be as early, with less effort. A state can
             # come up again earlier after the last visit only: by a route that ends that visit later.
-            self._best[phase][state.number] = node.time_us, -1, 0, 0, 0
+            self._best[phase][key] = node.time_us, -1, 0, 0, 0
             self._expand(node)
         return NoRoute("no order of waits and moves leads to the goal and a refuge", self.expansions, pops)
 
@@ -247,15 +248,17 @@ class _IntervalSearch:
 
         A bound that promises one is looked at, and what it comes to meets its turn in this very loop.
         """
-        phase, state, time_us, _, _, _, visit_ends_us, (aboard_us, travel_mm, moves) = node
+        phase, state, time_us, _, came, _, visit_ends_us, (aboard_us, travel_mm, moves) = node
         best, is_aboard = self._best[phase], self.roads.lift_at(state.segment) is not None
+        # A lift comes for who rides: nobody drives onto its platform to make room, and off it again.
+        is_to_ride = is_aboard and came is LegAction.TRAVEL
         is_last, is_any_over = phase == len(self.visits), False
         for place, (first_us, last_us, until_us, duration_us, number, distance_mm, is_safe) in enumerate(edges):
             depart_us = max(first_us, time_us)
-            if depart_us >= last_us or until_us <= time_us:
+            if depart_us >= last_us or until_us <= time_us or (is_to_ride and distance_mm):
                 continue
             arrival_us = depart_us + duration_us
-            known = best.get(number)
+            known = best.get(number if distance_mm else ~number)
             if (known is not None and arrival_us > known[0]) or (is_last and arrival_us > self._found[1]):
                 continue
             waited_us = ((depart_us if distance_mm else arrival_us) - time_us) if is_aboard else 0
@@ -271,6 +274,12 @@ class _IntervalSearch:
             self._push(_Node(phase, there, arrival_us, node, leg, depart_us, visit_ends_us, effort))
         if is_any_over:
             edges[:] = [edge for edge in edges if edge is not NO_EDGE]
+
+    def _key(self, node: _Node) -> int:
+        """The state's number; its complement on a platform which one may drive off: by a ride, or after a visit."""
+        number = node.state.number
+        is_driven = node.action is LegAction.TRAVEL
+        return number if is_driven or self.roads.lift_at(node.state.segment) is None else ~number
 
     def _push_dwell(self, node: _Node, visit: Visit) -> None:
         begin_us = max(node.time_us, ceil_ms(visit.not_before_us))
@@ -299,9 +308,10 @@ class _IntervalSearch:
         else:
             # Without visits all ends are equal.
             ends_us = node.visit_ends_us[-1] if node.visit_ends_us else 0, node.time_us + way_us
-        label, known = node.label, self._best[phase].get(state.number)
+        label, key = node.label, self._key(node)
+        known = self._best[phase].get(key)
         if max(ends_us) < FOREVER and ends_us <= self._found and (known is None or label < known):
-            self._best[phase][state.number] = label
+            self._best[phase][key] = label
             if self._is_goal(phase, state):
                 self._found = ends_us
             here = state.segment if node.parent is None else node.parent.state.segment

@@ -132,18 +132,24 @@ class ExhaustiveLifts:
         return following is None or tick + empty_run(following.board - floor) <= following.begin
 
     def spread(self, place: Place, times: int) -> dict[Place, int]:
-        """All (place, tick) at which one can be at rest, having been at ``place`` at any of ``times``."""
-        at = dict.fromkeys(self.stand, 0)
+        """All (place, tick) at which one can be at rest, having been at ``place`` at any of ``times``.
+
+        Who has driven onto a platform rides before it drives off: a lift comes for nothing else.
+        """
+        at, boarded = dict.fromkeys(self.stand, 0), dict.fromkeys(self.stand, 0)
         at[place] = times
         for tick in range(HORIZON):
             for here in at:
-                if not (at[here] & self.stand[here]) >> tick & 1:
-                    continue
-                at[here] |= 1 << (tick + 1)
-                for there, duration, allowed in self.moves.get(here, ()):
-                    if allowed >> tick & 1:
-                        at[there] |= 1 << (tick + duration)
-        return at
+                for rested, is_to_ride in ((at, False), (boarded, True)):
+                    if not (rested[here] & self.stand[here]) >> tick & 1:
+                        continue
+                    rested[here] |= 1 << (tick + 1)
+                    for there, duration, allowed in self.moves.get(here, ()):
+                        rides = there[0] != here[0]
+                        if allowed >> tick & 1 and (rides or not is_to_ride):
+                            enters = self.problem.lift_at(there) is not None and not rides
+                            (boarded if enters else at)[there] |= 1 << (tick + duration)
+        return {here: at[here] | boarded[here] for here in at}
 
     def dwells(self, at: int, visit: tuple[Place, int, int]) -> int:
         """All ends of a dwell for a body that can be there at the ticks ``at``."""
