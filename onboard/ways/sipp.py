@@ -255,7 +255,9 @@ class _IntervalSearch:
         is_last, is_any_over = phase == len(self.visits), False
         for place, (first_us, last_us, until_us, duration_us, number, distance_mm, is_safe) in enumerate(edges):
             depart_us = max(first_us, time_us)
-            if depart_us >= last_us or until_us <= time_us or (is_to_ride and distance_mm):
+            if depart_us >= last_us or until_us <= time_us:
+                continue
+            if is_to_ride and distance_mm:
                 continue
             arrival_us = depart_us + duration_us
             known = best.get(number if distance_mm else ~number)
