@@ -130,6 +130,16 @@ FOUND = (
         135,
         ("crash:at_s=117.016517,target=MR1,restart_s=17.716,write=1,durable=no",),
     ),
+    Found(
+        "who stands by a plan around an obstacle sets off when that is gone",
+        "A lift was off for 17 s; the robot kept to a wait of 90 s for another that had given its task back by then.",
+        "small",
+        9476,
+        (
+            "crash:at_s=125.343839,target=IOC1,restart_s=7.703",
+            "crash:at_s=573.229038,target=ER1,restart_s=17.726,frame=52",
+        ),
+    ),
 )
 
 
