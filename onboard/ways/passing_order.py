@@ -406,9 +406,11 @@ class PassingOrder:
             self._agreed.pop((low, high), None)
 
     def _has_passed(self, node: int, segment: Segment) -> bool:
-        """Whether a machine's plan, or a token that it gave back, tells that it was here and does not come again."""
+        """Whether a machine's plan, or a token that it gave back, tells that it was here; it may come again later."""
         way = self._ways.get(node)
-        return way is not None and self._first(node, segment) is None and segment in {*way.turns, *way.left}
+        if way is None:
+            return False
+        return segment in way.left or sum(1 for _ in way.open_turns(segment)) < len(way.turns.get(segment, ()))
 
     def _behind(self, leg: Leg, progress: Progress) -> set[Segment]:
         """Segments of a moving leg that the body, clearance included, has left."""

@@ -102,6 +102,21 @@ def test_arrived_it_keeps_nothing_of_a_way_for_which_it_had_asked_as_a_whole() -
     assert [(m.token, m.holder) for m in given] == [(MOUTH.number, STEWARD)]
 
 
+def test_who_waits_by_its_plan_keeps_nothing_of_the_way_that_comes_after() -> None:
+    # `changi`, overloaded: what it had asked for as a whole led out again, to where the one was that it waited for.
+    one = in_mouth()
+    one.whole.begin((MOUTH, INSIDE, MOUTH, Segment(1, 6)), 0)
+    for slot in (INSIDE, Segment(1, 6)):
+        get(one, slot)
+    one.advance(0)
+    one.sense(state(0, across=True, sequence=one.sequence), 3)
+    one.advance(3)
+    assert one.fleet.tokens.holds(segment_token(MOUTH)), "it is to go on"
+    one.go(INSIDE, waits=True)
+    given = [e.message for e in one.advance(3) if isinstance(e, Send) and isinstance(e.message, TokenGrant)]
+    assert sorted(m.token for m in given) == [Segment(1, 6).number, MOUTH.number]
+
+
 def test_out_it_drives_into_the_mouth_first_and_then_turns() -> None:
     one = in_mouth()
     one.advance(0)

@@ -131,3 +131,12 @@ def test_a_predecessor_that_has_passed_settles_the_question() -> None:
     order = passing()
     order.on_progress(progress(ALICE, 1, 4))
     assert order.verdict(BOB, Segment(1, 7), 1, ALICE) is Reason.NONE
+
+
+def test_a_predecessor_that_has_passed_and_comes_again_settles_it_too() -> None:
+    """Its holder knows that it has left before others hear of that, and refused it for as long as it drove on."""
+    there_and_back = plan(ALICE, [(9, 4, 20), (4, 4, 70), (4, 9, 90)])
+    order = order_of(there_and_back, plan(BOB, [(11, 11, 30), (11, 7, 40), (7, 11, 55)]))
+    assert order.verdict(BOB, Segment(1, 7), 1, ALICE) is Reason.TOKEN_NOT_GRANTABLE_YET
+    order.on_progress(progress(ALICE, 0, 4))
+    assert order.verdict(BOB, Segment(1, 7), 1, ALICE) is Reason.NONE

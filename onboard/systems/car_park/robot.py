@@ -411,7 +411,7 @@ class ParkingRobot:
             return [ride_record(step), *self.carriage.statement(now_us), *self.riding.begin(step.track, step.to_index)]
         else:
             # A way that was given up while its rights were awaited is not gone when they come.
-            self.carriage.go(step.destination)
+            self.carriage.go(step.destination, waits=step.work is None and step.end_us > now_us)
         return [] if step.work is None else self.shuttle.begin(step.work) + self._announce_start(step.work)
 
     def _announce_start(self, work: StationWork) -> list[Effect]:

@@ -213,15 +213,15 @@ class Carriage:
         (track, index), offset_mm = self._told_at(self.sensed)
         return Progress(self.fleet.node_id, *self.in_hand(), track, index, offset_mm, self.sensed.speed_mm_s)
 
-    def go(self, goal: Segment) -> None:
-        """Set the goal; ``advance`` does the rest."""
+    def go(self, goal: Segment, *, waits: bool = False) -> None:
+        """Set the goal; ``advance`` does the rest. Who ``waits`` there by its plan wants nothing beyond for now."""
+        if waits or goal not in self.whole.slots:
+            self.whole.end()
         if goal != self.goal:
             self.goal = goal
             self._turned = True
             self.target = None
             self.blocked = None
-            if goal not in self.whole.slots:
-                self.whole.end()
             if self.sensed is not None and goal.track != self.track:
                 self.track, self.sensed = self.placing.faced(self.sensed, self.track, goal)
 
@@ -250,7 +250,7 @@ class Carriage:
     def _outlook(self) -> tuple[object, ...]:
         """All that decides what is to be done, but the time: each message on the bus asks, and few change anything."""
         words = [self.sill.word(lift) for lift in self.axis.lifts]
-        seen = self.fleet.tokens.changes, self.fleet.mirror.obstacles.changes, *words
+        seen = self.fleet.tokens.changes, self.fleet.mirror.obstacles.changes, self.whole.slots, *words
         return self.sensed, self.goal, self.target, self.track, self.stopped, self.is_clear(), *seen
 
     def _go_on(self, now_us: int) -> list[Effect]:
