@@ -49,9 +49,13 @@ class LeftBehind:
         left, self.slots, self.due_us = self.slots, (), None
         return self._give([slot for slot in left if slot not in needed], now_us)
 
-    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
-        """A slot that was left goes to who is next there; all else is in use."""
-        if slot_of(key) not in self.slots or key != segment_token(slot_of(key)):
+    def may_grant(self, key: TokenKey, requester: int, now_us: int, *, is_used: bool) -> Reason:
+        """A slot that was left, or is not ``is_used``, goes to who is next there; nothing else, and no lift's."""
+        slot = slot_of(key)
+        if key != segment_token(slot):
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        is_kept = is_used or self.fleet.site.tracks[slot.track].kind is TrackKind.LIFT
+        if is_kept and slot not in self.slots:
             return Reason.TOKEN_NOT_GRANTABLE_YET
         return self.fleet.passing_verdict(key, requester, now_us)
 

@@ -1,7 +1,16 @@
 """A carriage before, in and after a turn: what it asks for, orders and tells (design, section 5)."""
 
-from onboard.contract.codes import DriveMode, KindCode, Reason, TokenKind
-from onboard.contract.messages import DriveOrder, DriveState, Progress, TokenGrant, TokenRequest
+from onboard.contract.codes import DriveMode, Grade, KindCode, LegAction, Reason, Side, TokenKind
+from onboard.contract.messages import (
+    DriveOrder,
+    DriveState,
+    Itinerary,
+    Leg,
+    Progress,
+    Stamp,
+    TokenGrant,
+    TokenRequest,
+)
 from onboard.core.authority import TokenBook, segment_token
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.negotiation import Negotiation
@@ -115,6 +124,26 @@ def test_who_waits_by_its_plan_keeps_nothing_of_the_way_that_comes_after() -> No
     one.go(INSIDE, waits=True)
     given = [e.message for e in one.advance(3) if isinstance(e, Send) and isinstance(e.message, TokenGrant)]
     assert sorted(m.token for m in given) == [Segment(1, 6).number, MOUTH.number]
+
+
+def test_a_slot_that_is_not_in_use_goes_to_who_comes_first_there_while_it_stands() -> None:
+    one = in_mouth()
+    get(one, INSIDE)
+    one.advance(0)
+    key, request = segment_token(MOUTH), TokenRequest(OTHER, TokenKind.SEGMENT, MOUTH.number, 1, 1, 0)
+    way = (
+        Leg(LegAction.STAND, 1, 9, 9, Side.NEAR, 1_000),
+        Leg(LegAction.TRAVEL, 1, 9, 5, Side.NEAR, 9_000),
+    )
+    one.fleet.mirror.on_itinerary(Itinerary(OTHER, 1, Grade.FIRM, Stamp(0, OTHER, 0), way), 0)
+    one.fleet.petitions.hear(key, request, 0)
+    assert one.may_grant(key, OTHER, 0) is Reason.TOKEN_NOT_GRANTABLE_YET, "it stands there"
+    one.sense(state(-PITCH_MM, DriveMode.MOVING, across=True), 2)
+    assert one.may_grant(key, OTHER, 2) is Reason.TOKEN_NOT_GRANTABLE_YET, "it drives"
+    one.sense(state(0, across=True, sequence=one.sequence), 3)
+    one.target = None
+    assert one.may_grant(key, OTHER, 3) is Reason.NONE
+    assert one.may_grant(segment_token(INSIDE), OTHER, 3) is Reason.TOKEN_NOT_GRANTABLE_YET
 
 
 def test_out_it_drives_into_the_mouth_first_and_then_turns() -> None:

@@ -284,8 +284,8 @@ class ParkingRobot:
         return Send(TaskReport(self.fleet.node_id, task, TaskPhase.FORFEITED, 0, why))
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
-        """All goes back to the stewards by itself, and is refused until then; a slot that was left goes on at once."""
-        return self.carriage.left.may_grant(key, requester, now_us)
+        """All goes back to the stewards by itself, and is refused until then; but for slots that are not in use."""
+        return self.carriage.may_grant(key, requester, now_us)
 
     def advance(self, now_us: int) -> list[Effect]:
         """Carry on with the step in hand."""

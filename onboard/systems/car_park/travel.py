@@ -23,12 +23,12 @@ from onboard.systems.car_park.axis import TrackAxis
 from onboard.systems.car_park.placing import Placing
 from onboard.systems.car_park.sill import SillProof
 from onboard.systems.car_park.stall import MOVES, PlaceWords, Stall
+from onboard.systems.car_park.way import line_to_refuge
 from onboard.ways.all_or_none import AllOrNone
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.left_behind import LeftBehind
 from onboard.ways.lifts import GATE_INDEX, MARK_TOLERANCE_MM, gate, platform
 from onboard.ways.mirror import WayFleet, slot_of
-from onboard.ways.refuges import refuges
 from onboard.ways.site import TrackKind
 
 #: A holder's view of the order that has differed from mine for this long will not be mended by asking again, us:
@@ -280,6 +280,12 @@ class Carriage:
             effects += self._order(permit, now_us)
         return effects + self._give_back(now_us)
 
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """What was left goes on at once, and what is not in use while it stands; all else goes back by itself."""
+        stands = self.sensed is not None and self.target is None
+        is_used = not stands or slot_of(key) in {*self.occupied(), *self._may_come_to()}
+        return self.left.may_grant(key, requester, now_us, is_used=is_used)
+
     def next_wake(self) -> int | None:
         """When the drive's order is to be repeated, or something is to be done about missing tokens."""
         asking_us = self._asks_at_us()
@@ -334,13 +340,7 @@ class Carriage:
         return min(behind.values()) + ORDER_PATIENCE_US if behind and not self.whole.slots else None
 
     def _way_to_refuge(self, ahead: list[int]) -> tuple[Segment, ...]:
-        places = refuges(self.fleet.site)
-        way: list[Segment] = []
-        for index in ahead:
-            way.append(self.axis.slot(index))
-            if way[-1] in places and len(way) > 1:
-                return tuple(way)
-        return (*way, *self.route_ahead())
+        return line_to_refuge(self.fleet.site, [self.axis.slot(index) for index in ahead], self.route_ahead)
 
     def _rest(self, now_us: int) -> list[Effect]:
         self.refresh_at_us = None

@@ -1,6 +1,6 @@
 """Where a programme's next legs lead: the slots up to the next refuge, for a way without an agreed order."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from onboard.contract.codes import LegAction
 from onboard.core.site import Segment
@@ -24,6 +24,17 @@ def way_to_refuge(site: WaySite, steps: Iterable[CarStep]) -> list[Segment]:
             if slot in places:
                 return way
     return way
+
+
+def line_to_refuge(
+    site: WaySite, line: Sequence[Segment], beyond: Callable[[], Sequence[Segment]]
+) -> tuple[Segment, ...]:
+    """Slots of a ``line`` from where a body is up to the next refuge, that included; without, all ``beyond`` too."""
+    places = refuges(site)
+    for number, slot in enumerate(line[1:], start=1):
+        if slot in places:
+            return tuple(line[: number + 1])
+    return (*line, *beyond())
 
 
 def _slots(site: WaySite, step: CarStep) -> list[Segment]:
