@@ -20,8 +20,8 @@ from bus_sim.systems.car_park.stage import ORIGIN_US
 from bus_sim.systems.car_park.window import two_way_hour, with_short_eve
 from bus_sim.virtual_time import VirtualTimeLoop
 
-#: 15:39:10 local time: a car comes in, others are asked for, robots share the street's alley.
-MOMENT_S = 15 * 3600 + 39 * 60 + 10
+#: 15:38:25 local time: one car comes in, another goes out, robots share the street's alley.
+MOMENT_S = 15 * 3600 + 38 * 60 + 25
 #: Of the picture.
 COLUMNS, LINES = 112, 30
 
