@@ -140,8 +140,9 @@ def test_a_slot_that_is_not_in_use_goes_to_who_comes_first_there_while_it_stands
     assert one.may_grant(key, OTHER, 0) is Reason.TOKEN_NOT_GRANTABLE_YET, "it stands there"
     one.sense(state(-PITCH_MM, DriveMode.MOVING, across=True), 2)
     assert one.may_grant(key, OTHER, 2) is Reason.TOKEN_NOT_GRANTABLE_YET, "it drives"
-    one.sense(state(0, across=True, sequence=one.sequence), 3)
     one.target = None
+    assert one.may_grant(key, OTHER, 2) is Reason.TOKEN_NOT_GRANTABLE_YET, "it drives by an order of a life before"
+    one.sense(state(0, across=True, sequence=one.sequence), 3)
     assert one.may_grant(key, OTHER, 3) is Reason.NONE
     assert one.may_grant(segment_token(INSIDE), OTHER, 3) is Reason.TOKEN_NOT_GRANTABLE_YET
 

@@ -282,7 +282,7 @@ class Carriage:
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """What was left goes on at once, and what is not in use while it stands; all else goes back by itself."""
-        stands = self.sensed is not None and self.target is None
+        stands = self.target is None and self.sensed is not None and self.sensed.mode is DriveMode.STANDING
         is_used = not stands or slot_of(key) in {*self.occupied(), *self._may_come_to()}
         return self.left.may_grant(key, requester, now_us, is_used=is_used)
 
