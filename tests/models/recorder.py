@@ -53,13 +53,15 @@ class Recorder:
     #: Which machine, by number, took each step of ``tokens``, and how often each token's machines crashed.
     doers: dict[TokenKey, list[int]] = field(default_factory=dict)
     crashes: Counter[TokenKey] = field(default_factory=Counter)
-    nodes: dict[object, list[int]] = field(default_factory=dict)
+    nodes: dict[TokenKey, list[int]] = field(default_factory=dict)
+    #: Apart from those: call 260 of node 1 and station 260 are the same pair of numbers.
+    bidders: dict[Call, list[int]] = field(default_factory=dict)
     costs: dict[Call, dict[int, int]] = field(default_factory=dict)
     heard: dict[Call, set[tuple[int | str, int]]] = field(default_factory=dict)
 
-    def index(self, thing: object, node: int) -> int:
+    def index(self, thing: TokenKey | Call, node: int) -> int:
         """The number of a machine in one token's or call's steps."""
-        known = self.nodes.setdefault(thing, [])
+        known = self.nodes.setdefault(thing, []) if isinstance(thing, TokenKey) else self.bidders.setdefault(thing, [])
         if node not in known:
             known.append(node)
         return known.index(node)

@@ -27,7 +27,7 @@ def refused_calls(folder: Path, recorder: Recorder) -> dict[Call, str]:
     """Of all calls for whole tasks."""
     refused = {}
     for call, steps in recorder.calls.items():
-        nodes, costs = recorder.nodes.get(call, [0]), recorder.costs.get(call, {})
+        nodes, costs = recorder.bidders.get(call, [0]), recorder.costs.get(call, {})
         # Lower cost, then lower node-ID; who did not bid comes last.
         order = sorted(range(len(nodes)), key=lambda i: (i not in costs, costs.get(i, 0), nodes[i]))
         begin = "; ".join(["begin()", *(f"rank[{i}] = {place}" for place, i in enumerate(order))])
