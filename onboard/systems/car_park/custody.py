@@ -37,7 +37,7 @@ def car_of(grant: TokenGrant) -> Reference:
 def state(fleet: WayFleet, car: Reference, station: int, wheelbase_mm: int) -> list[Effect]:
     """Journal and say where a car in my custody is; what somebody else holds is its custodian's to say: nothing.
 
-    Nor is one said of whose right no version is known: its compartment has it by its name alone, after a lost journal.
+    Nothing either of a car of whose right no version is known: after a lost journal its bay has it by name alone.
     """
     key = car_token(*car)
     if not fleet.tokens.holds(key) or key not in fleet.tokens.seen:
