@@ -179,6 +179,9 @@ class Mirror:
         """What of the site's things is no more, for the journal."""
         return []
 
+    def listen_anew(self, now_us: int) -> None:
+        """I have slept, or my clock has jumped: what lasts too long is counted from ``now_us`` on."""
+
     def retime(self, now_us: int) -> None:
         """My clock was set anew: read the times of all plans again, as the nearest to ``now_us`` that they can be."""
 

@@ -100,6 +100,7 @@ class WayMirror(CarMirror):
         # Its body is still somewhere: the reservation stays until its first new itinerary replaces it.
         self.plans.pop(node, None)
         self.replaced.pop(node, None)
+        self.standing.forget(node)
         super()._forget_plan(node)
 
     def on_progress(self, progress: Progress) -> None:
@@ -119,6 +120,11 @@ class WayMirror(CarMirror):
         for progress in self.progress.values():
             self.order.on_progress(progress)
         self.obstacles.retime(now_us)
+        self.listen_anew(now_us)
+
+    def listen_anew(self, now_us: int) -> None:
+        """Nobody has stood for any time that I know of."""
+        self.standing.begin_anew(now_us)
 
     # --- who is in the way -------------------------------------------------------------------------------------
 

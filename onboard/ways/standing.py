@@ -85,6 +85,16 @@ class Standing:
         if speaks and message.sender in self._seen:
             self._seen[message.sender].spoke_us = now_us
 
+    def begin_anew(self, now_us: int) -> None:
+        """What was seen was seen in another time, or nobody looked since: all that still may move has just moved."""
+        for node, seen in self._seen.items():
+            if not seen.stands:
+                self._seen[node] = _Seen(seen.place, now_us, now_us)
+
+    def forget(self, node: int) -> None:
+        """A machine begins a new life: that it stood in the one before says nothing of this one."""
+        self._seen.pop(node, None)
+
     def stands(self, node: int, now_us: int) -> bool:
         """Whether a machine has stood for too long where its plan does not leave it; motion or a person ends that."""
         seen = self._seen.get(node)

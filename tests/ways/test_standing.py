@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
-from onboard.contract.codes import Grade, LegAction, Reason, Side
-from onboard.contract.messages import Itinerary, Leg, Progress, Stamp, Waiting
+from onboard.contract.codes import Grade, KindCode, LegAction, MachineState, Reason, Side
+from onboard.contract.messages import Heartbeat, Itinerary, Leg, Progress, Stamp, Waiting
 from onboard.core.mirror import Mirror
+from onboard.ways.mirror import WayMirror
 from onboard.ways.standing import STANDS_AFTER_US, WAITS_AFTER_US, Standing
 from tests.sites import one_floor
 
@@ -65,3 +66,25 @@ def test_a_machine_that_has_stood_idle_for_long_has_all_the_time_for_a_new_plan(
 
 def test_a_machine_at_the_end_of_its_plan_may_stand_there_for_ever() -> None:
     assert not seen(place=7).stands(ROBOT, 10 * WAITS_AFTER_US)
+
+
+def test_time_that_nobody_saw_pass_is_not_time_that_somebody_stood() -> None:
+    standing, day_us = seen(), 86_400_000_000
+    standing.begin_anew(day_us)
+    assert not standing.stands(ROBOT, day_us), "my clock has jumped, or I have slept"
+    assert standing.stands(ROBOT, day_us + STANDS_AFTER_US), "but from now on it counts"
+    standing.begin_anew(2 * day_us)
+    assert standing.stands(ROBOT, 2 * day_us), "what stood before that stands until it moves"
+
+
+def test_who_is_started_again_has_not_stood() -> None:
+    mirror = WayMirror(one_floor(), ME)
+    beat = Heartbeat(ROBOT, 0, 0, 0, 1, KindCode.ROBOT, MachineState.IDLE, 0)
+    mirror.on_heartbeat(beat, 0)
+    mirror.hear(Progress(ROBOT, 1, 0, 1, 3, 0, 0), 0)
+    mirror.on_itinerary(goes(), 0)
+    late_us = RUN_MS * 1000 + STANDS_AFTER_US
+    assert mirror.stands(ROBOT, late_us)
+    mirror.on_heartbeat(replace(beat, boot=2, state=MachineState.STARTING), late_us)
+    mirror.hear(Progress(ROBOT, 0, 0, 1, 3, 0, 0), late_us)
+    assert not mirror.stands(ROBOT, late_us), "it would never be given anything to do again"

@@ -141,6 +141,8 @@ class Initiator:
     #: Every node's newest bid, and the nodes whose bids for this attempt do not count.
     bids: dict[int, int] = field(default_factory=dict)
     left_out: frozenset[int] = frozenset()
+    #: Whose bids did not count in an attempt before: the next one leaves them out, or those whom they beat stay silent.
+    of_no_account: set[int] = field(default_factory=set)
     floor: int | None = None
     due_us: int | None = None
     awards_sent: int = 0
@@ -182,7 +184,8 @@ class Initiator:
         )
         self.floor = None if terms.floor is None else terms.floor(self.call, now_us)
         last = self.attempt >= self.timing.max_attempts
-        self.left_out = self.trust.left_out(terms.task, now_us, last_attempt=last) | self.left_out_above
+        trusted_not = self.trust.left_out(terms.task, now_us, last_attempt=last)
+        self.left_out = trusted_not | self.left_out_above | self.of_no_account
         before = [*left_out_words(self.node_id, self.call.call, self.left_out), *self.terms.detail]
         return [*(Send(message) for message in before), Send(self.call)]
 
@@ -195,6 +198,7 @@ class Initiator:
         no_account = bid.sender in self.left_out or self.is_obstacle(bid.sender) or self._is_below_floor(bid.cost)
         if no_account or not self.is_sound(self.terms.task, bid):
             self.counters.bids_of_no_account += 1
+            self.of_no_account.add(bid.sender)
             return []
         self.bids[bid.sender] = bid.cost
         self.choose()

@@ -97,6 +97,14 @@ class Negotiation:
         self._forget(now_us)
         return outcome
 
+    def call_off(self, task: Reference, reason: Reason, now_us: int) -> Outcome:
+        """Nobody is to do a ``task`` of mine any more: its open call is withdrawn, an award under way given up."""
+        outcome: Outcome = []
+        for initiator in self.initiators:
+            if initiator.terms.task == task:
+                outcome += initiator.withdraw(now_us)
+        return outcome + self.abandon(task, reason, now_us)
+
     def abandon(self, task: Reference, reason: Reason, now_us: int) -> Outcome:
         """Give up own awards for a ``task`` whose winner was not heard; see ``Initiator.abandon``."""
         outcome: Outcome = []

@@ -207,7 +207,7 @@ class BayCalls:
         """Nobody brings a car, or another than was thought: the task is over before it began."""
         job, self.job = self.job, None
         assert job is not None
-        outcome = self.fleet.negotiation.abandon(job.task, Reason.CANCELLED, now_us)
+        outcome = self.fleet.negotiation.call_off(job.task, Reason.CANCELLED, now_us)
         over = bay_task.void_award(self.fleet.node_id, job.task)
         return [*(item for item in outcome if not isinstance(item, EVENT_TYPES)), Send(over)]
 

@@ -9,7 +9,7 @@ import pytest
 
 from onboard.contract.codes import CallResult, Criterion, Grade, Reason, TaskPhase
 from onboard.contract.constants import NOBODY
-from onboard.contract.messages import Award, Bid, Itinerary, Reference, Stamp, TaskReport
+from onboard.contract.messages import Award, Bid, CallForProposals, Itinerary, LeftOut, Reference, Stamp, TaskReport
 from onboard.core.negotiation import CallKey, delay_us, initiator, participant
 from onboard.core.negotiation.bidding import SpeakingSlot, in_slot, slot_of
 from onboard.core.negotiation.negotiation import FORGET_US, MAX_CALLS
@@ -280,3 +280,27 @@ def test_slots_keep_machines_a_bus_latency_apart() -> None:
     assert in_slot(123_456, SpeakingSlot(0, 1, 0)) == 123_456
     with pytest.raises(ValueError, match="99"):
         slot_of(site, 99)
+
+
+def test_whose_bid_does_not_count_is_named_so_that_those_whom_it_beats_bid() -> None:
+    compartment, *robots = fleet({11: 1_000, 12: 5_000})
+    compartment.negotiation.is_obstacle = lambda node: node == 11
+    bus = Bus([compartment, *robots])
+    bus.call(terms())
+    bus.run(4)
+    assert bus.assigned() == [12], "it was silent, as by its own belief 11 does better"
+    assert [(word.call, word.node_a) for _, word in bus.wire if isinstance(word, LeftOut)] == [(2, 11)]
+
+
+@pytest.mark.parametrize("after_s", [0.5, 1.5], ids=["open", "awarded and not heard"])
+def test_a_task_that_nobody_is_to_do_any_more_is_called_for_no_more(after_s: float) -> None:
+    machines = fleet({11: 1_000} if after_s > 1 else {})
+    bus = Bus(machines)
+    bus.call(terms())
+    bus.run(0.5)
+    bus.lose = lambda message, receiver: True
+    bus.run(after_s - 0.5)
+    machines[0].carry_out(machines[0].negotiation.call_off(terms().task, Reason.CANCELLED, bus.now_us), bus.now_us)
+    calls = sum(isinstance(word, CallForProposals | Award) for _, word in bus.wire)
+    bus.run(30)
+    assert sum(isinstance(word, CallForProposals | Award) for _, word in bus.wire) == calls
