@@ -9,7 +9,7 @@ from typing import Final
 
 from bus_sim.faults.injection import AnyFault, Injection
 from onboard.contract.codes import Reason
-from onboard.contract.messages import Halted, Message
+from onboard.contract.messages import Halted, Heartbeat, Message
 
 #: Records that are cut off the end, each number of them a point.
 MOST_LOST = 50
@@ -50,14 +50,24 @@ def journal_faults(written: Mapping[str, int]) -> list[AnyFault]:
 
 
 class Held:
-    """Listens to the fleet bus for machines that hold because of their journals, and need a person."""
+    """Listens to the fleet bus for machines that hold because of their journals, and need a person.
+
+    A hold is over with the life that says it, and with the epoch: in the next of either the machine says it again, or
+    works. So a run is not over because a machine once halted whose disk was full, or whose rights were made anew.
+    """
 
     def __init__(self) -> None:
         #: Since when each is held, us, by node-ID.
         self.since_us: dict[int, int] = {}
+        self._lives: dict[int, tuple[int, int]] = {}
 
     def hear(self, message: Message, time_us: int) -> None:
         """To be told every message of the fleet bus."""
+        if isinstance(message, Heartbeat):
+            life = (message.boot, message.epoch)
+            if self._lives.get(message.sender) != life:
+                self._lives[message.sender] = life
+                self.since_us.pop(message.sender, None)
         if not isinstance(message, Halted) or message.sender != message.machine:
             # What others say of it is not believed.
             return

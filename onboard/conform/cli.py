@@ -3,7 +3,6 @@
 import argparse
 import asyncio
 import shutil
-import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ from onboard.contract.codes import CONTRACT_VERSION, KindCode
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError, BusSettings, add_site_arguments, bus_settings, open_bus, parse_with_bus
+from onboard.io.signals import ended_by
 from onboard.ports.bus import Bus
 from onboard.systems.contract import codecs_for
 from onboard.systems.registry import part
@@ -180,18 +180,33 @@ class Bench:
             await before
         if self.power is not None:
             switched = await asyncio.create_subprocess_exec(self.power, "on" if on else "off")
-            await switched.wait()
+            try:
+                await switched.wait()
+            finally:
+                if switched.returncode is None:
+                    switched.terminate()
+                    await switched.wait()
+
+    async def end(self) -> None:
+        """Nothing that it has begun goes on: what switches the node neither."""
+        if self.timer is not None:
+            self.timer.cancel()
+        if self.switching is not None:
+            self.switching.cancel()
+            await asyncio.wait({self.switching})
 
 
 async def _run(player: Player, settings: BusSettings, power: str | None) -> None:
     bus = await open_bus(settings)
     try:
         bench = Bench(player, bus, power)
-        for number in (signal.SIGINT, signal.SIGTERM):
-            bench.loop.add_signal_handler(number, bench.over.set)
         lost = bench.loop.create_task(bus.wait_lost())
         over = bench.loop.create_task(bench.over.wait())
-        await asyncio.wait((lost, over), return_when=asyncio.FIRST_COMPLETED)
+        try:
+            with ended_by(bench.loop, lambda _: bench.over.set()):
+                await asyncio.wait((lost, over), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            await bench.end()
         if lost.done():
             raise ConformError(f"the bus is gone: {lost.result()}; what was judged until then is lost")
         lost.cancel()

@@ -6,7 +6,8 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 
-_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_OTHERS = (signal.SIGTERM, signal.SIGHUP)
+_ENDING = (signal.SIGINT, *_OTHERS)
 
 
 @contextlib.contextmanager
@@ -29,16 +30,17 @@ def ended_by(loop: asyncio.AbstractEventLoop, end: Callable[[signal.Signals], No
 
 @contextlib.contextmanager
 def terminated_as_interrupted() -> Iterator[None]:
-    """SIGTERM raises ``KeyboardInterrupt`` as Ctrl-C does, so that files are closed and workers ended on the way out.
+    """SIGTERM and a closed terminal raise ``KeyboardInterrupt`` as Ctrl-C does: files are closed, and workers ended.
 
-    For programs without a loop. Does nothing outside the main thread, or where somebody takes the signal already.
+    For programs without a loop. Takes no signal that somebody takes or ignores already (nohup), and none outside the
+    main thread.
     """
-    free = signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-    if not free or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    here = threading.current_thread() is threading.main_thread()
+    taken = [number for number in _OTHERS if here and signal.getsignal(number) is signal.SIG_DFL]
+    for number in taken:
+        signal.signal(number, signal.default_int_handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        for number in taken:
+            signal.signal(number, signal.SIG_DFL)

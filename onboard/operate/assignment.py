@@ -76,6 +76,17 @@ class Statements:
         keys = [key for key, claim in sorted(self.seen.items()) if claim.node == node and key not in self.held]
         return [Segment(key.number >> 8, key.number & 0xFF) for key in keys if key.kind is TokenKind.SEGMENT]
 
+    def left_perhaps(self, node: int) -> tuple[list[TokenKey], list[Station]]:
+        """Cars aboard ``node`` by all that others know, and the places where it had the right to leave them.
+
+        It has that right from before it leaves a car until it has said where: its last word may be missing.
+        """
+        its = [key for key, claim in sorted(self.seen.items()) if claim.node == node and key not in self.held]
+        cars = [key for key in its if key in self.cars and self.cars[key].station == ANY_STATION]
+        places = {place.number: place for place in way_site(self.site).places}
+        stations = [places[key.number] for key in its if key.kind is TokenKind.STATION and key.number in places]
+        return (cars, stations) if cars else ([], [])
+
     def contradiction(self) -> tuple[TokenKey, list[int]] | None:
         """A token that two say to hold, or that one holds under a version older than another knows; with whom."""
         for key in sorted(self.held):

@@ -2,7 +2,7 @@
 
 import argparse
 import asyncio
-import signal
+import contextlib
 import sys
 import time
 from collections.abc import Awaitable, Callable, Sequence
@@ -16,6 +16,7 @@ from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError, BusSettings, add_site_arguments, bus_settings, open_bus, parse_with_bus
 from onboard.io.seal_lives import SealLivesError
 from onboard.io.sealed_bus import sealed_bus
+from onboard.io.signals import ended_by
 from onboard.operate.asking import Asker
 from onboard.operate.commands import CommandRequest, Maker, maker_of
 from onboard.operate.names import OperateError, tool_of
@@ -142,12 +143,12 @@ async def _run(args: argparse.Namespace, site: Site, settings: BusSettings, make
         bus = await sealed_bus(plain, site, keys, args.keys, codec.decode_part)
     station = OperatorStation(site, codec, bus, _tell)
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, station.interrupt)
     lost = loop.create_task(_watch(plain.wait_lost, station))
     try:
-        asker = Asker(station, _tell, is_agreed=args.yes, typed=getattr(args, "locked_off", ""))
-        return await station.operate(make, node, asker.agrees)
+        # A terminal that is closed in the midst of a regeneration breaks it off as Ctrl-C does: all would stand else.
+        with ended_by(loop, lambda _: station.interrupt()):
+            asker = Asker(station, _tell, is_agreed=args.yes, typed=getattr(args, "locked_off", ""))
+            return await station.operate(make, node, asker.agrees)
     finally:
         lost.cancel()
         await bus.close()
@@ -158,4 +159,6 @@ async def _watch(wait_lost: Callable[[], Awaitable[str]], station: OperatorStati
 
 
 def _tell(line: str) -> None:
-    print(line, flush=True)
+    # Of a terminal that is closed nobody reads; what was begun must still be ended on the bus.
+    with contextlib.suppress(OSError):
+        print(line, flush=True)

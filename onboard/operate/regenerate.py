@@ -251,6 +251,11 @@ class Regenerate(OperatorCommand):
             known = [str(one) for one in self._said.slots_given_to(lost)]
             instead = f"; by the words of the others it may be in {', '.join(known)}" if known else ""
             return f"--body {slot}: {self.park.name(holder)} holds it, so {name} cannot be there: look again{instead}"
+        cars, stations = self._said.left_perhaps(lost)
+        for station in stations:
+            if station.segment not in self._who.body.slots:
+                left = f"{name} may have left car {_car(cars[0])} at {station} before its word was lost"
+                return f"--body: {left}: look there; push it to {station.segment}, then --body {station.segment}"
         return ""
 
     def _show(self) -> None:
@@ -259,6 +264,10 @@ class Regenerate(OperatorCommand):
             if kinds:
                 rights = ", ".join(f"{kinds.count(kind)} {kind.name.lower()}s" for kind in TokenKind if kind in kinds)
                 self.tell(f"{self.park.name(node)} gets {rights}")
+        cars, stations = self._said.left_perhaps(self._who.absent) if self._who.absent != NOBODY else ([], [])
+        for station in stations:
+            left = f"car {_car(cars[0])} was aboard {self.park.name(self._who.absent)} by the last word of it"
+            self.tell(f"{left}, and may stand at {station}: look there, and take it out before another is brought")
         if self._assignment.nobodys:
             self.tell(f"{len(self._assignment.nobodys)} rights stay nobody's")
 
@@ -385,3 +394,7 @@ def _newest(epochs: list[int]) -> int:
         if newest == 0 or is_newer(epoch, newest, 8):
             newest = epoch
     return newest
+
+
+def _car(key: TokenKey) -> str:
+    return f"{key.number >> 16}.{key.number & 0xFFFF}"

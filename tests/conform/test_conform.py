@@ -1,6 +1,10 @@
 """The kit of conformity: its sentences are the page's, our robot keeps to all, and what breaks a duty is named."""
 
+import os
 import re
+import select
+import signal
+import threading
 from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
@@ -20,6 +24,7 @@ from onboard.wire.codec import fleet_codec
 from tests.conform import foreign
 from tests.conform.bench import ALL, SITE, play
 from tests.project.rows import ROOT
+from tests.tools import DEADLINE_S
 
 PAGE = ROOT / "docs" / "protocol.md"
 BENCH = Path(__file__).parent / "bench.toml"
@@ -207,3 +212,24 @@ def test_the_player_takes_up_frames_and_times_only() -> None:
         player.wake(player.next_us())
     assert player.stage.now_us == 4_001_000 and player.stage.power == [False, True]
     assert totals(player.findings).startswith(f"{len(player.findings.by_name)} checks: 1 passed, 0 failed")
+
+
+def test_what_switches_the_node_does_not_outlive_the_play(tmp_path: Path) -> None:
+    """The switch takes its time, a supervisor ends the play meanwhile: no process is left behind."""
+    begun, switch = tmp_path / "begun", tmp_path / "switch"
+    os.mkfifo(begun)
+    switch.write_text(f"#!/bin/sh\necho $$ >{begun}\nexec sleep 300\n", encoding="utf-8")
+    switch.chmod(0o755)
+    switches: list[int] = []
+
+    def end() -> None:
+        switches.append(os.pidfd_open(int(begun.read_text(encoding="utf-8"))))
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    person = threading.Thread(target=end)
+    person.start()
+    words = ["--node", "11", "--kind", "robot", "--site", str(BENCH), "-i", "virtual", "-c", "ended"]
+    assert onboard(["conform", *words, "--power", str(switch)]) == 1
+    person.join()
+    assert select.select(switches, [], [], DEADLINE_S)[0], "it switches on"
+    os.close(switches[0])

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from bus_sim.campaign.journal_points import HELD_US, Held
 from bus_sim.campaign.points import SceneCounts, SceneOccasion, Single, count, points, reference
 from bus_sim.campaign.report import RunVerdict
 from bus_sim.campaign.runner import CampaignSettings, FaultPoint, run_point
@@ -14,6 +15,8 @@ from bus_sim.cli import main
 from bus_sim.faults.injection import AnyFault, Injection, parse_injection
 from bus_sim.faults.journals import HARMS
 from bus_sim.sites import find_site
+from onboard.contract.codes import KindCode, MachineState, Reason
+from onboard.contract.messages import Halted, Heartbeat
 from tests.thinned import is_long
 
 SITE = "level1"
@@ -117,3 +120,24 @@ def test_what_a_medium_loses_while_somebody_drives_in_leaves_nobody_waiting(site
     settings = CampaignSettings(site, "journal", 3_600.0, scene=SceneOccasion.OVERLAP)
     report = run_point(settings, FaultPoint(1, parse_injection(text))).report
     assert report.verdict is RunVerdict.SERVED, report.why()
+
+
+def test_a_hold_is_over_with_its_life_and_with_its_epoch() -> None:
+    """A robot whose disk was full for a while came back, and two minutes later the trial was over as told, unserved."""
+    held = Held()
+
+    def beat(boot: int, epoch: int = 0) -> Heartbeat:
+        return Heartbeat(11, 1, 1, 0, boot, KindCode.ROBOT, MachineState.OBSTACLE, epoch)
+
+    def halted(boot: int, reason: Reason = Reason.JOURNAL_LOST) -> Halted:
+        return Halted(11, 11, reason, 0, True, boot)
+
+    for number, word in enumerate([beat(1), halted(1), beat(1), halted(1)]):
+        held.hear(word, number)
+    assert held.is_over(HELD_US + 1), "since it was said first"
+    held.hear(beat(2), 10)
+    assert not held.is_over(HELD_US + 10), "another life"
+    held.hear(halted(2, Reason.JOURNAL_SHORT), 11)
+    assert held.is_over(HELD_US + 11), "that holds as well"
+    held.hear(beat(2, epoch=1), 12)
+    assert not held.is_over(HELD_US + 12), "its rights were made anew"

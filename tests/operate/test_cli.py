@@ -1,5 +1,7 @@
 """The command as a person meets it: mistakes in one line, and a bus with machines behind it."""
 
+import os
+import signal
 import threading
 from pathlib import Path
 
@@ -85,3 +87,23 @@ def test_stop_is_said_at_once_and_ends_when_all_hold(capsys: pytest.CaptureFixtu
         machines.join()
     out = capsys.readouterr().out
     assert "stop: said to all under node-ID 251" in out and "MR2 holds by it" in out
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_who_ends_the_tool_hears_what_still_holds(number: signal.Signals, capsys: pytest.CaptureFixture[str]) -> None:
+    """A terminal that is closed too: in the midst of a regeneration all would stand for a tool that is gone."""
+    before = signal.signal(number, signal.SIG_DFL)
+    with can.Bus(interface="virtual", channel="ended") as site:
+
+        def end() -> None:
+            if site.recv(20) is not None:
+                os.kill(os.getpid(), number)
+
+        person = threading.Thread(target=end)
+        person.start()
+        try:
+            assert onboard(["operate", "stop", "-i", "virtual", "-c", "ended", "--site", "site.toml"]) == 1
+        finally:
+            person.join()
+            signal.signal(number, before)
+    assert "no longer said: the stop holds for 30 s more" in capsys.readouterr().out

@@ -6,6 +6,7 @@ import pytest
 
 from onboard.contract.assignments import assignment_digest
 from onboard.contract.codes import CONTRACT_VERSION, MachineState, Reason, RegenerationPhase, TokenKind
+from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import (
     Blocked,
     CarAt,
@@ -191,6 +192,34 @@ def test_nobody_answers_for_five_minutes_and_it_is_broken_off() -> None:
     hand, machines = started()
     machines.turn(310)
     assert hand.order.status == 1 and "nobody has answered" in hand.lines
+
+
+def its_car(*, at: Segment) -> tuple[Message, ...]:
+    """MR1 had a car aboard, and the right to a place beside ``at``, by all that MR2 knows."""
+    place = next(place for place in way_site(SITE).places if place.segment == at)
+    car = Reference(1, 7)
+    return (
+        CarAt(MR2, car, ANY_STATION, 3, 2_700),
+        TokenSeen(MR2, TokenKind.CAR, car.origin << 16 | car.number, 3, MR1),
+        TokenSeen(MR2, TokenKind.STATION, place.number, 2, MR1),
+    )
+
+
+def test_a_robot_is_brought_back_where_it_may_have_left_its_car() -> None:
+    """It puts a car down, and loses that word: the place would be another's, and a car stands in it."""
+    hand, machines = started(*BODY, *its_car(at=LEFT))
+    machines.turn(5)
+    assert hand.order.status == 2 and not assigned(hand)
+    assert any("MR1 may have left car 1.7 at p(1,2)" in line and "push it to p(1,2)" in line for line in hand.lines)
+    hand, machines = started(*BODY, *its_car(at=HERE))
+    machines.turn(2)
+    assert hand.order.has_question
+
+
+def test_where_the_car_of_an_absent_machine_may_stand_is_told_before_it_is_asked() -> None:
+    hand, machines = started(*WORDS[1:], *its_car(at=LEFT), command=absent(), without=(MR1,))
+    machines.turn(2)
+    assert any("car 1.7 was aboard MR1" in line and "may stand at p(1,2)" in line for line in hand.lines)
 
 
 def test_a_grant_on_its_way_to_who_lives_becomes_that_machines() -> None:

@@ -7,7 +7,8 @@ from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import DeskText, Reason, RegenerationPhase, TaskPhase
-from onboard.contract.messages import DeskOrder, Halted, Heartbeat, Regeneration, TaskReport
+from onboard.contract.constants import OUTSIDE
+from onboard.contract.messages import CarAt, DeskOrder, Halted, Heartbeat, Regeneration, TaskReport
 from onboard.core.site import Site
 from tests.sites import at_arrival, at_the_key
 from tests.system.scene import Scene, play, stays
@@ -65,6 +66,19 @@ def test_rights_are_made_anew_in_the_middle_of_work(name: str, at_s: int, site: 
     scene.assert_sound()
     street = scene.simulation.plant.street.summary()
     assert (street.parked, street.served, street.queueing, street.asking) == (4, 3, 0, 0)
+
+
+@pytest.mark.parametrize(("at_s", "body", "car"), some([(88, "p(1;5)", 1), (171, "p(1;5)", 2), (255, "p(1;6)", 3)], 1))
+def test_a_car_that_was_left_before_its_word_was_lost_stands_where_it_is(at_s: int, body: str, car: int) -> None:
+    """Its robot was believed to have it aboard for ever, and gave the place to the next: two cars in one place."""
+    name = "MR2" if car == 2 else "MR1"
+    lost = f"crash:target={name},at_s={at_s},restart_s=3,journal=rolled_back,entries=8"
+    scene = played(lost, f"operate:do=regenerate,at_s={at_s + 20},target={name},body={body}")
+    assert scene.simulation.plant.oracle.finish() == []
+    said = [one.station for _, one in scene.all(CarAt) if one.car.number == car]
+    assert said[-1] == OUTSIDE, "its driver has it"
+    street = scene.simulation.plant.street.summary()
+    assert (street.queueing, street.asking) == (0, 0)
 
 
 def test_a_dead_robot_is_towed_regenerated_and_its_slot_is_nobodys() -> None:

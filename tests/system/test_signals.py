@@ -173,12 +173,16 @@ def test_ctrl_c_in_the_warm_up_tells_what_the_warm_up_came_to(tmp_path: Path) ->
     assert "now 2019-07-24" not in figures, "the hour itself did not begin"
 
 
-def test_a_look_at_a_log_ends_by_its_own_way_out(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_look_at_a_log_ends_by_its_own_way_out(number: signal.Signals, monkeypatch: pytest.MonkeyPatch) -> None:
     closed = []
+    if signal.getsignal(number) is signal.SIG_IGN:
+        # Under nohup.
+        signal.signal(number, signal.SIG_DFL)
 
     def slow_command(_: object) -> int:
         try:
-            os.kill(os.getpid(), signal.SIGTERM)
+            os.kill(os.getpid(), number)
             signal.pause()
         finally:
             closed.append("file")
@@ -190,4 +194,4 @@ def test_a_look_at_a_log_ends_by_its_own_way_out(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(parser, "parse_known_args", lambda _: (argparse.Namespace(run=slow_command), []))
     assert onboard(["trace", "dump"]) == 130
     assert closed == ["file"]
-    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert signal.getsignal(number) is signal.SIG_DFL

@@ -2,9 +2,9 @@
 
 import pytest
 
-from onboard.contract.codes import CallResult, KindCode, MachineState, Reason, TaskPhase
+from onboard.contract.codes import CallResult, KindCode, MachineState, Reason, RegenerationPhase, TaskPhase
 from onboard.contract.constants import ANY_STATION, OUTSIDE
-from onboard.contract.messages import BusTime, Halted, Heartbeat, Message, Reference
+from onboard.contract.messages import BusTime, Halted, Heartbeat, Message, Reference, Regeneration
 from tests.sites import one_floor
 from tests.trace.checking import (
     MR1,
@@ -154,6 +154,13 @@ CARS: dict[str, tuple[list[Message], str]] = {
 @pytest.mark.parametrize(("messages", "rule"), CARS.values(), ids=CARS.keys())
 def test_cars_are_conserved(messages: list[Message], rule: str) -> None:
     assert Tape(one_alley(), started=False).say(1, *messages).broken() == {rule: 1}
+
+
+def test_who_remembers_a_lost_machines_car_does_not_say_to_have_it() -> None:
+    """While rights are made anew all say where they remember it: not a car that goes from shuttle to shuttle."""
+    freeze = Regeneration(251, RegenerationPhase.FREEZE, 1, MR1, 0, 0, 0)
+    tape = Tape(one_alley(), started=False).say(1, car_at(MR1, ANY_STATION, 3), freeze)
+    assert tape.say(1.1, car_at(MR2, ANY_STATION, 3), car_at(1, ANY_STATION, 3)).broken() == {}
 
 
 def test_a_car_that_never_came_in_is_found_where_the_log_has_the_beginning() -> None:

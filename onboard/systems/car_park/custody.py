@@ -14,7 +14,8 @@ from onboard.contract.constants import ANY_STATION, OUTSIDE
 from onboard.contract.messages import CarAt, Reference, TokenGrant
 from onboard.core.authority import TokenKey
 from onboard.core.effects import Effect, Send
-from onboard.core.site import Station
+from onboard.core.site import Segment, Station
+from onboard.core.token_keys import station_token
 from onboard.systems.car_park.bay_memory import car_record
 from onboard.ways.mirror import WayFleet, WayMirror
 from onboard.ways.site import WaySite
@@ -107,6 +108,15 @@ def before_taking(fleet: WayFleet, grant: TokenGrant) -> list[Effect] | None:
     return [car_record(statement)]
 
 
+def put_down(fleet: WayFleet, car: Reference, station: Station, now_us: int) -> list[Effect]:
+    """A car of mine stands in a station whose right is mine: say so, and pass both on to who keeps the station."""
+    record = fleet.mirror.cars[car]
+    effects = state(fleet, car, station.number, record.wheelbase_mm)
+    for key in (car_token(*car), station_token(station)):
+        effects += fleet.tokens.give(key, keeper(fleet.site, station), now_us)
+    return effects
+
+
 def give_back(fleet: WayFleet, needed: Container[TokenKey], now_us: int) -> list[Effect]:
     """Return rights to stations and cars that no work of mine needs: their grants came after the work was dropped.
 
@@ -123,6 +133,29 @@ def give_back(fleet: WayFleet, needed: Container[TokenKey], now_us: int) -> list
             effects += state(fleet, car, station.number, record.wheelbase_mm)
             effects += fleet.tokens.give(key, keeper(fleet.site, station), now_us)
     return effects
+
+
+def take_over_aboard(fleet: WayFleet) -> list[Effect]:
+    """Cars that came to a robot as its rights were made anew: they were aboard it by the last that anybody heard.
+
+    Journalled and said under the version of now, so that another life knows of them as well.
+    """
+    taken, effects = fleet.mirror.taken_over, list[Effect]()
+    for car in [car for car, word in taken.items() if word.station == ANY_STATION]:
+        effects += state(fleet, car, ANY_STATION, taken.pop(car).wheelbase_mm)
+    return effects
+
+
+def said_aboard(fleet: WayFleet) -> list[Reference]:
+    """Cars that this machine has said to be aboard it, and that are in its custody."""
+    mine = (car for car, record in fleet.mirror.cars.items() if record.station == ANY_STATION)
+    return [car for car in mine if is_mine(fleet, car)]
+
+
+def may_stand_in(fleet: WayFleet, at: Segment) -> list[Station]:
+    """Stations beside a slot where a car may be that is said to be aboard and is not: those whose right is mine."""
+    held = (Station.from_number(key.number) for key in fleet.tokens.mine() if key.kind is TokenKind.STATION)
+    return [station for station in held if station.segment == at and not others_in(fleet.mirror, station)]
 
 
 def is_mine(fleet: WayFleet, car: Reference) -> bool:

@@ -12,10 +12,11 @@ from enum import Enum, auto
 from typing import Final, NamedTuple
 
 from onboard.contract.codes import DriveMode, LegAction, ShuttleMode
-from onboard.contract.messages import Stamp
+from onboard.contract.messages import Reference, ShuttleState, Stamp
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Segment
+from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.program import CarStep, ends_at, standing_itinerary
@@ -118,7 +119,7 @@ class Starting:
         In the mouth of a spur, turned towards it, it turns back first: no plan begins or ends there.
         """
         carriage, told = self.body.carriage, self.fleet.slots_told
-        effects: list[Effect] = []
+        effects = custody.take_over_aboard(self.fleet)
         if told:
             # A journal that is lost knew the floor: who made the rights anew has seen where the carrier stands.
             self.fleet.slots_told, carriage.track, self.recovery.is_restart = (), told[0].track, True
@@ -134,7 +135,7 @@ class Starting:
         rests = carriage.sensed.mode in (DriveMode.STANDING, DriveMode.FAULT)
         if carriage.goal is None and rests and shuttle is not None and shuttle.mode in AT_REST:
             if shuttle.mode is not ShuttleMode.HOME:
-                return effects + self._hold(self.recovery.contradiction(None, shuttle))
+                return effects + self._hold(self._contradiction(None, shuttle))
             if not self.generation.is_held:
                 # It asks first for what it is in: it may have been pushed there while it was off.
                 carriage.go(out or carriage.nearest)
@@ -159,7 +160,7 @@ class Starting:
         shuttle = self.body.shuttle.sensed
         if shuttle is None or shuttle.mode not in AT_REST:
             return []
-        why = self.recovery.contradiction(here, shuttle)
+        why = self._contradiction(here, shuttle)
         if why:
             return self._hold(why)
         self._enter(StartEvent.FIRST_PLACE)
@@ -182,7 +183,7 @@ class Starting:
         shuttle = self.body.shuttle.sensed
         if shuttle is None or shuttle.mode not in AT_REST:
             return effects
-        why = self.recovery.contradiction(self.place, shuttle)
+        why = self._contradiction(self.place, shuttle)
         return effects + (self._hold(why) if why else self._take_part(now_us))
 
     def _hold(self, why: str) -> list[Effect]:
@@ -197,15 +198,47 @@ class Starting:
         if shuttle is None or shuttle.mode not in AT_REST:
             return []
         place = self.body.carriage.standing_at
-        if self.recovery.contradiction(place, shuttle):
+        if self._contradiction(place, shuttle):
             return []
         self._enter(StartEvent.AGREEMENT)
         return [Report("sensors and journal agree again"), *self._find_place(now_us)]
 
+    def _contradiction(self, place: Segment | None, shuttle: ShuttleState) -> str:
+        """The same of what the journal has in hand, and of cars that came with rights made anew."""
+        why = self.recovery.contradiction(place, shuttle)
+        if why or place is None or shuttle.load_kg:
+            return why
+        missing = self._missing()
+        if not missing or (len(missing) == 1 and len(custody.may_stand_in(self.fleet, place)) == 1):
+            return ""
+        names = ", ".join(f"{car.origin}.{car.number}" for car in missing)
+        return f"no car is aboard, {names} was there by the last word of it, and where it was left no right tells"
+
+    def _missing(self) -> list[Reference]:
+        """Cars that are said to be aboard, and that nothing in hand is about: rights made anew tell no handling."""
+        in_hand = {work.car for work in self.recovery.works}
+        return [car for car in custody.said_aboard(self.fleet) if car not in in_hand]
+
+    def _put_down(self, place: Segment, now_us: int) -> list[Effect]:
+        """A car that is said to be aboard and is not was left before the journal was lost: where it had the right to.
+
+        A robot leaves a car only in a station whose right it holds, and has that until it has said where the car is.
+        """
+        shuttle = self.body.shuttle.sensed
+        if shuttle is None or shuttle.load_kg:
+            return []
+        effects: list[Effect] = []
+        for car in self._missing():
+            (station,) = custody.may_stand_in(self.fleet, place)
+            effects.append(Report(f"car {car.origin}.{car.number} was left at {station} before its word was lost"))
+            effects += custody.put_down(self.fleet, car, station, now_us)
+        return effects
+
     def _take_part(self, now_us: int) -> list[Effect]:
         assert self.place is not None
         self._enter(StartEvent.PLAN)
-        return self._go_on(self.place, self._in_hand(self.place, now_us), now_us)
+        placed = self._put_down(self.place, now_us)
+        return placed + self._go_on(self.place, self._in_hand(self.place, now_us), now_us)
 
     def _go_on(self, place: Segment, in_hand: tuple[CarStep, ...], now_us: int) -> list[Effect]:
         """Go on from ``place`` with what the journal says is mine, by a way planned anew (rows P14, P20)."""
