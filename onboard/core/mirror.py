@@ -179,7 +179,7 @@ class Mirror:
         """What of the site's things is no more, for the journal."""
         return []
 
-    def listen_anew(self, now_us: int) -> None:
+    def slept(self, now_us: int) -> None:
         """I have slept, or my clock has jumped: what lasts too long is counted from ``now_us`` on."""
 
     def retime(self, now_us: int) -> None:

@@ -63,6 +63,7 @@ class Presence:
         self.active_us = now_us
         if slept:
             self.listen_anew(now_us)
+            self.mirror.slept(now_us)
         return slept
 
     def slept(self, now_us: int) -> bool:
@@ -194,7 +195,6 @@ class Presence:
         self._listening_since_us = now_us
         for peer in self.mirror.peers.values():
             peer.heard_at_us = now_us
-        self.mirror.listen_anew(now_us)
 
     def _judge(self, machine: Machine, now_us: int) -> None:
         reason = self._why(machine, now_us)

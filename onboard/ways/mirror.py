@@ -120,9 +120,9 @@ class WayMirror(CarMirror):
         for progress in self.progress.values():
             self.order.on_progress(progress)
         self.obstacles.retime(now_us)
-        self.listen_anew(now_us)
+        self.slept(now_us)
 
-    def listen_anew(self, now_us: int) -> None:
+    def slept(self, now_us: int) -> None:
         """Nobody has stood for any time that I know of."""
         self.standing.begin_anew(now_us)
 
