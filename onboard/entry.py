@@ -39,9 +39,9 @@ def spare_openssl() -> None:
     for name in absent:
         sys.modules[name] = None  # type: ignore[assignment]  # how an import is told that there is no such module
     try:
-        import asyncio  # noqa: PLC0415, F401  # to be loaded is all, here and below
-        import hashlib  # noqa: PLC0415, F401
-        import hmac  # noqa: PLC0415, F401
+        import asyncio  # noqa: PLC0415, F401  # to be loaded is all
+        import hashlib  # noqa: PLC0415, F401  # as above
+        import hmac  # noqa: PLC0415, F401  # as above
     finally:
         for name in absent:
             del sys.modules[name]
