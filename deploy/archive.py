@@ -70,7 +70,8 @@ def _compiled(sources: list[tuple[str, bytes]]) -> list[bytes]:
 
     What is marshalled names an object twice where somebody else holds it too: in this process that would be chance.
     """
-    command = [sys.executable, "-S", "-c", _COMPILE]
+    # Lines are enough to find a mistake by: columns are a fifth of the archive.
+    command = [sys.executable, "-S", "-X", "no_debug_ranges", "-c", _COMPILE]
     asked = marshal.dumps((sources, tuple(f"{name}/" for name in PACKAGES)))
     done = subprocess.run(command, input=asked, capture_output=True, check=True, env={"PYTHONHASHSEED": "0"})
     found: list[bytes] = marshal.loads(done.stdout)

@@ -5,6 +5,8 @@ Imports nothing that an interpreter has not loaded by itself, so that there is h
 
 import sys
 
+#: Hash functions of the interpreter's own; without them ``hashlib`` has those of OpenSSL only.
+_OWN_HASHES = frozenset({"_sha2", "_sha256"})
 #: Exit status of a program that a person ended: 128 and the number of SIGINT, as shells have it.
 INTERRUPTED = 130
 
@@ -23,3 +25,23 @@ class Interruptible:
         if kind is KeyboardInterrupt:
             print(f"{self._program}: interrupted", file=sys.stderr)
             raise SystemExit(INTERRUPTED) from None
+
+
+def spare_openssl() -> None:
+    """Load asyncio and ``hashlib`` without OpenSSL: 1.7 MB that a controller without a broker never uses.
+
+    Both do without where it cannot be imported, as the library reference says of ``ssl``; whoever imports it later has
+    it, but asyncio's own TLS. Nothing happens where they are loaded, or the interpreter has no hash functions.
+    """
+    absent = ["ssl"] if sys.modules.keys().isdisjoint(("asyncio", "ssl")) else []
+    if "hashlib" not in sys.modules and not _OWN_HASHES.isdisjoint(sys.builtin_module_names):
+        absent.append("_hashlib")
+    for name in absent:
+        sys.modules[name] = None  # type: ignore[assignment]  # how an import is told that there is no such module
+    try:
+        import asyncio  # noqa: PLC0415, F401  # to be loaded is all
+        import hashlib  # noqa: PLC0415, F401  # as above
+        import hmac  # noqa: PLC0415, F401  # as above
+    finally:
+        for name in absent:
+            del sys.modules[name]

@@ -44,16 +44,25 @@ class _Copier:
 
     by_us: int
     known: dict[int, Any] = field(default_factory=dict)
+    #: Classes whose things a copy has in common with the original.
+    shared: set[type] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.shared = _SHARED_WHILE_TIME_PASSES if self.by_us else _SHARED_AT_ONE_TIME
 
     def copy(self, thing: Any) -> Any:
         kind = type(thing)
+        if kind in self.shared:
+            return thing
+        if kind is int:
+            return max(thing - self.by_us, NOW_US - OLDEST_US) if _LEAST_US < thing < _MOST_US else thing
         how = _HOW_COPIED.get(kind, _UNKNOWN)
         if how is _UNKNOWN:
             how = _HOW_COPIED[kind] = None if _is_shared(kind) else _COPIES.get(kind, _Copier._instance)
         if how is None:
+            _SHARED_WHILE_TIME_PASSES.add(kind)
+            _SHARED_AT_ONE_TIME.add(kind)
             return thing
-        if kind is int:
-            return max(thing - self.by_us, NOW_US - OLDEST_US) if self.by_us and _is_time(thing) else thing
         found = self.known.get(id(thing))
         if found is None:
             # The original is kept as long as its number stands for it.
@@ -64,8 +73,10 @@ class _Copier:
         return thing
 
     def _tuple(self, thing: Any) -> Any:
-        copy, kind = self.copy, type(thing)
-        made = [copy(one) for one in thing]
+        copy, kind, shared = self.copy, type(thing), self.shared
+        if shared.issuperset(map(type, thing)):
+            return thing
+        made = [one if type(one) in shared else copy(one) for one in thing]
         for one, other in zip(made, thing, strict=True):
             if one is not other:
                 return tuple(made) if kind is tuple else tuple.__new__(kind, made)
@@ -74,16 +85,17 @@ class _Copier:
     def _list(self, thing: Any) -> Any:
         made: list[Any] = []
         self.known[id(thing)] = made
-        copy = self.copy
-        made.extend([copy(one) for one in thing])
+        copy, shared = self.copy, self.shared
+        made.extend([one if type(one) in shared else copy(one) for one in thing])
         return made
 
     def _dict(self, thing: Any) -> Any:
         made = type(thing)()
         self.known[id(thing)] = made
-        copy = self.copy
+        copy, shared = self.copy, self.shared
         for key, value in thing.items():
-            made[copy(key)] = copy(value)
+            own = key if type(key) in shared else copy(key)
+            made[own] = value if type(value) in shared else copy(value)
         return made
 
     def _set(self, thing: Any) -> Any:
@@ -108,22 +120,27 @@ class _Copier:
         return partial(self.copy(thing.func), *[self.copy(one) for one in thing.args], **keywords)
 
     def _instance(self, thing: Any) -> Any:
-        kind, copy = type(thing), self.copy
+        kind, copy, shared = type(thing), self.copy, self.shared
         if issubclass(kind, tuple):
             return self._tuple(thing)
         made = object.__new__(kind)
         self.known[id(thing)] = made
         for name in _slots(kind):
-            if hasattr(thing, name):
-                object.__setattr__(made, name, copy(getattr(thing, name)))
+            value = getattr(thing, name, _ABSENT)
+            if value is not _ABSENT:
+                object.__setattr__(made, name, value if type(value) in shared else copy(value))
         if hasattr(thing, "__dict__"):
             new = made.__dict__
             for name, value in thing.__dict__.items():
-                new[name] = copy(value)
+                new[name] = value if type(value) in shared else copy(value)
         return made
 
 
 _UNKNOWN = _Copier._same
+_ABSENT = object()
+#: Filled as classes are met. A number may be a time, which becomes older.
+_SHARED_WHILE_TIME_PASSES: set[type] = set()
+_SHARED_AT_ONE_TIME: set[type] = {int}
 #: Classes of this project are copied; all else that is not below has no state of a machine.
 _COPIED = ("onboard.", "tests.")
 _COPIES: dict[type, Callable[[_Copier, Any], Any]] = {
@@ -178,6 +195,8 @@ def _how_compared(kind: type) -> str:
 
 
 _HOW_COMPARED: dict[type, str] = {}
+#: Filled as classes are met.
+_AS_THEY_ARE: set[type] = set()
 
 
 @dataclass
@@ -188,28 +207,37 @@ class _Essence:
 
     def of(self, thing: Any) -> Any:
         kind = type(thing)
+        if kind in _AS_THEY_ARE:
+            return thing
         how = _HOW_COMPARED.get(kind)
         if how is None:
             how = _HOW_COMPARED[kind] = _how_compared(kind)
         if how == "value":
+            _AS_THEY_ARE.add(kind)
             return thing
         if how == "int":
             # All that is due within a while is due when it has passed.
-            return (_WHILES, -(-(thing - NOW_US) // WHILE_US)) if _is_time(thing) else thing
-        of = self.of
+            return (_WHILES, -(-(thing - NOW_US) // WHILE_US)) if _LEAST_US < thing < _MOST_US else thing
+        of, plain = self.of, _AS_THEY_ARE
         if how == "row":
-            return tuple([of(one) for one in thing])
+            return tuple([one if type(one) in plain else of(one) for one in thing])
         if how == "nothing" or id(thing) in self.met:
             return None
         self.met.add(id(thing))
-        if how == "list":
-            return tuple([of(one) for one in thing])
+        if how == "instance":
+            return self._instance(thing)
         if how == "dict":
-            return frozenset([(of(key), of(value)) for key, value in thing.items()])
-        if how == "set":
-            return frozenset([of(one) for one in thing])
-        left_out, slots = self.left_out, _slots(kind)
+            return frozenset([(of(key), value if type(value) in plain else of(value)) for key, value in thing.items()])
+        made = [one if type(one) in plain else of(one) for one in thing]
+        return frozenset(made) if how == "set" else tuple(made)
+
+    def _instance(self, thing: Any) -> Any:
+        of, plain, left_out, slots = self.of, _AS_THEY_ARE, self.left_out, _slots(type(thing))
         values = [(name, of(getattr(thing, name))) for name in slots if name not in left_out] if slots else []
         if hasattr(thing, "__dict__"):
-            values += [(name, of(value)) for name, value in thing.__dict__.items() if name not in left_out]
+            values += [
+                (name, value if type(value) in plain else of(value))
+                for name, value in thing.__dict__.items()
+                if name not in left_out
+            ]
         return tuple(values)

@@ -17,6 +17,7 @@ from tests.models.engine import Engine, Found, Limits, Part
 from tests.models.gate import FIRST, LIFT, GatePart
 from tests.models.late import LatePart
 from tests.models.moving import engine_of
+from tests.thinned import is_long
 
 #: The compartment and one robot: all that two robots add is who of them wins.
 PAIR = (BAY, CHEAP)
@@ -37,14 +38,19 @@ PLANTED = {
 BUGS = [(part, bug) for part, bugs in PLANTED.items() for bug in bugs]
 
 
+def _of(count: int) -> int:
+    """Half of them, or all where all is tried."""
+    return count if is_long() else count // 2
+
+
 @pytest.mark.parametrize(
     ("part", "limits", "at_least"),
     [
         ("award", Limits(crashes=0), 30_000),
-        ("award", Limits(crashes=1, most_states=2_000), 2_500),
-        ("taking", Limits(crashes=1, most_states=2_000), 2_500),
-        ("leaving", Limits(crashes=1, most_states=2_000), 2_500),
-        ("boarding", Limits(crashes=0, most_states=1_500), 2_500),
+        ("award", Limits(crashes=1, most_states=_of(2_000)), _of(2_500)),
+        ("taking", Limits(crashes=1, most_states=_of(2_000)), _of(2_500)),
+        ("leaving", Limits(crashes=1, most_states=_of(2_000)), _of(2_500)),
+        ("boarding", Limits(crashes=0, most_states=_of(1_500)), _of(2_500)),
         ("riding", Limits(crashes=1, most_states=1_000), 2_000),
         ("two-riding", Limits(crashes=1, most_states=400), 500),
     ],

@@ -3,10 +3,12 @@
 A frame is cut into words of 1, 2, 4 or 8 bytes, and ``struct`` packs them; a signal that crosses a cut is taken in
 parts. Of all cuts the cheapest is taken, by the nanoseconds that CPython 3.11 needs for each step on the machine of
 docs/figures.md (bench/codec.py). Its whole numbers have digits of 30 bits and fast ways for sums and products of one
-digit. Where a signal ends where its word ends, ``struct`` checks its range, for nothing.
+digit. Where a signal ends where its word ends, ``struct`` checks its range, for nothing. Where it is the last of its
+word but ends before it, one that is too low makes the word negative, as all below are none, and ``struct`` refuses it.
 """
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import NamedTuple
 
 from onboard.contract.generate.decoding import function_name, shape
@@ -24,8 +26,10 @@ _FRAME_BYTES = 8
 #: more than one; ``+`` within a digit and beyond; a table instead, less the check; to make a negative number a
 #: positive one, half of all being so; to check a range, and one of more than a digit.
 _WORD_NS, _BIG_WORD_NS, _FRAME_NS, _AND_NS, _SHIFT_NS = 1, 10, 14, 7, 11
-_TIMES_NS, _CROSS_TIMES_NS, _LONG_TIMES_NS, _PLUS_NS, _LONG_PLUS_NS = 5, 8, 14, 9, 10
+_TIMES_NS, _CROSS_TIMES_NS, _LONG_TIMES_NS, _PLUS_NS, _LONG_PLUS_NS = 5, 8, 9, 9, 10
 _TABLE_NS, _SIGN_NS, _CHECK_NS, _LONG_CHECK_NS = -8, 10, 11, 20
+#: To carry yes or no in the number below it, half of all being no.
+_CARRY_NS = 8
 #: Lengths of words where another cut than the cheapest by these is 7 to 13 % faster, as measured.
 _MEASURED = {
     "MissionKey": (1, 1, 4, 2),
@@ -33,7 +37,6 @@ _MEASURED = {
     "Progress": (4, 4),
     "Regeneration": (4, 4),
     "StepReport": (1, 2, 4, 1),
-    "StepState": (2, 4, 1, 1),
 }
 
 
@@ -70,6 +73,13 @@ class Word(NamedTuple):
         return last.signal if last.has_sign and last.at + last.bits == self.length * 8 else None
 
     @property
+    def guarded(self) -> SignalLayout | None:
+        """The signal whose low end ``struct`` checks, as nothing above it makes up for what is below 0."""
+        last = self.pieces[-1]
+        is_free = last.has_sign and not last.signal.signed and _is_free(last.signal, is_low=True)
+        return last.signal if is_free and not last.signal.choices else None
+
+    @property
     def letter(self) -> str:
         """The word in a format of ``struct``."""
         if not self.pieces:
@@ -104,6 +114,22 @@ def _word(frame: DbcMessage, start: int, length: int) -> Word:
     return Word(start, length, tuple(_pieces(frame, start * 8, (start + length) * 8)))
 
 
+def _carried(word: Word) -> dict[str, Piece]:
+    """Yes and no right above a number that has a name: by signal, the piece of the number, which takes them along.
+
+    One that says no costs a jump then, and one that says yes a sum of small numbers.
+    """
+    found: dict[str, Piece] = {}
+    for below, piece in pairwise(word.pieces):
+        carrier = found.get(below.signal.name, below)
+        signal = carrier.signal
+        can_carry = not (signal.signed or signal.choices or signal.scale != 1 or _is_from_table(word, carrier))
+        is_next = piece.at == below.at + below.bits and carrier.has_sign
+        if is_next and can_carry and piece.signal.choices == YES_NO:
+            found[piece.signal.name] = carrier
+    return found
+
+
 def _pieces(frame: DbcMessage, low: int, high: int) -> Iterator[Piece]:
     for signal in sorted(frame.layout.signals, key=lambda one: one.shift):
         first, end = max(signal.shift, low), min(signal.shift + signal.bits, high)
@@ -119,10 +145,13 @@ def _cost(word: Word) -> int:
     cost = _FRAME_NS if word.length == _FRAME_BYTES else _WORD_NS
     if word.letter == "I" and len(word.pieces) > 1 and last.at + last.bits > _DIGIT_BITS:
         cost += _BIG_WORD_NS
-    cost += sum(_piece_cost(word, piece) for piece in word.pieces)
+    carried = _carried(word)
+    cost += sum(_CARRY_NS if piece.signal.name in carried else _piece_cost(word, piece) for piece in word.pieces)
     if closing is not None and not closing.choices:
         check = _LONG_CHECK_NS if closing.maximum >= 1 << _DIGIT_BITS else _CHECK_NS
         cost -= check * (_is_free(closing, is_low=True) + _is_free(closing, is_low=False)) // 2
+    elif word.guarded is not None and not _is_from_table(word, last):
+        cost -= (_LONG_CHECK_NS if word.guarded.maximum >= 1 << _DIGIT_BITS else _CHECK_NS) // 2
     return cost
 
 
@@ -180,8 +209,13 @@ class _Lines:
         self.names: dict[str, str] = {}
         #: Signals whose range, or one end of it, is not checked before they are packed.
         self.late: list[str] = []
+        self.carried = {name: one for word in self.words for name, one in _carried(word).items()}
         for field in frame.fields:
             self._take(field)
+        for name, carrier in self.carried.items():
+            bit = next(piece.at for word in self.words for piece in word.pieces if piece.signal.name == name)
+            added = 1 << bit - carrier.at + carrier.first
+            self.body += [f"    if message.{name}:", f"        {carrier.signal.name} += 0x{added:X}"]
 
     def _take(self, field: Field) -> None:
         """Get a field's values and refuse those out of range."""
@@ -214,6 +248,7 @@ class _Lines:
         name = signal.name
         word = next((word for word in self.words if word.pieces and word.closing == signal), None)
         low = word is not None and _is_free(signal, is_low=True)
+        low = low or any(word.guarded == signal for word in self.words if word.pieces)
         high = word is not None and _is_free(signal, is_low=False)
         if any(_is_from_table(word, piece) for word in self.words for piece in word.pieces if piece.signal == signal):
             low = high = True
@@ -247,7 +282,8 @@ class _Lines:
         if any(_is_from_table(word, piece) for word in used for piece in word.pieces):
             errors.append("KeyError")
         if used[0].is_number:
-            errors += ["OverflowError"] if used[0].closing else []
+            is_late = used[0].closing or (used[0].guarded and not _is_from_table(used[0], used[0].pieces[-1]))
+            errors += ["OverflowError"] if is_late else []
             made = f'({self._number(used[0])}).to_bytes({_FRAME_BYTES}, "little")'
         else:
             errors.append("struct.error")
@@ -257,10 +293,14 @@ class _Lines:
     def _number(self, word: Word) -> str:
         """The expression that makes a word of its pieces, those of one digit of a whole number together."""
         digits: list[list[Piece]] = []
+        carried = _carried(word)
         for piece in word.pieces:
+            if piece.signal.name in carried:
+                continue
             is_apart = _is_fixed(word, piece)
             fits = digits and not _is_fixed(word, digits[-1][0]) and not is_apart
-            if fits and piece.at + piece.bits - digits[-1][0].at <= _DIGIT_BITS:
+            bits = piece.bits + sum(one == piece for one in carried.values())
+            if fits and piece.at + bits - digits[-1][0].at <= _DIGIT_BITS:
                 digits[-1].append(piece)
             else:
                 digits.append([piece])
@@ -301,6 +341,8 @@ def _scaled(signal: SignalLayout, name: str) -> str:
 
 
 def _times(term: str, shift: int) -> str:
+    if shift >= _DIGIT_BITS:
+        return f"({term} << {shift})"
     return f"{term} * 0x{1 << shift:X}" if shift else term
 
 

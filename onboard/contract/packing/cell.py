@@ -85,12 +85,14 @@ def unpack_goal_end(sender: int, data: bytes) -> GoalEnd | None:
 
 def pack_goal_terms(message: GoalTerms) -> bytes:
     level = message.level
-    if level < 0 or level > 5:
+    if level > 5:
         raise OutOfRangeError("GoalTerms.level", level, 0, 5)
     try:
         return _PACK_HIH(message.goal, message.time_limit_ms, level)
     except struct.error as error:
-        raise refusal(message, ("GoalTerms.goal", 0, 65535), ("GoalTerms.time_limit_ms", 0, 4294967295)) from error
+        raise refusal(
+            message, ("GoalTerms.goal", 0, 65535), ("GoalTerms.time_limit_ms", 0, 4294967295), ("GoalTerms.level", 0, 5)
+        ) from error
 
 
 def unpack_goal_terms(sender: int, data: bytes) -> GoalTerms | None:

@@ -52,12 +52,17 @@ def unpack_arm_order(sender: int, data: bytes) -> ArmOrder | None:
 def pack_grip_order(message: GripOrder) -> bytes:
     part = message.part
     part_number = part[1]
-    if part_number < 0 or part_number > 65535:
+    if part_number > 65535:
         raise OutOfRangeError("GripOrder.part_number", part_number, 0, 65535)
     try:
         return _PACK_BIXXX(message.sequence, message.grip_action + _FROM_0_TO_255_AT_1[part[0]] + part_number * 0x200)
     except (KeyError, struct.error) as error:
-        raise refusal(message, ("GripOrder.sequence", 0, 255), ("GripOrder.part.origin", 0, 255)) from error
+        raise refusal(
+            message,
+            ("GripOrder.sequence", 0, 255),
+            ("GripOrder.part.origin", 0, 255),
+            ("GripOrder.part.number", 0, 65535),
+        ) from error
 
 
 def unpack_grip_order(sender: int, data: bytes) -> GripOrder | None:
@@ -70,12 +75,12 @@ def unpack_grip_order(sender: int, data: bytes) -> GripOrder | None:
 
 def pack_order_answer(message: OrderAnswer) -> bytes:
     cost_mm = message.cost_mm
-    if cost_mm < 0 or cost_mm > 4294967295:
+    if cost_mm > 4294967295:
         raise OutOfRangeError("OrderAnswer.cost_mm", cost_mm, 0, 4294967295)
     try:
         return _PACK_HBIX(message.order, message.order_result + (cost_mm & 0x1F) * 0x8, cost_mm >> 5)
     except struct.error as error:
-        raise refusal(message, ("OrderAnswer.order", 0, 65535)) from error
+        raise refusal(message, ("OrderAnswer.order", 0, 65535), ("OrderAnswer.cost_mm", 0, 4294967295)) from error
 
 
 def unpack_order_answer(sender: int, data: bytes) -> OrderAnswer | None:
@@ -123,12 +128,17 @@ def unpack_arm_state(sender: int, data: bytes) -> ArmState | None:
 def pack_grip_state(message: GripState) -> bytes:
     part = message.part
     part_number = part[1]
-    if part_number < 0 or part_number > 65535:
+    if part_number > 65535:
         raise OutOfRangeError("GripState.part_number", part_number, 0, 65535)
     try:
         return _PACK_BIXXX(message.sequence, message.grip_mode + _FROM_0_TO_255_AT_2[part[0]] + part_number * 0x400)
     except (KeyError, struct.error) as error:
-        raise refusal(message, ("GripState.sequence", 0, 255), ("GripState.part.origin", 0, 255)) from error
+        raise refusal(
+            message,
+            ("GripState.sequence", 0, 255),
+            ("GripState.part.origin", 0, 255),
+            ("GripState.part.number", 0, 65535),
+        ) from error
 
 
 def unpack_grip_state(sender: int, data: bytes) -> GripState | None:

@@ -84,12 +84,12 @@ def unpack_drive_order(sender: int, data: bytes) -> DriveOrder | None:
 
 def pack_shuttle_order(message: ShuttleOrder) -> bytes:
     wheelbase_mm = message.wheelbase_mm
-    if wheelbase_mm < 0 or wheelbase_mm > 8191:
+    if wheelbase_mm > 8191:
         raise OutOfRangeError("ShuttleOrder.wheelbase_mm", wheelbase_mm, 0, 8191)
     try:
         return _PACK_BIXXX(message.sequence, message.action + message.side * 0x10 + wheelbase_mm * 0x20)
     except struct.error as error:
-        raise refusal(message, ("ShuttleOrder.sequence", 0, 255)) from error
+        raise refusal(message, ("ShuttleOrder.sequence", 0, 255), ("ShuttleOrder.wheelbase_mm", 0, 8191)) from error
 
 
 def unpack_shuttle_order(sender: int, data: bytes) -> ShuttleOrder | None:
@@ -129,12 +129,17 @@ def unpack_light_order(sender: int, data: bytes) -> LightOrder | None:
 def pack_desk_order(message: DeskOrder) -> bytes:
     car = message.car
     car_number = car[1]
-    if car_number < 0 or car_number > 65535:
+    if car_number > 65535:
         raise OutOfRangeError("DeskOrder.car_number", car_number, 0, 65535)
     try:
         return _PACK_BIXXX(message.sequence, message.text + _FROM_0_TO_255_AT_4[car[0]] + car_number * 0x1000)
     except (KeyError, struct.error) as error:
-        raise refusal(message, ("DeskOrder.sequence", 0, 255), ("DeskOrder.car.origin", 0, 255)) from error
+        raise refusal(
+            message,
+            ("DeskOrder.sequence", 0, 255),
+            ("DeskOrder.car.origin", 0, 255),
+            ("DeskOrder.car.number", 0, 65535),
+        ) from error
 
 
 def unpack_desk_order(sender: int, data: bytes) -> DeskOrder | None:
@@ -157,13 +162,18 @@ def unpack_state_request(sender: int, data: bytes) -> StateRequest | None:
 
 def pack_ticket_print(message: TicketPrint) -> bytes:
     half = message.half
-    if half < 0 or half > 1:
+    if half > 1:
         raise OutOfRangeError("TicketPrint.half", half, 0, 1)
     code = message.code
     try:
         return _PACK_BBBIX(message.sequence, half, code & 0xFF, code >> 8)
     except struct.error as error:
-        raise refusal(message, ("TicketPrint.sequence", 0, 255), ("TicketPrint.code", 0, 1099511627775)) from error
+        raise refusal(
+            message,
+            ("TicketPrint.sequence", 0, 255),
+            ("TicketPrint.half", 0, 1),
+            ("TicketPrint.code", 0, 1099511627775),
+        ) from error
 
 
 def unpack_ticket_print(sender: int, data: bytes) -> TicketPrint | None:
@@ -209,7 +219,7 @@ def pack_shuttle_state(message: ShuttleState) -> bytes:
     if load_kg < 0 or load_kg > 4095:
         raise OutOfRangeError("ShuttleState.load_kg", load_kg, 0, 4095)
     wheelbase_mm = message.wheelbase_mm
-    if wheelbase_mm < 0 or wheelbase_mm > 8191:
+    if wheelbase_mm > 8191:
         raise OutOfRangeError("ShuttleState.wheelbase_mm", wheelbase_mm, 0, 8191)
     try:
         return _PACK_BHIX(
@@ -218,7 +228,7 @@ def pack_shuttle_state(message: ShuttleState) -> bytes:
             (extension_mm >> 11) + load_kg * 0x4 + wheelbase_mm * 0x4000,
         )
     except struct.error as error:
-        raise refusal(message, ("ShuttleState.sequence", 0, 255)) from error
+        raise refusal(message, ("ShuttleState.sequence", 0, 255), ("ShuttleState.wheelbase_mm", 0, 8191)) from error
 
 
 def unpack_shuttle_state(sender: int, data: bytes) -> ShuttleState | None:
@@ -253,12 +263,17 @@ def unpack_door_state(sender: int, data: bytes) -> DoorState | None:
 def pack_desk_event(message: DeskEvent) -> bytes:
     car = message.car
     car_number = car[1]
-    if car_number < 0 or car_number > 65535:
+    if car_number > 65535:
         raise OutOfRangeError("DeskEvent.car_number", car_number, 0, 65535)
     try:
         return _PACK_BIXXX(message.sequence, message.event + _FROM_0_TO_255_AT_2[car[0]] + car_number * 0x400)
     except (KeyError, struct.error) as error:
-        raise refusal(message, ("DeskEvent.sequence", 0, 255), ("DeskEvent.car.origin", 0, 255)) from error
+        raise refusal(
+            message,
+            ("DeskEvent.sequence", 0, 255),
+            ("DeskEvent.car.origin", 0, 255),
+            ("DeskEvent.car.number", 0, 65535),
+        ) from error
 
 
 def unpack_desk_event(sender: int, data: bytes) -> DeskEvent | None:
@@ -282,14 +297,13 @@ def pack_bay_state(message: BayState) -> bytes:
     wheelbase_mm = message.wheelbase_mm
     if wheelbase_mm < 0 or wheelbase_mm > 8191:
         raise OutOfRangeError("BayState.wheelbase_mm", wheelbase_mm, 0, 8191)
+    if message.person_inside:
+        wheelbase_mm += 0x2000
+    if message.carrier_in_front:
+        wheelbase_mm += 0x4000
     try:
         return (
-            load_kg
-            + length_mm * 0x1000
-            + (height_mm + wheelbase_mm * 0x1000) * 0x2000000
-            + (0x4000000000000 if message.person_inside else 0)
-            + (0x8000000000000 if message.carrier_in_front else 0)
-            + message.width_mm * 0x10000000000000
+            load_kg + length_mm * 0x1000 + (height_mm + wheelbase_mm * 0x1000) * 0x2000000 + (message.width_mm << 52)
         ).to_bytes(8, "little")
     except OverflowError as error:
         raise refusal(message, ("BayState.width_mm", 0, 4095)) from error
@@ -316,9 +330,12 @@ def unpack_bay_state(sender: int, data: bytes) -> BayState | None:
 
 def pack_platform_state(message: PlatformState) -> bytes:
     load_kg = message.load_kg
-    if load_kg < 0 or load_kg > 4095:
+    if load_kg > 4095:
         raise OutOfRangeError("PlatformState.load_kg", load_kg, 0, 4095)
-    return _PACK_IXXXX(message.carrier_aboard + (0x2 if message.crossing else 0) + load_kg * 0x4)
+    try:
+        return _PACK_IXXXX(message.carrier_aboard + (0x2 if message.crossing else 0) + load_kg * 0x4)
+    except struct.error as error:
+        raise refusal(message, ("PlatformState.load_kg", 0, 4095)) from error
 
 
 def unpack_platform_state(sender: int, data: bytes) -> PlatformState | None:
@@ -329,13 +346,15 @@ def unpack_platform_state(sender: int, data: bytes) -> PlatformState | None:
 
 def pack_ticket_read(message: TicketRead) -> bytes:
     half = message.half
-    if half < 0 or half > 1:
+    if half > 1:
         raise OutOfRangeError("TicketRead.half", half, 0, 1)
     code = message.code
     try:
         return _PACK_BBBIX(message.sequence, half, code & 0xFF, code >> 8)
     except struct.error as error:
-        raise refusal(message, ("TicketRead.sequence", 0, 255), ("TicketRead.code", 0, 1099511627775)) from error
+        raise refusal(
+            message, ("TicketRead.sequence", 0, 255), ("TicketRead.half", 0, 1), ("TicketRead.code", 0, 1099511627775)
+        ) from error
 
 
 def unpack_ticket_read(sender: int, data: bytes) -> TicketRead | None:

@@ -15,7 +15,6 @@ _FROM_0_TO_255_AT_30 = {value: value << 30 for value in range(256)}
 _FROM_0_TO_255_AT_38 = {value: value << 38 for value in range(256)}
 _FROM_0_TO_255_AT_50 = {value: value << 50 for value in range(256)}
 _PACK_BBHI = struct.Struct("<BBHI").pack
-_PACK_HIBX = struct.Struct("<HIBx").pack
 _PACK_IXXXX = struct.Struct("<Ixxxx").pack
 _UNPACK_IXXXX = struct.Struct("<Ixxxx").unpack_from
 _UNPACK_Q = struct.Struct("<Q").unpack_from
@@ -158,11 +157,11 @@ def pack_step_state(message: StepState) -> bytes:
     task = message.task
     if task < 0 or task > 65535:
         raise OutOfRangeError("StepState.task", task, 0, 65535)
-    return _PACK_HIBX(
-        step & 0xFFFF,
-        (step >> 16) + cell * 0x40 + (task & 0x3FF) * 0x400000,
-        (task >> 10) + (0x40 if message.loaded else 0) + (0x80 if message.served else 0),
-    )
+    if message.loaded:
+        task += 0x10000
+    if message.served:
+        task += 0x20000
+    return (step + cell * 0x400000 + (task << 38)).to_bytes(8, "little")
 
 
 def unpack_step_state(sender: int, data: bytes) -> StepState | None:

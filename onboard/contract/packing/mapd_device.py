@@ -33,7 +33,7 @@ def pack_cart_order(message: CartOrder) -> bytes:
         raise OutOfRangeError("CartOrder.task", task, 0, 65535)
     try:
         return (
-            sequence + message.cart_action * 0x100 + cell * 0x400 + task * 0x4000000 + message.step * 0x40000000000
+            sequence + message.cart_action * 0x100 + cell * 0x400 + task * 0x4000000 + (message.step << 42)
         ).to_bytes(8, "little")
     except OverflowError as error:
         raise refusal(message, ("CartOrder.step", 0, 4194303)) from error
@@ -76,12 +76,14 @@ def pack_cart_state(message: CartState) -> bytes:
     if cell > 63999:
         raise OutOfRangeError("CartState.cell", cell, 0, 63999)
     task = message.task
-    if task < 0 or task > 65535:
+    if task > 65535:
         raise OutOfRangeError("CartState.task", task, 0, 65535)
     try:
         return _PACK_BHIX(message.sequence, cell, message.moving + task * 0x2)
     except struct.error as error:
-        raise refusal(message, ("CartState.sequence", 0, 255), ("CartState.cell", 0, 63999)) from error
+        raise refusal(
+            message, ("CartState.sequence", 0, 255), ("CartState.cell", 0, 63999), ("CartState.task", 0, 65535)
+        ) from error
 
 
 def unpack_cart_state(sender: int, data: bytes) -> CartState | None:

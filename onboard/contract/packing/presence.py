@@ -69,9 +69,12 @@ def unpack_go(sender: int, data: bytes) -> Go | None:
 
 def pack_bus_time(message: BusTime) -> bytes:
     bus_time_us = message.bus_time_us
-    if bus_time_us < 0 or bus_time_us > 281474976710655:
+    if bus_time_us > 281474976710655:
         raise OutOfRangeError("BusTime.bus_time_us", bus_time_us, 0, 281474976710655)
-    return (bus_time_us).to_bytes(8, "little")
+    try:
+        return (bus_time_us).to_bytes(8, "little")
+    except OverflowError as error:
+        raise refusal(message, ("BusTime.bus_time_us", 0, 281474976710655)) from error
 
 
 def unpack_bus_time(sender: int, data: bytes) -> BusTime | None:
@@ -157,12 +160,17 @@ def pack_operator_order(message: OperatorOrder) -> bytes:
         raise OutOfRangeError("OperatorOrder.compartment", compartment, 1, 255)
     car = message.car
     car_number = car[1]
-    if car_number < 0 or car_number > 65535:
+    if car_number > 65535:
         raise OutOfRangeError("OperatorOrder.car_number", car_number, 0, 65535)
     try:
         return _PACK_BIXXX(compartment, message.action + _FROM_0_TO_255_AT_4[car[0]] + car_number * 0x1000)
     except (KeyError, struct.error) as error:
-        raise refusal(message, ("OperatorOrder.compartment", 1, 255), ("OperatorOrder.car.origin", 0, 255)) from error
+        raise refusal(
+            message,
+            ("OperatorOrder.compartment", 1, 255),
+            ("OperatorOrder.car.origin", 0, 255),
+            ("OperatorOrder.car.number", 0, 65535),
+        ) from error
 
 
 def unpack_operator_order(sender: int, data: bytes) -> OperatorOrder | None:

@@ -66,9 +66,12 @@ def pack_token_held(message: TokenHeld) -> bytes:
     if token < 0 or token > 16777215:
         raise OutOfRangeError("TokenHeld.token", token, 0, 16777215)
     version = message.version
-    if version < 0 or version > 268435455:
+    if version > 268435455:
         raise OutOfRangeError("TokenHeld.version", version, 0, 268435455)
-    return (message.token_kind + token * 0x10 + version * 0x10000000).to_bytes(8, "little")
+    try:
+        return (message.token_kind + token * 0x10 + version * 0x10000000).to_bytes(8, "little")
+    except OverflowError as error:
+        raise refusal(message, ("TokenHeld.version", 0, 268435455)) from error
 
 
 def unpack_token_held(sender: int, data: bytes) -> TokenHeld | None:
@@ -264,7 +267,7 @@ def pack_regeneration(message: Regeneration) -> bytes:
     if tokens < 0 or tokens > 65535:
         raise OutOfRangeError("Regeneration.tokens", tokens, 0, 65535)
     digest = message.digest
-    if digest < 0 or digest > 65535:
+    if digest > 65535:
         raise OutOfRangeError("Regeneration.digest", digest, 0, 65535)
     try:
         return _PACK_II(
@@ -277,7 +280,11 @@ def pack_regeneration(message: Regeneration) -> bytes:
         )
     except (KeyError, struct.error) as error:
         raise refusal(
-            message, ("Regeneration.epoch", 1, 255), ("Regeneration.lost", 0, 250), ("Regeneration.absent", 0, 250)
+            message,
+            ("Regeneration.epoch", 1, 255),
+            ("Regeneration.lost", 0, 250),
+            ("Regeneration.absent", 0, 250),
+            ("Regeneration.digest", 0, 65535),
         ) from error
 
 

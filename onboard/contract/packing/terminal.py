@@ -69,8 +69,10 @@ def pack_box_order(message: BoxOrder) -> bytes:
     within_s = message.within_s
     if within_s < 0 or within_s > 32767:
         raise OutOfRangeError("BoxOrder.within_s", within_s, 0, 32767)
+    if message.urgent:
+        within_s += 0x8000
     try:
-        return _PACK_BHHBH(desk, message.number, box, target, within_s + (0x8000 if message.urgent else 0))
+        return _PACK_BHHBH(desk, message.number, box, target, within_s)
     except struct.error as error:
         raise refusal(
             message, ("BoxOrder.number", 0, 65535), ("BoxOrder.box", 1, 65535), ("BoxOrder.target", 1, 255)
@@ -159,7 +161,7 @@ def pack_plan_step(message: PlanStep) -> bytes:
         raise OutOfRangeError("PlanStep.entity", entity, 1, 255)
     end_ms = message.end_ms
     after_step = message.after_step
-    if after_step < 0 or after_step > 31:
+    if after_step > 31:
         raise OutOfRangeError("PlanStep.after_step", after_step, 0, 31)
     try:
         return _PACK_BBBBHBB(
@@ -172,6 +174,7 @@ def pack_plan_step(message: PlanStep) -> bytes:
             ("PlanStep.entity", 1, 255),
             ("PlanStep.end_ms", 0, 16777215),
             ("PlanStep.after", 0, 255),
+            ("PlanStep.after_step", 0, 31),
         ) from error
 
 
@@ -208,7 +211,7 @@ def pack_plan_task(message: PlanTask) -> bytes:
         raise OutOfRangeError("PlanTask.box", box, 1, 65535)
     task = message.task
     task_number = task[1]
-    if task_number < 0 or task_number > 65535:
+    if task_number > 65535:
         raise OutOfRangeError("PlanTask.task_number", task_number, 0, 65535)
     try:
         return _PACK_BBHI(
@@ -219,7 +222,11 @@ def pack_plan_task(message: PlanTask) -> bytes:
         )
     except (KeyError, struct.error) as error:
         raise refusal(
-            message, ("PlanTask.version", 1, 255), ("PlanTask.pick", 0, 31), ("PlanTask.task.origin", 0, 255)
+            message,
+            ("PlanTask.version", 1, 255),
+            ("PlanTask.pick", 0, 31),
+            ("PlanTask.task.origin", 0, 255),
+            ("PlanTask.task.number", 0, 65535),
         ) from error
 
 
@@ -251,7 +258,7 @@ def pack_step_report(message: StepReport) -> bytes:
     if step < 0 or step > 30:
         raise OutOfRangeError("StepReport.step", step, 0, 30)
     at_ms = message.at_ms
-    if at_ms < 0 or at_ms > 4294967295:
+    if at_ms > 4294967295:
         raise OutOfRangeError("StepReport.at_ms", at_ms, 0, 4294967295)
     try:
         return _PACK_BHIX(
@@ -260,7 +267,9 @@ def pack_step_report(message: StepReport) -> bytes:
             at_ms >> 1,
         )
     except (KeyError, struct.error) as error:
-        raise refusal(message, ("StepReport.version", 1, 255), ("StepReport.entity", 1, 255)) from error
+        raise refusal(
+            message, ("StepReport.version", 1, 255), ("StepReport.entity", 1, 255), ("StepReport.at_ms", 0, 4294967295)
+        ) from error
 
 
 def unpack_step_report(sender: int, data: bytes) -> StepReport | None:
@@ -286,9 +295,14 @@ def pack_lane_state(message: LaneState) -> bytes:
     if lane < 1 or lane > 255:
         raise OutOfRangeError("LaneState.lane", lane, 1, 255)
     since_ms = message.since_ms
-    if since_ms < 0 or since_ms > 4294967295:
+    if since_ms > 4294967295:
         raise OutOfRangeError("LaneState.since_ms", since_ms, 0, 4294967295)
-    return (lane + (0x100 if message.blocked else 0) + since_ms * 0x200).to_bytes(8, "little")
+    if message.blocked:
+        lane += 0x100
+    try:
+        return (lane + since_ms * 0x200).to_bytes(8, "little")
+    except OverflowError as error:
+        raise refusal(message, ("LaneState.since_ms", 0, 4294967295)) from error
 
 
 def unpack_lane_state(sender: int, data: bytes) -> LaneState | None:

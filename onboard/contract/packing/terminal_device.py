@@ -64,12 +64,12 @@ def unpack_move_order(sender: int, data: bytes) -> MoveOrder | None:
 
 def pack_handler_order(message: HandlerOrder) -> bytes:
     box = message.box
-    if box < 0 or box > 65535:
+    if box > 65535:
         raise OutOfRangeError("HandlerOrder.box", box, 0, 65535)
     try:
         return _PACK_BIXXX(message.sequence, message.action + box * 0x8)
     except struct.error as error:
-        raise refusal(message, ("HandlerOrder.sequence", 0, 255)) from error
+        raise refusal(message, ("HandlerOrder.sequence", 0, 255), ("HandlerOrder.box", 0, 65535)) from error
 
 
 def unpack_handler_order(sender: int, data: bytes) -> HandlerOrder | None:
@@ -112,12 +112,12 @@ def unpack_move_state(sender: int, data: bytes) -> MoveState | None:
 
 def pack_handler_state(message: HandlerState) -> bytes:
     box = message.box
-    if box < 0 or box > 65535:
+    if box > 65535:
         raise OutOfRangeError("HandlerState.box", box, 0, 65535)
     try:
         return _PACK_BIXXX(message.sequence, message.gear + box * 0x4)
     except struct.error as error:
-        raise refusal(message, ("HandlerState.sequence", 0, 255)) from error
+        raise refusal(message, ("HandlerState.sequence", 0, 255), ("HandlerState.box", 0, 65535)) from error
 
 
 def unpack_handler_state(sender: int, data: bytes) -> HandlerState | None:
@@ -151,6 +151,8 @@ def pack_mission_key(message: MissionKey) -> bytes:
     before_s = message.before_s
     if before_s < 0 or before_s > 32767:
         raise OutOfRangeError("MissionKey.before_s", before_s, 0, 32767)
+    if message.urgent:
+        before_s += 0x8000
     try:
         return _PACK_BBIH(
             message.mission,
@@ -159,8 +161,8 @@ def pack_mission_key(message: MissionKey) -> bytes:
             + _FROM_0_TO_31_AT_10[message.count]
             + _FROM_0_TO_255_AT_15[message.source]
             + _FROM_0_TO_255_AT_23[message.target]
-            + (before_s & 0x1) * 0x80000000,
-            (before_s >> 1) + (0x4000 if message.urgent else 0),
+            + ((before_s & 0x1) << 31),
+            (before_s >> 1),
         )
     except (KeyError, struct.error) as error:
         raise refusal(

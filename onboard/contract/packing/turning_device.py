@@ -67,12 +67,14 @@ def unpack_program_end(sender: int, data: bytes) -> ProgramEnd | None:
 
 def pack_lathe_order(message: LatheOrder) -> bytes:
     edges = message.edges
-    if edges < 0 or edges > 65535:
+    if edges > 65535:
         raise OutOfRangeError("LatheOrder.edges", edges, 0, 65535)
     try:
         return _PACK_BIXXX(message.sequence, message.lathe_action + _FROM_0_TO_15_AT_2[message.chuck] + edges * 0x40)
     except (KeyError, struct.error) as error:
-        raise refusal(message, ("LatheOrder.sequence", 0, 255), ("LatheOrder.chuck", 0, 15)) from error
+        raise refusal(
+            message, ("LatheOrder.sequence", 0, 255), ("LatheOrder.chuck", 0, 15), ("LatheOrder.edges", 0, 65535)
+        ) from error
 
 
 def unpack_lathe_order(sender: int, data: bytes) -> LatheOrder | None:
@@ -87,12 +89,14 @@ def unpack_lathe_order(sender: int, data: bytes) -> LatheOrder | None:
 
 def pack_job_answer(message: JobAnswer) -> bytes:
     total_ct = message.total_ct
-    if total_ct < 0 or total_ct > 1048575:
+    if total_ct > 1048575:
         raise OutOfRangeError("JobAnswer.total_ct", total_ct, 0, 1048575)
     try:
         return _PACK_HIXX(message.number, message.job_result + _FROM_0_TO_255_AT_3[message.winner] + total_ct * 0x800)
     except (KeyError, struct.error) as error:
-        raise refusal(message, ("JobAnswer.number", 0, 65535), ("JobAnswer.winner", 0, 255)) from error
+        raise refusal(
+            message, ("JobAnswer.number", 0, 65535), ("JobAnswer.winner", 0, 255), ("JobAnswer.total_ct", 0, 1048575)
+        ) from error
 
 
 def unpack_job_answer(sender: int, data: bytes) -> JobAnswer | None:
@@ -107,12 +111,14 @@ def unpack_job_answer(sender: int, data: bytes) -> JobAnswer | None:
 
 def pack_nc_state(message: NcState) -> bytes:
     parts = message.parts
-    if parts < 0 or parts > 65535:
+    if parts > 65535:
         raise OutOfRangeError("NcState.parts", parts, 0, 65535)
     try:
         return _PACK_BIXXX(message.sequence, message.nc_mode + _FROM_0_TO_255_AT_3[message.program] + parts * 0x800)
     except (KeyError, struct.error) as error:
-        raise refusal(message, ("NcState.sequence", 0, 255), ("NcState.program", 0, 255)) from error
+        raise refusal(
+            message, ("NcState.sequence", 0, 255), ("NcState.program", 0, 255), ("NcState.parts", 0, 65535)
+        ) from error
 
 
 def unpack_nc_state(sender: int, data: bytes) -> NcState | None:
