@@ -60,6 +60,9 @@ class MachineActivity:
     busy_us: int = 0
     travel_mm: int = 0
     empty_mm: int = 0
+    #: Of that on ways that it took of its own accord: its plan has no work, and its stamp is its own.
+    resting_mm: int = 0
+    is_resting: bool = False
     longest_wait_us: int = 0
 
 
@@ -86,7 +89,7 @@ class Activities:
         for body in self.bodies.values():
             body.since_us = time_us
             body.spent_us = Counter()
-            body.busy_us = body.travel_mm = body.empty_mm = body.longest_wait_us = 0
+            body.busy_us = body.travel_mm = body.empty_mm = body.resting_mm = body.longest_wait_us = 0
 
     def take(self, fact: Fact | None, time_us: int) -> None:
         """Take up what one message has told."""
@@ -136,6 +139,7 @@ class Activities:
         loaded = body.node in self._loads.aboard if body.kind is KindCode.ROBOT else self._passengers(body)
         if not loaded:
             body.empty_mm += way_mm
+            body.resting_mm += way_mm if body.is_resting else 0
 
     def _on_waiting(self, told: WaitTold, time_us: int) -> None:
         body = self.bodies.get(told.word.sender)
@@ -144,6 +148,7 @@ class Activities:
 
     def _on_itinerary(self, robot: MachineActivity, itinerary: Itinerary, time_us: int) -> None:
         robot.works = [Segment(leg.track, leg.to_index) for leg in itinerary.legs if leg.action is LegAction.WORK]
+        robot.is_resting = not robot.works and itinerary.stamp.initiator == robot.node
         self._settle(robot, time_us)
         rides = Counter(self._site.stewards.get(leg.track) for leg in itinerary.legs if leg.action is LegAction.RIDE)
         for lift in self.bodies.values():

@@ -61,7 +61,8 @@ class FleetIndicators:
     """All that the fleet bus tells. ``messages_per_task`` counts all but the periodic ones; 0 where no task was done.
 
     ``replans``: plans told anew beyond the first of a task, by what changed and why. ``give_ways``: another way taken
-    because of another machine's plan, ways taken without a task, and calls to give way.
+    because of another machine's plan, ways taken without a task, and calls to give way. ``robots_resting_mm`` is
+    the part of the empty travel by which robots went to wait elsewhere.
     """
 
     seconds_s: float
@@ -84,6 +85,7 @@ class FleetIndicators:
     robots_travel_mm: int
     robots_empty_mm: int
     robots_empty_share: float
+    robots_resting_mm: int
 
     def to_json(self) -> dict[str, object]:
         """The fields as ``json.dump`` takes them; units stand in the keys."""
@@ -94,6 +96,8 @@ class FleetIndicators:
         whys = ((count, *key.split(", ", 1)) for key, count in self.replans.items())
         replans = ", ".join(f"{count} other {what} ({why})" for count, what, why in whys) or "none"
         slack = self.slack
+        empty = f"{self.robots_empty_share:.0%} without a car"
+        empty += f", {self.robots_resting_mm / 1e3:,.0f} m to wait elsewhere" if self.robots_resting_mm else ""
         told = f"mean {slack.mean_s:+.1f} s   95 % at least {slack.p95_s:+.1f}   worst {slack.worst_s:+.1f}"
         text = [
             f"throughput   in {self.parked.per_h:.1f} cars/h (best hour {self.parked.best_hour})   "
@@ -102,7 +106,7 @@ class FleetIndicators:
             f"messages {self.messages_per_task:.0f}   sub-calls in all {self.sub_calls}",
             f"plans anew   {replans}   give-ways {self.give_ways}",
             f"promises     promised minus actual: {told if slack.count else 'none'}   ({slack.count})",
-            f"robots       travelled {self.robots_travel_mm / 1e3:,.0f} m, {self.robots_empty_share:.0%} without a car",
+            f"robots       travelled {self.robots_travel_mm / 1e3:,.0f} m, {empty}",
             "machine   busy riding driving handling standing   idle travel m empty max wait s",
         ]
         return text + [_line(machine) for machine in self.machines]
@@ -174,6 +178,7 @@ class Indicators:
             robots_travel_mm=travel_mm,
             robots_empty_mm=empty_mm,
             robots_empty_share=_per(empty_mm, travel_mm),
+            robots_resting_mm=sum(body.resting_mm for body in robots),
         )
 
     def _utilisation(self, body: MachineActivity, passed_us: int) -> Utilisation:

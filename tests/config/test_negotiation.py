@@ -3,7 +3,7 @@
 import pytest
 
 from onboard.config.problems import ConfigError
-from onboard.systems.car_park.site import RideCalls
+from onboard.systems.car_park.site import RestAt, RideCalls
 from tests.sites import one_floor
 
 
@@ -20,9 +20,20 @@ def test_bids_keep_their_itineraries_unless_the_site_says_otherwise() -> None:
     assert one_floor(extra='[negotiation]\noffers = "told"\n').tells_offers
 
 
+def test_robots_wait_in_the_nearest_refuge_unless_the_site_says_where_calls_are_likely() -> None:
+    assert one_floor().rest_at is RestAt.NEAREST
+    assert one_floor(extra='[negotiation]\nrest_at = "demand"\n').rest_at is RestAt.DEMAND
+    assert one_floor(extra='[negotiation]\nrest_at = "nearest"\n').digest == one_floor().digest
+
+
 @pytest.mark.parametrize(
     ("line", "told"),
-    [('rides = "never"', '"never"'), ("sub_call_percent = 90", "from 20 to 80"), ("ride = 1", "ride")],
+    [
+        ('rides = "never"', '"never"'),
+        ('rest_at = "home"', '"home"'),
+        ("sub_call_percent = 90", "from 20 to 80"),
+        ("ride = 1", "ride"),
+    ],
 )
 def test_a_mistake_is_told_with_its_line(line: str, told: str) -> None:
     with pytest.raises(ConfigError, match=r"test\.toml:\d+: negotiation\.") as caught:

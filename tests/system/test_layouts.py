@@ -6,6 +6,8 @@ import pytest
 
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Demand
+from onboard.contract.codes import KindCode
+from onboard.core.site import Segment
 from onboard.systems.car_park.site import car_park
 from onboard.ways.lifts import is_same_stop
 from onboard.ways.site import BayUse, TrackKind
@@ -69,6 +71,15 @@ def test_cars_come_and_go_with_all_checkers_silent(name: str) -> None:
     scene.assert_sound()
     street = scene.simulation.plant.street.summary()
     assert (street.served, street.inside) == (cars, 0)
+
+
+def test_robots_of_the_tower_start_beside_its_compartments() -> None:
+    tower = Building("tower")
+    robots = [machine for machine in tower.site.machines.values() if machine.kind is KindCode.ROBOT]
+    assert (len(tower.site.places), len(tower.bays), len(tower.sills), len(robots)) == (1_192, 4, 2, 4)
+    assert {alley.length for alley in tower.alleys if alley.number <= 20} == {30}
+    mouths = {tower.site.tracks[robot.home.track].low for robot in robots}
+    assert mouths == {Segment(bay.track, bay.index - 2) for bay in tower.bays}
 
 
 #: Published figures (docs/layouts.md): floors, places, compartments, lifts.

@@ -86,6 +86,11 @@ class GoingAround:
         """The order program in hand."""
         return self.generation.program
 
+    @property
+    def is_at_ease(self) -> bool:
+        """Whether the drive moves, and no plan is to be made anew."""
+        return not self.is_stuck and self._retry_at_us is None and self._since_us is None
+
     def next_wake(self) -> int | None:
         """When to try again, or to say again what was given back."""
         stands_us = None if self._stands_since_us is None else self._stands_since_us + KEEP_US

@@ -187,6 +187,11 @@ class Program:
         self.unplanned = list(unplanned)
         self._tell_anew(steps)
 
+    def leave_out(self, tasks: Collection[Reference]) -> None:
+        """What is in hand for these tasks is no more; nothing is told anew."""
+        self.unplanned = [work for work in self.unplanned if work.call.task not in tasks]
+        self.steps = [step for step in self.steps if step.work is None or step.work.call.task not in tasks]
+
     def over(self) -> None:
         """The step in hand is over: the robot stands where it ends."""
         step = self.step

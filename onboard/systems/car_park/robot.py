@@ -41,6 +41,7 @@ from onboard.systems.car_park.handling import ShuttleWork, handle
 from onboard.systems.car_park.holding import RobotHold
 from onboard.systems.car_park.program import MAX_STEPS, CarHandling, CarStep, HandlingPhase, Program, StationWork
 from onboard.systems.car_park.recovery import JournalRecovery, award_record, floor_record, handled_record, ride_record
+from onboard.systems.car_park.resting import Resting
 from onboard.systems.car_park.riding import Riding
 from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.systems.car_park.starting import RobotDevices, Starting, StartStage
@@ -92,6 +93,7 @@ class ParkingRobot:
     going_around: GoingAround = field(init=False)
     holding: RobotHold = field(init=False)
     starting: Starting = field(init=False)
+    resting: Resting = field(init=False)
     #: The last tasks that were done: a late word about one of them is no news.
     _done: deque[Reference] = field(default_factory=lambda: deque(maxlen=16))
     _begun: bool = False
@@ -109,13 +111,13 @@ class ParkingRobot:
         self.fleet.tokens.before_grant = partial(custody.before_grant, self.fleet)
         self.going_around = GoingAround(self.fleet, self.generation, self.carriage, self.shuttle, self._take_up)
         self.giving_way = GivingWay(self.fleet, self.program, self.going_around.standoff)
+        self.resting = Resting(self.fleet, self.generation.site, self.generation, self.going_around)
         self.holding = RobotHold(self.fleet, self.generation, self.carriage, self.shuttle)
         machine = RobotDevices(self.carriage, self.shuttle, self.riding)
         self.starting = Starting(
             self.fleet, self.generation, machine, self.recovery, self._say_what_is_mine, self._started
         )
-        if self.recovery.floor is not None:
-            self.carriage.track = self.recovery.floor
+        self.carriage.track = self.recovery.floor or self.carriage.track
 
     @property
     def program(self) -> Program:
@@ -160,6 +162,7 @@ class ParkingRobot:
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Another machine's plan may mean that mine has to come later, or to take another way."""
         self.going_around.hear(message)
+        self.resting.hear(message, now_us)
         if isinstance(message, Award):
             again = [self._tell_again(message.task)] if self.recovery.is_asked(self.fleet, message) else []
             return again + self._yield_task(message, now_us)
@@ -296,15 +299,17 @@ class ParkingRobot:
         if not self.starting.is_over:
             return self.starting.advance(now_us)
         self.generation.ahead.go_on(now_us)
-        effects = self.going_around.watch_drive(now_us)
-        effects += self.going_around.advance(now_us)
+        effects = self.going_around.watch_drive(now_us) + self.going_around.advance(now_us)
         # A step can end without a word on any bus, and the next is to begin in the same moment.
         for _ in range(MAX_STEPS):
             if self.holding.stops(self._begun):
                 return effects + self.holding.come_to_rest(now_us)
             step = self.program.step
             if step is None:
-                return effects + self.carriage.advance(now_us)
+                if not self.resting.sets_off(now_us):
+                    return effects + self.carriage.advance(now_us)
+                effects += self._publish(now_us)
+                continue
             if not self._begun:
                 self._begun = True
                 effects += self._begin(step, now_us)
@@ -326,7 +331,8 @@ class ParkingRobot:
             return min((one for one in (self.carriage.next_wake(), self.going_around.next_word()) if one), default=None)
         if not self.starting.is_over:
             return min((one for one in (self.carriage.next_wake(), self.starting.next_wake()) if one), default=None)
-        times = [self.carriage.next_wake(), self.going_around.next_wake(), self.generation.ahead.next_wake()]
+        parts = (self.carriage, self.going_around, self.generation.ahead, self.resting)
+        times = [part.next_wake() for part in parts]
         step = self.program.step
         if step is not None and self._begun:
             times.append(step.end_us if step.action is LegAction.STAND else self._latest_us(step) + OVERDUE_US)
@@ -347,8 +353,8 @@ class ParkingRobot:
         if itinerary is not None:
             effects += [Send(itinerary), *self.carriage.statement(now_us)]
         # An initiator that was restarted learns that its task is in hand.
-        effects += self._taken_on(self.program.works())
-        effects += custody.statements(self.fleet) + self.holding.manual.statement()
+        effects += self._taken_on(self.program.works()) + custody.statements(self.fleet)
+        effects += self.holding.manual.statement()
         return effects + self.fleet.tokens.statements()
 
     def _taken_on(self, works: list[StationWork]) -> list[Effect]:
@@ -393,13 +399,12 @@ class ParkingRobot:
         self._begun = self._begun and bool(kept)
         self.program.replace([*kept, *solution.steps], Stamp(call.deadline_ms, call.sender, call.call & 0xFF))
         self.going_around.won()
-        effects: list[Effect] = [
+        return [
             award_record(call, *self.generation.ends(call, solution.place), version),
             Report("program: " + "; ".join(str(step) for step in solution.steps)),
+            *self._publish(now_us),
+            self._report(call.task, TaskPhase.AWARDED, solution.place.number),
         ]
-        effects += self._publish(now_us)
-        effects.append(self._report(call.task, TaskPhase.AWARDED, solution.place.number))
-        return effects
 
     def _begin(self, step: CarStep, now_us: int) -> list[Effect]:
         if step.action is LegAction.TRAVEL:
@@ -474,7 +479,6 @@ class ParkingRobot:
 
     def _publish(self, now_us: int) -> list[Effect]:
         itinerary = self.program.itinerary(self.fleet.node_id, now_us)
-        assert itinerary.grade is Grade.FIRM
         self.fleet.mirror.on_itinerary(itinerary, now_us)
         return [Send(itinerary)]
 
@@ -486,15 +490,11 @@ class ParkingRobot:
 
         What follows is a person's decision: the controller is started anew once the machine is sound.
         """
-        self._fault = reason
-        self.carriage.stopped = True
+        self._fault, self.carriage.stopped = reason, True
         effects: list[Effect] = [Report(f"stopped: {reason.name}")]
         lost = self._untouched()
         for task in lost:
             self.recovery.forget(task)
             effects += self.going_around.forfeit(task, reason, now_us)
-        self.program.unplanned = [work for work in self.program.unplanned if work.call.task not in lost]
-        self.program.steps = [
-            step for step in self.program.steps if step.work is None or step.work.call.task not in lost
-        ]
+        self.program.leave_out(lost)
         return effects

@@ -107,6 +107,17 @@ class CallAt(Enum):
     ARRIVAL = "arrival"
 
 
+class RestAt(Enum):
+    """Where a robot with nothing to do stands.
+
+    In the refuge that was NEAREST when its last work was done; or it goes on, after a rest, to the one from which by
+    DEMAND heard on the bus the next call is likely to be met soonest.
+    """
+
+    NEAREST = "nearest"
+    DEMAND = "demand"
+
+
 @dataclass(frozen=True, kw_only=True)
 class CarPark(WaySite):
     """A robotized car park (rows P30 to P33)."""
@@ -127,6 +138,7 @@ class CarPark(WaySite):
     cars: CarLimits
     rides: RideCalls = RideCalls.PLANNED
     call_at: CallAt = CallAt.ARRIVAL
+    rest_at: RestAt = RestAt.NEAREST
     #: Whether a bid brings its tentative itinerary: to be seen, as in the paper; nobody plans around it.
     tells_offers: bool = False
     #: In the order in which a car is tried against them; numbers are from 1.
