@@ -34,6 +34,7 @@ def test_a_campaign_over_a_scheduler_comes_to_the_same() -> None:
         ["campaign", "level1", "--seeds", "1-2"],
         ["compare", "level1", "--parts", "random", "--seeds", "1-2"],
         ["certify", "ring:3", "--robots", "1", "--up-to", "2"],
+        ["design", "level1", "--wait", "300"],
     ],
 )
 def test_where_no_scheduler_answers_one_line_says_so(
