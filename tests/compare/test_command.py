@@ -12,8 +12,8 @@ from bus_sim.systems.car_park.compare.table import BOUND
 
 def test_p56_one_command_makes_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     told = tmp_path / "table.json"
-    status = main(["compare", "small", "--parts", "random", "--seeds", "1", "--cars", "2", "--jobs", "1", "--json", str(told)])
-    assert status == 0
+    words = ["--parts", "random", "--seeds", "1", "--cars", "2", "--jobs", "1", "--json", str(told)]
+    assert main(["compare", "small", *words]) == 0
     out = capsys.readouterr().out
     lines = [line for line in out.splitlines() if line.startswith("| ")]
     assert [line.split(" | ")[0].removeprefix("| ") for line in lines[1:]] == [*POLICIES, BOUND]

@@ -6,7 +6,7 @@ import pytest
 
 from bus_sim.demand import DemandError
 from bus_sim.sites import find_site, layout_names, site_names, site_text
-from bus_sim.systems.car_park.design.options import OptionError, Size, option_of, parse_range, size_of
+from bus_sim.systems.car_park.design.options import Size, SizeError, option_of, parse_range, size_of
 from bus_sim.systems.car_park.design.toml_text import toml_text
 from onboard.config.site import parse_site
 from onboard.systems.car_park.site import CarPark
@@ -74,7 +74,7 @@ def test_entries_and_exits_come_by_turns() -> None:
     ],
 )
 def test_a_size_that_cannot_be_built_is_told_why(name: str, size: Size, why: str) -> None:
-    with pytest.raises(OptionError, match=why):
+    with pytest.raises(SizeError, match=why):
         option_of(site_text(name), f"{name}.toml", size)
 
 

@@ -14,7 +14,7 @@ from bus_sim.systems.car_park.design.days import DayPlan, Days
 from bus_sim.systems.car_park.design.measure import Outcome, modelled
 from bus_sim.systems.car_park.design.options import Size
 from bus_sim.systems.car_park.design.picture import draw
-from bus_sim.systems.car_park.design.search import Design, Search, Target
+from bus_sim.systems.car_park.design.search import Design, DesignTarget, Search
 from bus_sim.systems.car_park.design.table import lines, to_json
 from onboard.trace.durations import Durations
 
@@ -47,14 +47,14 @@ def day(number: int) -> DayPlan:
     return DayPlan(f"2024-05-0{number}", Demand.by_mean(90, 30, number, count=8), number)
 
 
-def search(engine: SlowPlant, target: Target, *, unseen: int = 0) -> Search:
+def search(engine: SlowPlant, target: DesignTarget, *, unseen: int = 0) -> Search:
     days = Days([day(1), day(2), day(3)], [day(number) for number in range(4, 4 + unseen)], [])
     ranges = (range(1, 3), range(1, 2), range(1, 4))
     return Search(site_text("small"), "small.toml", ranges, (1.0, 1.0, 1.0), target, days, engine)
 
 
 def found_by(engine: SlowPlant, p95_s: float, *, unseen: int = 0) -> Design:
-    return search(engine, Target(p95_s), unseen=unseen).run()
+    return search(engine, DesignTarget(p95_s), unseen=unseen).run()
 
 
 @pytest.fixture(scope="module")
@@ -79,12 +79,12 @@ def test_the_fewest_machines_that_keep_the_target_win(design: Design) -> None:
 
 
 def test_a_tighter_target_takes_more_machines(design: Design) -> None:
-    tight = search(SlowPlant(), Target(170.0)).run(has_plant=False)
+    tight = search(SlowPlant(), DesignTarget(170.0)).run(has_plant=False)
     assert sum(winner(tight)) > sum(winner(design))
 
 
 def test_a_machine_that_costs_little_is_taken_first() -> None:
-    asked = search(SlowPlant(), Target(170.0))
+    asked = search(SlowPlant(), DesignTarget(170.0))
     assert winner(asked.run(has_plant=False)) == Size(2, 1, 2)
     asked.prices = (10.0, 1.0, 1.0)
     assert winner(asked.run(has_plant=False)) == Size(1, 1, 3)
@@ -115,7 +115,7 @@ def test_neighbours_and_days_that_were_kept_back_are_played(design: Design) -> N
 
 
 def test_filling_and_emptying_is_part_of_the_target(design: Design) -> None:
-    quick = search(SlowPlant(), Target(240.0, fill_h=0.8)).run()
+    quick = search(SlowPlant(), DesignTarget(240.0, fill_h=0.8)).run()
     assert quick.winner is not None and quick.winner.filled.fill_h <= 0.8
     assert sum(winner(quick)) > sum(winner(design))
     assert quick.plant_fill is not None
@@ -164,6 +164,6 @@ def test_the_picture_has_each_value_and_names_the_winner(design: Design) -> None
 
 
 def test_nothing_is_drawn_without_a_winner() -> None:
-    found = search(SlowPlant(), Target(1.0)).run(has_plant=False)
+    found = search(SlowPlant(), DesignTarget(1.0)).run(has_plant=False)
     with pytest.raises(ValueError, match="without a winner"):
         draw(found, "small")

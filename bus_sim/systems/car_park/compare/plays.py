@@ -85,7 +85,7 @@ class Wanted(NamedTuple):
 
 
 def play_wanted(wanted: Wanted) -> Play:
-    """``play``, of one value."""
+    """Play what was wanted to its end; raises ``KeyError`` as ``play`` does."""
     return play(*wanted)
 
 

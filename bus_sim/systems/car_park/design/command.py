@@ -17,7 +17,7 @@ from bus_sim.sites import find_site, site_text
 from bus_sim.systems.car_park.design.days import days_of
 from bus_sim.systems.car_park.design.options import parse_range, size_of
 from bus_sim.systems.car_park.design.picture import draw
-from bus_sim.systems.car_park.design.search import Design, Search, Target
+from bus_sim.systems.car_park.design.search import Design, DesignTarget, Search
 from bus_sim.systems.car_park.design.table import lines, to_json
 from onboard.systems.car_park.site import CarPark
 
@@ -137,7 +137,7 @@ class _Shown:
         return shown(play(function, items), len(items), what, self._console)
 
 
-def _target(args: argparse.Namespace) -> Target:
+def _target(args: argparse.Namespace) -> DesignTarget:
     for option, value, most, unit in (
         ("--wait", args.wait, LONGEST_S, "s"),
         ("--fill", args.fill, LONGEST_H, "h"),
@@ -147,7 +147,7 @@ def _target(args: argparse.Namespace) -> Target:
             raise DemandError(f"{option} {value:g}: must be above 0 {unit}, and at most {most:g}")
     if args.wait == inf:
         raise DemandError("--wait inf: must be a time in s")
-    return Target(args.wait, args.fill, args.empty)
+    return DesignTarget(args.wait, args.fill, args.empty)
 
 
 def _check_counts(args: argparse.Namespace) -> None:

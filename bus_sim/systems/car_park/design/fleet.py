@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from bus_sim.systems.car_park.design.ways import Leg, Traffic, arrival_us
+from bus_sim.systems.car_park.design.ways import ModelLeg, ModelTraffic, arrival_us
 from onboard.contract.codes import KindCode
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.generation import AWARD_LATENCY_US, HANDLING_OVERHEAD_US
@@ -16,7 +16,7 @@ from onboard.ways.refuges import open_refuges, refuges
 TIDY_EVERY = 4
 
 
-class Served(NamedTuple):
+class ServedCall(NamedTuple):
     """What came of a call, us: when the car was set down (retrieval) or taken (parking) at the bay, and parked."""
 
     at_bay_us: int
@@ -30,8 +30,8 @@ class _Trip(NamedTuple):
     done_us: int
     take_us: tuple[int, int]
     leave_us: tuple[int, int]
-    first: list[Leg]
-    second: list[Leg]
+    first: list[ModelLeg]
+    second: list[ModelLeg]
     kept: int
 
 
@@ -53,7 +53,7 @@ class RobotModel:
     node: int
     at: Segment
     free_us: int = 0
-    retreat: list[Leg] = field(default_factory=list)
+    retreat: list[ModelLeg] = field(default_factory=list)
     busy_us: int = 0
     distance_mm: int = 0
 
@@ -77,7 +77,7 @@ class FleetModel:
 
     def __init__(self, site: CarPark) -> None:
         self.site = site
-        self.traffic = Traffic(site)
+        self.traffic = ModelTraffic(site)
         robots = [one for one in site.machines.values() if one.kind is KindCode.ROBOT]
         self.robots = [RobotModel(one.node_id, one.home) for one in robots]
         self.free = dict.fromkeys(site.places)
@@ -89,7 +89,7 @@ class FleetModel:
 
     # --- tasks -------------------------------------------------------------------------------------------------
 
-    def park(self, front: Segment, call_us: int, ready_us: int) -> Served | None:
+    def park(self, front: Segment, call_us: int, ready_us: int) -> ServedCall | None:
         """A car is taken from a bay that is locked at ``ready_us`` to the nearest free place; None: all are taken."""
         place = next((one for one in self._nearest(front) if one in self.free), None)
         if place is None:
@@ -97,14 +97,14 @@ class FleetModel:
         del self.free[place]
         work = _Work(front, place.segment, ready_us, 0, self.site.timing.door_us, 0)
         trip = self._give(work, call_us)
-        return Served(trip.take_us[1], trip.done_us, place)
+        return ServedCall(trip.take_us[1], trip.done_us, place)
 
-    def retrieve(self, place: Station, front: Segment, call_us: int, ready_us: int) -> Served:
+    def retrieve(self, place: Station, front: Segment, call_us: int, ready_us: int) -> ServedCall:
         """A car is brought from its place to a bay that is empty and locked at ``ready_us``."""
         work = _Work(place.segment, front, 0, ready_us, 0, self.site.timing.door_us)
         trip = self._give(work, call_us)
         self.free[place] = None
-        return Served(trip.leave_us[1], trip.done_us)
+        return ServedCall(trip.leave_us[1], trip.done_us)
 
     def _nearest(self, front: Segment) -> list[Station]:
         """All places, the nearest to a bay first; of places as near the site's order."""
@@ -166,7 +166,7 @@ class FleetModel:
 
     # --- refuges -----------------------------------------------------------------------------------------------
 
-    def _retreat(self, robot: RobotModel) -> list[Leg]:
+    def _retreat(self, robot: RobotModel) -> list[ModelLeg]:
         """The way to the nearest place where it may stand while the others rest where they will."""
         others = [one.rests_at for one in self.robots if one is not robot]
         goals = open_refuges(self.site, others) or refuges(self.site)

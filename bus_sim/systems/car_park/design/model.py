@@ -12,7 +12,7 @@ from heapq import heappop, heappush
 
 from bus_sim.systems.car_park.compare.free_flow import Acts, FreeFlow
 from bus_sim.systems.car_park.demand import Demand, Stay
-from bus_sim.systems.car_park.design.fleet import FleetModel, Served
+from bus_sim.systems.car_park.design.fleet import FleetModel, ServedCall
 from bus_sim.systems.car_park.plant.customer import REACTION_US
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.pipeline import MOST_OUT, QUEUED_US
@@ -51,7 +51,7 @@ class Modelled:
 
 
 @dataclass
-class _Bay:
+class _BayModel:
     node: int
     front: Segment
     use: BayUse
@@ -65,7 +65,7 @@ class _Bay:
     is_queued: bool = False
     enters_at_us: int | None = None
     #: Next car to go out, called for already, and when it is set down.
-    ahead: "tuple[_Person, Served] | None" = None
+    ahead: "tuple[_Person, ServedCall] | None" = None
     #: From when on, and for when, the next car may be called for; None while it may not.
     ahead_ready_us: int | None = None
     busy_us: int = 0
@@ -80,7 +80,7 @@ class DayModel:
         self._close_us, self._open_us = flow.close_us + STEP_US, flow.open_us + STEP_US
         uses = site.bay_uses
         self._bays = [
-            _Bay(node, station.segment, uses.get(node, BayUse.BOTH)) for node, station in site.compartments.items()
+            _BayModel(node, station.segment, uses.get(node, BayUse.BOTH)) for node, station in site.compartments.items()
         ]
         self._bays.sort(key=lambda one: one.node)
         self._calls_on_arrival = site.call_at is CallAt.ARRIVAL and not site.classes and not site.measures_width
@@ -112,7 +112,7 @@ class DayModel:
         self._number += 1
         heappush(self._events, (time_us, self._number, act))
 
-    def _choose(self, closed: BayUse) -> _Bay:
+    def _choose(self, closed: BayUse) -> _BayModel:
         return min((one for one in self._bays if one.use is not closed), key=lambda one: (one.people, one.node))
 
     # --- people ------------------------------------------------------------------------------------------------
@@ -134,15 +134,15 @@ class DayModel:
 
     # --- a bay -------------------------------------------------------------------------------------------------
 
-    def _is_asked_for(self, bay: _Bay, now_us: int) -> bool:
+    def _is_asked_for(self, bay: _BayModel, now_us: int) -> bool:
         return bool(bay.askers) and bay.askers[0].stored_us <= now_us
 
-    def _is_drivers_turn(self, bay: _Bay) -> bool:
+    def _is_drivers_turn(self, bay: _BayModel) -> bool:
         if bay.use is BayUse.EXIT:
             return False
         return bay.is_queued or bay.outs >= MOST_OUT
 
-    def _look(self, bay: _Bay, now_us: int) -> None:
+    def _look(self, bay: _BayModel, now_us: int) -> None:
         """Something has changed: whoever is next for a free bay, or whose car can be called for."""
         if not bay.is_free:
             self._call_ahead(bay, now_us)
@@ -163,12 +163,12 @@ class DayModel:
         if is_out:
             self._at(bay.free_from_us + QUEUED_US, lambda then_us: self._look(bay, then_us) if bay.is_free else None)
 
-    def _set_free(self, bay: _Bay, now_us: int, opens_us: int) -> None:
+    def _set_free(self, bay: _BayModel, now_us: int, opens_us: int) -> None:
         bay.is_free, bay.open_us, bay.free_from_us = True, opens_us, opens_us
         bay.enters_at_us = bay.ahead_ready_us = None
         self._at(opens_us, lambda then_us: self._look(bay, then_us) if bay.is_free else None)
 
-    def _enter(self, bay: _Bay, now_us: int) -> None:
+    def _enter(self, bay: _BayModel, now_us: int) -> None:
         bay.enters_at_us = None
         if not bay.is_free or not bay.drivers:
             return
@@ -193,7 +193,7 @@ class DayModel:
         self._at(known_us, lambda then_us: self._may_call_ahead(bay, locked_us, then_us))
         self._at(locked_us, lambda then_us: self._taken(bay, then_us))
 
-    def _walk_away(self, bay: _Bay, person: _Person, now_us: int) -> None:
+    def _walk_away(self, bay: _BayModel, person: _Person, now_us: int) -> None:
         bay.people -= 1
         self._found.in_us.append(now_us - person.arrived_us)
         self._found.parked_us.append(now_us)
@@ -201,7 +201,7 @@ class DayModel:
         if leaves_us is not None:
             self._at(max(now_us, leaves_us), lambda then_us: self._ask(person, then_us))
 
-    def _taken(self, bay: _Bay, now_us: int) -> None:
+    def _taken(self, bay: _BayModel, now_us: int) -> None:
         """The bay is empty and locked on both sides: the next car comes in from behind, or the input door opens."""
         bay.ahead_ready_us = None
         if bay.ahead is not None:
@@ -209,23 +209,23 @@ class DayModel:
         else:
             self._set_free(bay, now_us, now_us + self._open_us)
 
-    def _may_call_ahead(self, bay: _Bay, ready_us: int, now_us: int) -> None:
+    def _may_call_ahead(self, bay: _BayModel, ready_us: int, now_us: int) -> None:
         bay.ahead_ready_us = ready_us
         self._call_ahead(bay, now_us)
 
-    def _call_ahead(self, bay: _Bay, now_us: int) -> None:
+    def _call_ahead(self, bay: _BayModel, now_us: int) -> None:
         ready_us = bay.ahead_ready_us
         if ready_us is None or bay.ahead is not None or not self._is_asked_for(bay, now_us):
             return
         if self._site.call_at is CallAt.ARRIVAL:
             bay.ahead = self._fetch(bay, now_us, ready_us)
 
-    def _fetch(self, bay: _Bay, now_us: int, ready_us: int) -> "tuple[_Person, Served]":
+    def _fetch(self, bay: _BayModel, now_us: int, ready_us: int) -> "tuple[_Person, ServedCall]":
         person = bay.askers.popleft()
         assert person.place is not None, "who asks has parked"
         return person, self._fleet.retrieve(person.place, bay.front, now_us, ready_us)
 
-    def _begin_out(self, bay: _Bay, now_us: int, locked_us: int, since_us: int) -> None:
+    def _begin_out(self, bay: _BayModel, now_us: int, locked_us: int, since_us: int) -> None:
         bay.is_free = False
         person, served = bay.ahead or self._fetch(bay, now_us, locked_us)
         bay.ahead, bay.ahead_ready_us = None, None
@@ -235,11 +235,11 @@ class DayModel:
         self._at(handed_us, lambda then_us: self._hand_over(bay, gone_us + self._close_us, then_us))
         self._at(gone_us, lambda then_us: self._drive_away(bay, person, then_us))
 
-    def _hand_over(self, bay: _Bay, ready_us: int, now_us: int) -> None:
+    def _hand_over(self, bay: _BayModel, ready_us: int, now_us: int) -> None:
         if not self._is_drivers_turn(bay):
             self._may_call_ahead(bay, ready_us, now_us)
 
-    def _drive_away(self, bay: _Bay, person: _Person, now_us: int) -> None:
+    def _drive_away(self, bay: _BayModel, person: _Person, now_us: int) -> None:
         bay.people -= 1
         self._found.out_us.append(now_us - person.asked_us)
         self._found.gone_us.append(now_us)

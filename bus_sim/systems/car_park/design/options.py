@@ -40,7 +40,7 @@ class Size(NamedTuple):
         return ", ".join(f"{count} {word}{'' if count == 1 else 's'}" for count, word in words)
 
 
-class OptionError(ValueError):
+class SizeError(ValueError):
     """A site of this size cannot be made of the template; one line says why."""
 
 
@@ -59,7 +59,7 @@ def size_of(site: CarPark) -> Size:
 
 
 def option_of(template: str, name: str, size: Size) -> Option:
-    """The site file of a size. Raises ``OptionError`` where the template has no room for it."""
+    """The site file of a size. Raises ``SizeError`` where the template has no room for it."""
     values = tomllib.loads(template)
     own = Size(*(len(values.get(kind, [])) for kind in ("robots", "lifts", "compartments")))
     if size == own:
@@ -97,13 +97,13 @@ class _Maker:
         try:
             return Option(size, text, car_park(parse_site(text, self._name)))
         except ConfigError as error:
-            raise OptionError(str(error).splitlines()[0]) from error
+            raise SizeError(str(error).splitlines()[0]) from error
 
     def _site(self) -> CarPark:
         try:
             return car_park(parse_site(toml_text(self._values), self._name, crowded=True))
         except ConfigError as error:
-            raise OptionError(str(error).splitlines()[0]) from error
+            raise SizeError(str(error).splitlines()[0]) from error
 
     def _drop_stewards(self, robots: Sequence[dict[str, Any]]) -> None:
         names = {one.get("name") for kind in ("lifts", "compartments") for one in self._values.get(kind, [])}
@@ -119,7 +119,7 @@ class _Maker:
         number = next(count for count in range(1, 252) if f"{stem}{count}" not in names)
         node = next((one for one in range(1 if kind != "robots" else 101, 251) if one not in nodes), None)
         if node is None:
-            raise OptionError(f"{self._size}: no node-ID is left; a site has at most 250 machines")
+            raise SizeError(f"{self._size}: no node-ID is left; a site has at most 250 machines")
         return {"name": f"{stem}{number}", "node": node}
 
     # --- compartments ------------------------------------------------------------------------------------------
@@ -132,7 +132,7 @@ class _Maker:
         ]
         at = _in_widest_gap([one.segment for one in free], _in_use(site))
         if at is None:
-            raise OptionError(f"{self._size}: no room for a compartment beside {len(known)} others")
+            raise SizeError(f"{self._size}: no room for a compartment beside {len(known)} others")
         table = self._machine("compartments", known[0]["name"].rstrip("0123456789"))
         table |= {"at": _words(site, at), "side": _SIDES[streets[at.track]]}
         like = known[(len(known)) % len({one.get("use", "both") for one in known})]
@@ -159,7 +159,7 @@ class _Maker:
             ranked = sorted(columns, key=lambda index: (-min((abs(index - one) for one in used), default=99), index))
             if any(self._takes(known, table | {"doors": [f"p(*,{index}){side}"]}) for index in ranked[:4]):
                 return
-        raise OptionError(f"{self._size}: no room for a lift beside {len(known)} others")
+        raise SizeError(f"{self._size}: no room for a lift beside {len(known)} others")
 
     def _is_free_on_all(self, site: CarPark, tracks: Iterable[int], index: int) -> bool:
         return not {Segment(track, index) for track in tracks} & _in_use(site)
@@ -168,7 +168,7 @@ class _Maker:
         known.append(table)
         try:
             self._site()
-        except OptionError:
+        except SizeError:
             known.pop()
             return False
         return True
@@ -191,7 +191,7 @@ class _Maker:
                 if at is not None:
                     break
             if at is None:
-                raise OptionError(f"{self._size}: refuges for {room} robots, and no room for another spur")
+                raise SizeError(f"{self._size}: refuges for {room} robots, and no room for another spur")
             tried.add(at)
             sides = [one.side for one in site.places if one.segment == at]
             side = Side.FAR if Side.FAR in sides else sides[0]
@@ -203,7 +203,7 @@ class _Maker:
     def _is_roomier(self, room: int) -> bool:
         try:
             return len(refuge_tracks(self._site(), 2)) > room
-        except OptionError:
+        except SizeError:
             return False
 
     def _add_robots(self, templates: list[dict[str, Any]]) -> None:
@@ -225,7 +225,7 @@ class _Maker:
             free = [one for one in open_refuges(site, taken) if one.track in allowed and one not in kept_free(site)]
             free = [one for one in free if one.track not in {home.track for home in taken}] or free
             if not free:
-                raise OptionError(f"{self._size}: homes for {len(taken)} robots only")
+                raise SizeError(f"{self._size}: homes for {len(taken)} robots only")
             home = min(free, key=lambda one: (roads.nearest_us(one, fronts), one))
             values["robots"].append(self._machine("robots", stem) | {"home": _words(site, home)})
             taken.append(home)
@@ -235,7 +235,7 @@ class _Maker:
         kept, self._values["robots"] = self._values["robots"], [table]
         try:
             return next(one.home for one in self._site().machines.values() if one.name == table["name"])
-        except OptionError:
+        except SizeError:
             return Segment(0, 0)
         finally:
             self._values["robots"] = kept

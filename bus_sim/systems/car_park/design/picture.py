@@ -32,7 +32,7 @@ def draw(design: Design, name: str) -> SvgDrawing:
         left = LEFT + column * (width + GAP)
         for number, measure in enumerate(_MEASURES):
             box = _Box(left, TOP + number * (height + GAP), width, height)
-            _Panel(pen, box, row, column, measure, design).draw(
+            _FigurePanel(pen, box, row, column, measure, design).draw(
                 names_axis=column == 0, kind=kind if number == 1 else "", winner=design.winner
             )
     return pen
@@ -42,11 +42,11 @@ def _legend(pen: SvgDrawing) -> None:
     pen.line([(LEFT, 46), (LEFT + 26, 46)], _MODEL, width=2)
     pen.text(LEFT + 32, 50, "model, with the 95 % interval of its mean")
     pen.ring(LEFT + 300, 46, 4, _PLANT, width=2)
-    pen.text(LEFT + 312, 50, "plant, one day or run each")
-    pen.line([(LEFT + 500, 46), (LEFT + 526, 46)], _TARGET, dash="6 3")
-    pen.text(LEFT + 532, 50, "target")
-    pen.area([(LEFT + 600, 40), (LEFT + 612, 40), (LEFT + 612, 52), (LEFT + 600, 52)], colour(4), opacity=0.35)
-    pen.text(LEFT + 618, 50, "fewest that keep it")
+    pen.text(LEFT + 312, 50, "plant: one run, below of the hardest day")
+    pen.line([(LEFT + 580, 46), (LEFT + 606, 46)], _TARGET, dash="6 3")
+    pen.text(LEFT + 612, 50, "target")
+    pen.area([(LEFT + 680, 40), (LEFT + 692, 40), (LEFT + 692, 52), (LEFT + 680, 52)], colour(4), opacity=0.35)
+    pen.text(LEFT + 698, 50, "fewest that keep it")
 
 
 def _along(design: Design, column: int) -> list[Judged]:
@@ -94,7 +94,7 @@ class _Box:
 
 
 @dataclass
-class _Panel:
+class _FigurePanel:
     """One panel on the paper."""
 
     pen: SvgDrawing

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 
 from bus_sim.systems.car_park.design.days import DayPlan, Days, overload
 from bus_sim.systems.car_park.design.measure import Mean, Outcome, Trial, fill_trial, modelled, modelled_fill, played
-from bus_sim.systems.car_park.design.options import Option, OptionError, Size, option_of
+from bus_sim.systems.car_park.design.options import Option, Size, SizeError, option_of
 
 #: A target that holds for so many of the days, 0 to 1, is kept: one day in twenty may be out of the ordinary.
 KEPT_SHARE = 0.95
@@ -25,14 +25,14 @@ LEAST_GAIN = 0.02
 KINDS = ("robots", "lifts", "compartments")
 
 
-class Engine(Protocol):
+class ShownEngine(Protocol):
     """Plays trials and shows how far it is; results come as they are ready."""
 
     def __call__(self, what: str, function: Callable[[Any], Any], items: Sequence[Any], /) -> Iterator[Any]:
         """Results of ``function`` for all items; ``what`` is what the bar is called."""
 
 
-class Target(NamedTuple):
+class DesignTarget(NamedTuple):
     """What is asked for: 95 % of waits in, and of waits out, in s; filling and emptying in h. Endless: not asked."""
 
     p95_s: float
@@ -65,16 +65,16 @@ class Judged:
         """Cars an hour, in and out, under overload in the model."""
         return Mean.of([one.per_hour for one in self.overloads])
 
-    def kept(self, target: Target, factor: float) -> int:
+    def kept(self, target: DesignTarget, factor: float) -> int:
         """On how many days the model keeps the target, its waits multiplied by a factor."""
         return sum(one.p95_s * factor <= target.p95_s for one in self.days)
 
-    def keeps(self, target: Target, factor: float) -> bool:
+    def keeps(self, target: DesignTarget, factor: float) -> bool:
         """Whether the model keeps all of the target."""
         is_in_time = self.filled.fill_h <= target.fill_h and self.filled.empty_h <= target.empty_h
         return is_in_time and self.kept(target, factor) >= KEPT_SHARE * len(self.days)
 
-    def keeps_in_plant(self, target: Target) -> bool:
+    def keeps_in_plant(self, target: DesignTarget) -> bool:
         """Whether it was played in the plant and kept the target on each of its days."""
         return bool(self.in_plant) and all(one.p95_s <= target.p95_s and not one.faults for one in self.in_plant)
 
@@ -94,7 +94,7 @@ class Bottleneck(NamedTuple):
 class Design:
     """What was found: all options by their price, the winner if there is one, and what it was checked by."""
 
-    target: Target
+    target: DesignTarget
     judged: list[Judged]
     impossible: list[tuple[Size, str]]
     factor: float = 1.0
@@ -118,9 +118,9 @@ class Search:
     name: str
     ranges: tuple[Sequence[int], Sequence[int], Sequence[int]]
     prices: tuple[float, float, float]
-    target: Target
+    target: DesignTarget
     days: Days
-    engine: Engine
+    engine: ShownEngine
     plant_days: int = 1
 
     def run(self, *, has_plant: bool = True) -> Design:
@@ -142,7 +142,7 @@ class Search:
         for size in sorted((Size(*one) for one in product(*self.ranges)), key=self._price):
             try:
                 options.append(option_of(self.template, self.name, size))
-            except OptionError as error:
+            except SizeError as error:
                 impossible.append((size, str(error)))
         return options, impossible
 
@@ -183,7 +183,7 @@ class Search:
             counts[number] += 1
             try:
                 more.append(option_of(self.template, self.name, Size(*counts)))
-            except OptionError:
+            except SizeError:
                 continue
         trials = [
             Trial(one.size, one.text, overload(winner.option.site, seed)) for one in more for seed in OVERLOAD_SEEDS

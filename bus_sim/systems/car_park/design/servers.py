@@ -38,7 +38,7 @@ class PlatformUse(NamedTuple):
 
 @dataclass
 class AlleyServer:
-    """One alley or spur."""
+    """The turns of one alley or spur, in the order in which they begin; those in other parts of it may overlap."""
 
     turns: list[Stretch] = field(default_factory=list)
 

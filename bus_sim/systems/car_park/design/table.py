@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from math import inf, isfinite
 
 from bus_sim.systems.car_park.design.measure import Mean, Outcome
-from bus_sim.systems.car_park.design.search import KINDS, Design, Judged, Target
+from bus_sim.systems.car_park.design.search import KINDS, Design, DesignTarget, Judged
 
 HEAD = "robots lifts compartments  95 % wait, s  days kept  cars an hour   fill  empty, h"
 ONE = {"robots": "robot", "lifts": "lift", "compartments": "compartment"}
@@ -25,7 +25,7 @@ def lines(design: Design) -> list[str]:
     return text
 
 
-def target_words(target: Target) -> str:
+def target_words(target: DesignTarget) -> str:
     """What was asked for, in words."""
     parts = [f"95 % of waits within {target.p95_s:g} s"]
     parts += [f"filled in {target.fill_h:g} h"] if target.fill_h < inf else []

@@ -1,6 +1,6 @@
 """How a robot of the model goes from one position to another: the earliest way, around the turns of the others."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from onboard.ways.site import WaySite
 LEG_US = 300_000
 
 
-class Leg(NamedTuple):
+class ModelLeg(NamedTuple):
     """A move from rest to rest, and what it takes: stretches by track, and a use of a lift."""
 
     here: Segment
@@ -27,11 +27,11 @@ class Leg(NamedTuple):
 
 
 #: A position with the way to it: legs, the last first, as a chain.
-_Chain = tuple[Leg, "_Chain | None"]
+_Chain = tuple[ModelLeg, "_Chain | None"]
 
 
 @dataclass
-class Traffic:
+class ModelTraffic:
     """All alleys and lifts of a site with the turns that were taken."""
 
     site: WaySite
@@ -45,7 +45,7 @@ class Traffic:
         self.alleys = {track: AlleyServer() for track in self.site.tracks if track not in self.site.lifts}
         self.lifts = {track: LiftServer(self.site, track) for track in self.site.lifts}
 
-    def plan(self, origin: Segment, ready_us: int, goals: frozenset[Segment], owner: int) -> list[Leg] | None:
+    def plan(self, origin: Segment, ready_us: int, goals: frozenset[Segment], owner: int) -> list[ModelLeg] | None:
         """The legs by which a robot is at any of ``goals`` first, none where it stands there; None without a way."""
         by_track: dict[int, list[Segment]] = {}
         for goal in goals:
@@ -72,7 +72,7 @@ class Traffic:
                     heappush(open_, (there_us + rest_us[there], number, there_us, there, (leg, chain)))
         return None
 
-    def _legs_from(self, here: Segment, time_us: int, goals: "list[Segment] | tuple[()]", owner: int) -> Iterator[Leg]:
+    def _legs_from(self, here: Segment, time_us: int, goals: Sequence[Segment], owner: int) -> Iterator[ModelLeg]:
         roads = self.roads
         for move in roads.hops(here):
             if move.lift_track is not None:
@@ -86,16 +86,16 @@ class Traffic:
                 low, high = min(here.index, there.index), max(here.index, there.index)
                 begin_us = alley.free_from(time_us, run[1], low, high, owner)
                 turn = Stretch(begin_us, begin_us + run[1], low, high, owner)
-                yield Leg(here, there, begin_us, begin_us + run[1], ((here.track, turn),), None, run[2])
+                yield ModelLeg(here, there, begin_us, begin_us + run[1], ((here.track, turn),), None, run[2])
 
-    def _ride(self, here: Segment, move: Move, track: int, time_us: int) -> Leg:
+    def _ride(self, here: Segment, move: Move, track: int, time_us: int) -> ModelLeg:
         lift, boards, leaves = self.lifts[track], self.roads.lift_at(here), self.roads.lift_at(move.destination)
         assert boards is not None and leaves is not None, "a ride begins and ends at doors of a lift"
         begin_us = lift.boards_at(time_us, boards[1], leaves[1])
         end_us = begin_us + lift.ride_us(boards[1], leaves[1])
-        return Leg(here, move.destination, begin_us, end_us, (), (track, lift.use(begin_us, boards[1], leaves[1])))
+        return ModelLeg(here, move.destination, begin_us, end_us, (), (track, lift.use(begin_us, boards[1], leaves[1])))
 
-    def _hop(self, here: Segment, move: Move, time_us: int, owner: int) -> Leg:
+    def _hop(self, here: Segment, move: Move, time_us: int, owner: int) -> ModelLeg:
         """A turn through a mouth takes the slots at both of its ends."""
         there, begin_us, waits = move.destination, time_us, True
         while waits:
@@ -105,14 +105,14 @@ class Traffic:
                 waits, begin_us = waits or free_us > begin_us, free_us
         end_us = begin_us + move.duration_us
         turns = tuple((slot.track, Stretch(begin_us, end_us, slot.index, slot.index, owner)) for slot in (here, there))
-        return Leg(here, there, begin_us, end_us, turns, None, move.distance_mm)
+        return ModelLeg(here, there, begin_us, end_us, turns, None, move.distance_mm)
 
     def stands(self, at: Segment, begin_us: int, end_us: int, owner: int) -> None:
         """A robot stands and works somewhere."""
         if end_us > begin_us:
             self.alleys[at.track].take(Stretch(begin_us, end_us, at.index, at.index, owner))
 
-    def take(self, legs: list[Leg]) -> None:
+    def take(self, legs: list[ModelLeg]) -> None:
         """Take all that these legs need."""
         for leg in legs:
             for track, turn in leg.turns:
@@ -120,7 +120,7 @@ class Traffic:
             if leg.ride is not None:
                 self.lifts[leg.ride[0]].take(leg.ride[1])
 
-    def give_back(self, legs: list[Leg]) -> None:
+    def give_back(self, legs: list[ModelLeg]) -> None:
         """These legs are not driven."""
         for leg in legs:
             for track, turn in leg.turns:
@@ -136,13 +136,13 @@ class Traffic:
             lift.forget(now_us - KEPT_US)
 
 
-def arrival_us(legs: list[Leg], ready_us: int) -> int:
+def arrival_us(legs: list[ModelLeg], ready_us: int) -> int:
     """When the last leg has ended, and was told; ``ready_us`` without legs."""
     return legs[-1].end_us + LEG_US if legs else ready_us
 
 
-def _legs(chain: "_Chain | None") -> list[Leg]:
-    found: list[Leg] = []
+def _legs(chain: "_Chain | None") -> list[ModelLeg]:
+    found: list[ModelLeg] = []
     while chain is not None:
         leg, chain = chain
         found.append(leg)

@@ -152,12 +152,13 @@ def _propose(graph: Graph, rules: Rules, capacity: int | None, most: int, engine
     """Throughput by number of robots, and the best that is certified."""
     asked = [_Proposal(graph, rules, capacity or robots, robots) for robots in range(1, most + 1)]
     found = sorted(_shown(engine(_proposed, asked), len(asked)), key=lambda one: one.robots)
+    best: tuple[float, int] | None = None
     print("\nrobots  certified  tasks/h  a robot")
     for one in found:
         print(one.line())
-    sound = [(one.result.per_hour, one.robots) for one in found if one.certified and one.result is not None]
-    # Of equal ones the fewest robots.
-    best = max(sound, key=lambda one: (one[0], -one[1]), default=None)
+        result = one.result
+        if one.certified and result is not None and (best is None or result.per_hour > best[0]):
+            best = (result.per_hour, one.robots)
     print(f"proposed: {best[1]} robots, {best[0]:.1f} tasks an hour" if best else "proposed: none is certified")
 
 
