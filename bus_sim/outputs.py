@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 #: Options of all commands that name a file to be written, and those that name a folder.
-FILES, FOLDERS = ("trace", "json", "counterexample", "output", "add_to"), ("out", "process_dir")
+FILES = ("trace", "json", "counterexample", "output", "add_to", "out_file", "draw")
+FOLDERS = ("out", "process_dir")
 
 
 class OutputError(ValueError):
@@ -29,7 +30,7 @@ def _named(args: argparse.Namespace, options: tuple[str, ...]) -> Iterator[tuple
     for name in options:
         value = getattr(args, name, None)
         if value is not None:
-            yield f"--{name.replace('_', '-')}", Path(value)
+            yield f"--{name.removesuffix('_file').replace('_', '-')}", Path(value)
 
 
 def _check_folder(option: str, path: Path) -> None:

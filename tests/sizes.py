@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 #: A system's tests are at least so much of its own lines.
 LEAST = 0.5
 #: Folders of tests that concern the car park alone: it was there before there were systems.
-CAR_PARK = ("car_park", "compare", "demand", "kinds", "plant", "system", "ways")
+CAR_PARK = ("car_park", "compare", "demand", "design", "kinds", "plant", "system", "ways")
 
 
 class Size(NamedTuple):

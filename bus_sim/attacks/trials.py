@@ -14,9 +14,9 @@ from typing import Any
 
 from bus_sim.attacks.catalogue import ATTACKS
 from bus_sim.attacks.watch import BACK_US, AttackWatch
-from bus_sim.campaign.engine import on_cores
 from bus_sim.campaign.report import FAILURES, RunVerdict, TrialReport
 from bus_sim.campaign.trial import play
+from bus_sim.engine import on_cores
 from bus_sim.faults.injection import Injection
 from bus_sim.faults.scenario import FaultScenario
 from bus_sim.sites import find_site

@@ -10,11 +10,9 @@ from functools import partial
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from bus_sim.campaign import table
 from bus_sim.campaign.cold_start import cold_starts
-from bus_sim.campaign.engine import on_cores, on_dask
 from bus_sim.campaign.ledger import Ledger
 from bus_sim.campaign.points import SceneOccasion, Single, count, points, reference
 from bus_sim.campaign.profiles import PROFILES, kinds_for
@@ -23,6 +21,7 @@ from bus_sim.campaign.runner import CampaignSettings, FaultPoint, TrialResult, r
 from bus_sim.campaign.strangers import StrangerPlan, play_pairs
 from bus_sim.campaign.trial import play
 from bus_sim.demand import DemandError
+from bus_sim.engine import add_where_options, engine_of, shown
 from bus_sim.faults.scenario import load_scenario
 from bus_sim.sites import find_site
 from bus_sim.systems.registry import simulated_of
@@ -98,8 +97,7 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--sample", type=int, metavar="N", help="with --exhaustive or --cold-start: only so many, spread over all"
     )
-    parser.add_argument("--dask", metavar="ADDRESS", help="on the workers of a Dask scheduler, such as tcp://host:8786")
-    parser.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: one a core)")
+    add_where_options(parser)
     parser.add_argument("--cars", type=int, metavar="N", help="cars in each run of a car park (default: a few)")
     parser.add_argument(
         "--orders",
@@ -160,14 +158,10 @@ def run_campaign_command(args: argparse.Namespace) -> int:
     ledger = _ledger(args, plan)
     trials, total = _trials(args, plan, site, console, ledger)
     results: list[TrialResult] = []
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("runs", total=total)
-        for result in trials:
-            results.append(result)
-            if ledger is not None:
-                ledger.add(result.seed, result.report.verdict, _why(result))
-            progress.advance(task)
+    for result in shown(trials, total, "runs", console):
+        results.append(result)
+        if ledger is not None:
+            ledger.add(result.seed, result.report.verdict, _why(result))
     results.sort(key=lambda result: result.seed)
     for line in table.lines(results):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
@@ -237,8 +231,7 @@ def _trials(
     args: argparse.Namespace, plan: CampaignSettings, site: Site, console: Console, ledger: Ledger[RunVerdict] | None
 ) -> tuple[Iterator[TrialResult], int]:
     """What is to be played, as an iterator over results, and how many they will be."""
-    jobs = args.jobs or os.cpu_count() or 1
-    play_all = partial(on_dask, args.dask) if args.dask else partial(on_cores, jobs)
+    play_all = engine_of(args)
     if args.exhaustive is None:
         seeds = read_seeds(args.seeds)
         head = f"campaign on {site.name}: seeds {seeds[0]}-{seeds[-1]}, faults {plan.profile}"
@@ -256,7 +249,7 @@ def _trials(
     chosen = chosen if ledger is None else [one for one in chosen if one.number not in ledger.done]
     if args.dask:
         return play_all(partial(run_point, plan), chosen), len(chosen)
-    return run_points(plan, chosen, jobs), len(chosen)
+    return run_points(plan, chosen, args.jobs or os.cpu_count() or 1), len(chosen)
 
 
 def _plan(args: argparse.Namespace, site: Site) -> CampaignSettings:
@@ -287,8 +280,6 @@ def _check(args: argparse.Namespace) -> None:
     """Raise ``DemandError`` for the first value that no site takes."""
     if args.faults not in PROFILES:
         raise DemandError(f"--faults {args.faults}: no such profile; profiles are {', '.join(PROFILES)}")
-    if args.jobs < 0:
-        raise DemandError(f"--jobs {args.jobs}: must be 1 or more; leave it out for one a core")
     if args.cars is not None and args.cars < 1:
         raise DemandError(f"--cars {args.cars}: must be 1 or more")
     if args.orders is not None and not 0 <= args.orders <= MOST_ORDERS:

@@ -7,13 +7,13 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from bus_sim.campaign.engine import on_cores
 from bus_sim.campaign.points import SceneOccasion, reference
 from bus_sim.campaign.profiles import draw_at_rate, draw_faults
 from bus_sim.campaign.report import FAILURES, RunVerdict, TrialReport
 from bus_sim.campaign.shared import Crash, can_share, is_shared, play_shared
 from bus_sim.campaign.shrink import shrink
 from bus_sim.campaign.trial import play
+from bus_sim.engine import on_cores
 from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.faults.scenario import FaultScenario
 from bus_sim.faults.table import KINDS

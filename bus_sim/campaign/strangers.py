@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import partial
 from statistics import fmean
 
-from bus_sim.campaign.engine import on_cores
 from bus_sim.campaign.judges import Judges
+from bus_sim.engine import on_cores
 from bus_sim.options import RunOptions
 from bus_sim.run import run_until
 from bus_sim.sites import find_site

@@ -5,9 +5,9 @@ from functools import partial
 
 import pytest
 
-from bus_sim.campaign.engine import on_cores, on_dask
 from bus_sim.campaign.runner import CampaignSettings, run_seed
 from bus_sim.cli import main
+from bus_sim.engine import on_cores, on_dask
 from bus_sim.systems.car_park.demand import Arrivals
 
 PLAN = CampaignSettings("level1", "bus", 3_600.0, Arrivals(cars=1))
@@ -28,10 +28,19 @@ def test_a_campaign_over_a_scheduler_comes_to_the_same() -> None:
     assert len(there) == len(seeds)
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["campaign", "level1", "--seeds", "1-2"],
+        ["compare", "level1", "--parts", "random", "--seeds", "1-2"],
+        ["certify", "ring:3", "--robots", "1", "--up-to", "2"],
+        ["design", "level1", "--wait", "300"],
+    ],
+)
 def test_where_no_scheduler_answers_one_line_says_so(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    command: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("distributed", reason="Dask is not installed: the extra campaign")
-    monkeypatch.setattr("bus_sim.campaign.engine.ANSWER_S", 0.5)
-    assert main(["campaign", "level1", "--seeds", "1-2", "--dask", "tcp://127.0.0.1:9"]) == 2
+    monkeypatch.setattr("bus_sim.engine.ANSWER_S", 0.5)
+    assert main([*command, "--dask", "tcp://127.0.0.1:9"]) == 2
     assert "no Dask scheduler answers there" in capsys.readouterr().err

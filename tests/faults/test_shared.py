@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from bus_sim.campaign import shared, table
-from bus_sim.campaign.engine import on_cores
 from bus_sim.campaign.points import SceneCounts, Single, count, points, reference
 from bus_sim.campaign.report import RunVerdict
 from bus_sim.campaign.runner import CampaignSettings, FaultPoint, TrialResult, run_point, run_points
 from bus_sim.campaign.shared import Copies, Crash, is_shared
+from bus_sim.engine import on_cores
 from bus_sim.faults.injection import Injection, parse_injection
 from bus_sim.faults.scenario import FaultScenario
 from bus_sim.sites import find_site

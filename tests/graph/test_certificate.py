@@ -126,7 +126,7 @@ def test_g29_a_search_that_is_too_large_is_not_called_certified() -> None:
 
 
 def test_g30_the_best_number_of_robots_is_measured_and_certified(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["certify", "grid:3x3", "--robots", "2", "--rules", "keep", "--up-to", "3"]) == 0
+    assert main(["certify", "grid:3x3", "--robots", "2", "--rules", "keep", "--up-to", "3", "--jobs", "1"]) == 0
     said = capsys.readouterr().out
     assert "deadlock-free under these rules" in said
     assert "proposed: 2 robots" in said  # three are not certified, and two do more than one
@@ -144,7 +144,7 @@ def test_g30_robots_that_stick_have_no_throughput_afterwards() -> None:
 def test_g29_a_counterexample_is_written_and_played(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "stuck.json"
     options = ["--robots", "2", "--rules", "paper", "--up-to", "1", "--counterexample", str(file)]
-    assert main(["certify", "ring:6", *options]) == 1
+    assert main(["certify", "ring:6", "--jobs", "1", *options]) == 1
     assert "not certified" in capsys.readouterr().out
     assert main(["certify", "--play", str(file)]) == 0
     assert "nobody can move" in capsys.readouterr().out

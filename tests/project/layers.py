@@ -331,7 +331,7 @@ EXCLUSIVE: dict[str, tuple[str, ...]] = {
     "aiomqtt": ("onboard/io/mqtt.py",),
     "can": ("onboard/io/pycan.py", "onboard/trace/readers/python_can.py"),
     "cantools": ("onboard/wire/dbc_file.py",),
-    "distributed": ("bus_sim/campaign/engine.py",),
+    "distributed": ("bus_sim/engine.py",),
     "pyarrow": ("onboard/trace/columns/parquet.py",),
     "ortools": ("bus_sim/systems/car_park/compare/optimum.py",),
 }

@@ -5,12 +5,15 @@ import json
 import sys
 from pathlib import Path
 
+from rich.console import Console
+
 from bus_sim.demand import DemandError
 from bus_sim.demand_options import add_table_options
+from bus_sim.engine import Engine, add_where_options, engine_of, shown
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.compare.free_flow import bounds_us
 from bus_sim.systems.car_park.compare.optimum import OptimumError, is_available
-from bus_sim.systems.car_park.compare.plays import POLICIES, Play, play
+from bus_sim.systems.car_park.compare.plays import POLICIES, Play, Wanted, play_wanted
 from bus_sim.systems.car_park.compare.small_table import SmallTable, solve_case
 from bus_sim.systems.car_park.compare.table import ComparisonTable, tabulate
 from bus_sim.systems.car_park.day import ParkingDay, asked_inside, brought_in, check_together, choose_demand
@@ -71,12 +74,13 @@ def add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         metavar="PART,...",
         help=f"which of {', '.join(PARTS)} (default: all)",
     )
+    add_where_options(compare)
     compare.add_argument("--json", type=Path, metavar="FILE", help="write all tables as JSON too")
 
 
 def run_compare(args: argparse.Namespace) -> int:
     """Make the tables; the exit status. Raises ``DemandError`` for a person's mistake."""
-    seeds, parts = _seeds(args.seeds), _parts(args.parts)
+    seeds, parts, engine = _seeds(args.seeds), _parts(args.parts), engine_of(args, chunk=1)
     site = find_site(args.site)
     if not isinstance(site, CarPark):
         raise DemandError(f"{args.site}: a {site.system}, and only car parks are compared; name a car park")
@@ -87,9 +91,9 @@ def run_compare(args: argparse.Namespace) -> int:
             print("no optimum: OR-Tools is not installed; pip install 'onboard-fleet[optimum]'\n", flush=True)
             continue
         if part == "random":
-            found[part] = compare_random(site, seeds, args.cars, tuple(args.random))
+            found[part] = compare_random(site, seeds, args.cars, tuple(args.random), engine)
         elif part == "day":
-            found[part] = compare_day(site, args)
+            found[part] = compare_day(site, args, engine)
         else:
             found[part] = _compare_small(small, seeds[:MOST_CASES])
         print("\n".join([*found[part].lines(), ""]), flush=True)
@@ -100,10 +104,13 @@ def run_compare(args: argparse.Namespace) -> int:
     return 1 if any(table.faults or table.left_out for table in tables) else 0
 
 
-def compare_random(site: Site, seeds: range, cars: int, interval_s: tuple[float, float]) -> ComparisonTable:
+def compare_random(
+    site: Site, seeds: range, cars: int, interval_s: tuple[float, float], engine: Engine = map
+) -> ComparisonTable:
     """All policies on random arrivals. Raises ``DemandError`` for intervals that make no sense."""
     demands = {seed: Demand.by_mean(*interval_s, seed, count=cars) for seed in seeds}
-    plays = [_told(play(site, demands[seed], policy, seed)) for seed in seeds for policy in POLICIES]
+    wanted = [Wanted(site, demands[seed], policy, seed) for seed in seeds for policy in POLICIES]
+    plays = _all_played(wanted, engine)
     title = (
         f"{site.name}: {cars} cars in and out at intervals of {interval_s[0]:g} s +- {interval_s[1]:g} s, "
         f"seeds {seeds[0]} to {seeds[-1]}"
@@ -111,7 +118,7 @@ def compare_random(site: Site, seeds: range, cars: int, interval_s: tuple[float,
     return tabulate(title, plays, {seed: bounds_us(site, demand, seed) for seed, demand in demands.items()})
 
 
-def compare_day(site: CarPark, args: argparse.Namespace) -> ComparisonTable:
+def compare_day(site: CarPark, args: argparse.Namespace, engine: Engine = map) -> ComparisonTable:
     """All policies on a window of a real day: what comes before is played too, and not counted."""
     check_together(args)
     inside, overnight = asked_inside(args)
@@ -123,7 +130,7 @@ def compare_day(site: CarPark, args: argparse.Namespace) -> ComparisonTable:
         print(remark, file=sys.stderr, flush=True)
     seed = 1
     before = Demand(tuple(stay for stay in demand.stays if stay.arrival_us < window.end_us), demand.zero)
-    plays = [_told(play(site, before, policy, seed, window)) for policy in POLICIES]
+    plays = _all_played([Wanted(site, before, policy, seed, window) for policy in POLICIES], engine)
     return tabulate(
         f"{site.name}: {window.described(demand)}", plays, {seed: _bounds_within(site, before, window, seed)}
     )
@@ -151,6 +158,13 @@ def _compare_small(site: Site, seeds: range) -> SmallTable:
     if not cases:
         raise DemandError("--parts small: no case of these seeds could be solved; try others")
     return SmallTable(site.name, tuple(cases))
+
+
+def _all_played(wanted: list[Wanted], engine: Engine) -> list[Play]:
+    """All plays in the order of the seeds, then of the policies, whoever played them."""
+    results = shown(engine(play_wanted, wanted), len(wanted), "plays", Console(stderr=True))
+    order = {name: number for number, name in enumerate(POLICIES)}
+    return sorted(map(_told, results), key=lambda one: (one.seed, order[one.policy]))
 
 
 def _told(one: Play) -> Play:

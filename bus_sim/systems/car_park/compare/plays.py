@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from bus_sim.options import RunOptions
 from bus_sim.run import run_until
@@ -32,11 +33,16 @@ LEAD_US = 10_000_000
 PATIENCE_US = 2 * 3_600_000_000
 #: Looks at whether all is over, us.
 STEP_US = 1_000_000
+_SENT_AWAY = (VisitOutcome.FULL, VisitOutcome.TOO_LARGE, VisitOutcome.NO_CHARGING)
 
 
 @dataclass(frozen=True)
 class Play:
-    """What came of it: waiting times in us, ``left`` customers still waiting at the end, and the bus's figures."""
+    """What came of it: waiting times in us, ``left`` customers still waiting at the end, and the bus's figures.
+
+    ``parked_us`` and ``gone_us`` are when the customers of ``in_us`` and ``out_us`` were through, in the demand's time;
+    ``refused`` those who were sent away.
+    """
 
     policy: str
     seed: int
@@ -49,6 +55,9 @@ class Play:
     messages: float
     left: int
     faults: tuple[str, ...]
+    parked_us: tuple[int, ...] = ()
+    gone_us: tuple[int, ...] = ()
+    refused: int = 0
 
 
 def play(site: Site, demand: Demand, policy: str, seed: int, window: DayWindow | None = None) -> Play:
@@ -63,6 +72,21 @@ def play(site: Site, demand: Demand, policy: str, seed: int, window: DayWindow |
     finally:
         asyncio.set_event_loop(None)
         loop.close()
+
+
+class Wanted(NamedTuple):
+    """What is to be played, as one value that another process can be sent."""
+
+    site: Site
+    demand: Demand
+    policy: str
+    seed: int
+    window: DayWindow | None = None
+
+
+def play_wanted(wanted: Wanted) -> Play:
+    """Play what was wanted to its end; raises ``KeyError`` as ``play`` does."""
+    return play(*wanted)
 
 
 class _Run:
@@ -146,6 +170,9 @@ class _Run:
             fleet.messages_per_task * fleet.tasks,
             self._waiting(),
             tuple(faults),
+            tuple(one.parked_us - self._origin_us for one in parked if one.parked_us is not None),
+            tuple(one.gone_us - self._origin_us for one in served if one.gone_us is not None),
+            sum(one.outcome in _SENT_AWAY for one in visits),
         )
 
 

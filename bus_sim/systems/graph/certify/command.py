@@ -2,21 +2,27 @@
 
 import argparse
 import re
-import sys
 import time
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple, TypeVar
 
+from rich.console import Console
+
+from bus_sim.engine import Engine, add_where_options, engine_of, shown
 from bus_sim.options import RunOptions
 from bus_sim.sites import SiteNotFoundError, find_site
 from bus_sim.systems.graph.against_optimum import compare
 from bus_sim.systems.graph.certify.certificate import ROWS, Certificate, certify, count_stuck, stuck_lines
 from bus_sim.systems.graph.certify.counterexample import play_file, play_on_bus, write_counterexample
 from bus_sim.systems.graph.certify.model import GraphModel
-from bus_sim.systems.graph.certify.throughput import Pace, measure
+from bus_sim.systems.graph.certify.throughput import Pace, Throughput, measure
 from onboard.systems.graph.network import Graph, complete, grid, ring
 from onboard.systems.graph.rules import Rules
 from onboard.systems.graph.site import FactoryGraph
 
+T = TypeVar("T")
 #: Cases that are compared with the optimum at most.
 MOST_CASES = 20
 _SPEC = re.compile(r"(?:ring:(\d{1,2})|complete:(\d{1,2})|grid:(\d{1,2})x(\d{1,2}))")
@@ -62,15 +68,17 @@ def add_certify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         metavar="CASES",
         help="instead, 1 to 4 robots on a 3x3 grid on the bus: time to the last goal over the exact optimum",
     )
+    add_where_options(parser)
     parser.add_argument("--table", action="store_true", help="count the task sets that can stick on known graphs")
 
 
 def run_certify(args: argparse.Namespace) -> int:
     """The command. Raises ``SiteNotFoundError`` or ``ConfigError`` for a mistake in the command line or a file."""
+    engine = engine_of(args, chunk=1)
     if args.table:
-        return _table()
+        return _table(engine)
     if args.optimum is not None:
-        return _optimum(args.optimum)
+        return _optimum(args.optimum, engine)
     if args.play is not None and args.bus:
         rules = Rules(args.rules) if args.rules is not None else None
         return play_on_bus(args.play, rules, RunOptions(trace=args.trace, limit_s=3_600))
@@ -88,7 +96,7 @@ def run_certify(args: argparse.Namespace) -> int:
     capacity = args.capacity or (site.capacity if site is not None else robots)
     found = certify(graph, robots, rules, capacity)
     _say(found, f"{args.site}, {robots} robots, rules {rules.value}", args.counterexample, graph, rules, capacity)
-    _propose(graph, rules, capacity if args.capacity or site else None, min(args.up_to, len(graph.nodes)))
+    _propose(graph, rules, capacity if args.capacity or site else None, min(args.up_to, len(graph.nodes)), engine)
     return 0 if found.certified else 1
 
 
@@ -115,20 +123,47 @@ def _say(found: Certificate, what: str, file: Path | None, graph: Graph, rules: 
             print(f"written to {file}; play it: bus-sim certify --play {file} [--bus [--rules edge-and-node]]")
 
 
-def _propose(graph: Graph, rules: Rules, capacity: int | None, most: int) -> None:
+class _Proposal(NamedTuple):
+    """So many robots on a graph: whether they are certified, and what they do in an hour; None before it is known."""
+
+    graph: Graph
+    rules: Rules
+    room: int
+    robots: int
+    certified: bool | None = None
+    result: Throughput | None = None
+
+    def line(self) -> str:
+        """One row of the table."""
+        assert self.result is not None, "told when it is known"
+        words = {True: "yes", False: "no", None: "?"}[self.certified]
+        stuck = f"  stuck after {self.result.stuck_at_s:.0f} s" if self.result.stuck_at_s is not None else ""
+        per_hour = self.result.per_hour
+        return f"{self.robots:6}  {words:9}  {per_hour:7.1f}  {per_hour / self.robots:7.1f}{stuck}"
+
+
+def _proposed(one: _Proposal) -> _Proposal:
+    certified = certify(one.graph, one.robots, one.rules, one.room, limit=300_000).certified
+    result = measure(GraphModel(one.graph, one.rules, one.room), one.robots, _pace(one.graph))
+    return one._replace(certified=certified, result=result)
+
+
+def _propose(graph: Graph, rules: Rules, capacity: int | None, most: int, engine: Engine) -> None:
     """Throughput by number of robots, and the best that is certified."""
+    asked = [_Proposal(graph, rules, capacity or robots, robots) for robots in range(1, most + 1)]
+    found = sorted(_shown(engine(_proposed, asked), len(asked)), key=lambda one: one.robots)
     best: tuple[float, int] | None = None
     print("\nrobots  certified  tasks/h  a robot")
-    for robots in range(1, most + 1):
-        room = capacity or robots
-        certified = certify(graph, robots, rules, room, limit=300_000).certified
-        result = measure(GraphModel(graph, rules, room), robots, _pace(graph))
-        words = {True: "yes", False: "no", None: "?"}[certified]
-        stuck = f"  stuck after {result.stuck_at_s:.0f} s" if result.stuck_at_s is not None else ""
-        print(f"{robots:6}  {words:9}  {result.per_hour:7.1f}  {result.per_hour / robots:7.1f}{stuck}")
-        if certified and (best is None or result.per_hour > best[0]):
-            best = (result.per_hour, robots)
+    for one in found:
+        print(one.line())
+        result = one.result
+        if one.certified and result is not None and (best is None or result.per_hour > best[0]):
+            best = (result.per_hour, one.robots)
     print(f"proposed: {best[1]} robots, {best[0]:.1f} tasks an hour" if best else "proposed: none is certified")
+
+
+def _shown(results: Iterator[T], total: int) -> Iterator[T]:
+    return shown(results, total, "certify", Console(stderr=True))
 
 
 def _pace(graph: Graph) -> Pace:
@@ -136,26 +171,32 @@ def _pace(graph: Graph) -> Pace:
     return Pace() if max(graph.lengths_mm.values()) >= 1000 else Pace(speed_mm_s=1, load_s=0.5)
 
 
-def _optimum(cases: int) -> int:
+def _optimum(cases: int, engine: Engine) -> int:
     site = find_site("graph")
     if not isinstance(site, FactoryGraph) or not 1 <= cases <= MOST_CASES:
         raise SiteNotFoundError(f"--optimum {cases}: must be 1 to {MOST_CASES}; a case of 4 robots takes 10 s")
     print("robots  cases    mean   worst")
-    for robots in range(1, 5):
-        print(compare(site, grid(3, 3, 6000), robots, cases).line(), flush=True)
+    compared = partial(_compared, site, cases)
+    for _, line in sorted(_shown(engine(compared, range(1, 5)), 4)):
+        print(line, flush=True)
     return 0
 
 
-def _table() -> int:
+def _compared(site: FactoryGraph, cases: int, robots: int) -> tuple[int, str]:
+    return robots, compare(site, grid(3, 3, 6000), robots, cases).line()
+
+
+def _table(engine: Engine) -> int:
     print(f"{'graph':10} robots  task sets  {'rule off':>8}  {'rule on':>8}  seconds")
-    for row in ROWS:
-        began = time.perf_counter()
-        sets, off = count_stuck(row.graph, row.robots, Rules.PAPER, sample=row.sample)
-        _, on = count_stuck(row.graph, row.robots, Rules.KEEP, sample=row.sample)
-        print(
-            f"{row.name:10} {row.robots:6}  {sets:9}  {off:8}  {on:8}  {time.perf_counter() - began:7.1f}"
-            + (f"  drawn with seed {row.sample[1]}" if row.sample is not None else ""),
-            flush=True,
-        )
-    sys.stdout.flush()
+    for _, line in sorted(_shown(engine(_counted, range(len(ROWS))), len(ROWS))):
+        print(line, flush=True)
     return 0
+
+
+def _counted(number: int) -> tuple[int, str]:
+    row, began = ROWS[number], time.perf_counter()
+    sets, off = count_stuck(row.graph, row.robots, Rules.PAPER, sample=row.sample)
+    _, on = count_stuck(row.graph, row.robots, Rules.KEEP, sample=row.sample)
+    drawn = f"  drawn with seed {row.sample[1]}" if row.sample is not None else ""
+    took_s = time.perf_counter() - began
+    return number, f"{row.name:10} {row.robots:6}  {sets:9}  {off:8}  {on:8}  {took_s:7.1f}{drawn}"

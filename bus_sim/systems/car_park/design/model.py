@@ -1,0 +1,246 @@
+"""A day of a car park as a queueing model: people, bays, robots and lifts with the site's own times, no messages.
+
+The order of the bays is the compartments' own (``onboard.systems.car_park.pipeline``): who drives in is called for when
+he drives in, the next car while the bay still works, and drivers are invited after ``MOST_OUT`` cars at the latest.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from heapq import heappop, heappush
+
+from bus_sim.systems.car_park.compare.free_flow import Acts, FreeFlow
+from bus_sim.systems.car_park.demand import Demand, Stay
+from bus_sim.systems.car_park.design.fleet import FleetModel, ServedCall
+from bus_sim.systems.car_park.plant.customer import REACTION_US
+from onboard.core.site import Segment, Station
+from onboard.systems.car_park.pipeline import MOST_OUT, QUEUED_US
+from onboard.systems.car_park.site import CallAt, CarPark
+from onboard.ways.site import BayUse
+
+#: From a call until its winner's plan is known, us: the call's window, and what is said after it.
+KNOWN_AFTER_US = 400_000
+#: From the last sensor's word to the next thing that a compartment does, us.
+STEP_US = 200_000
+
+
+@dataclass
+class _Person:
+    stay: Stay
+    acts: Acts
+    arrived_us: int
+    place: Station | None = None
+    stored_us: int = 0
+    asked_us: int = 0
+
+
+@dataclass
+class Modelled:
+    """What came of a modelled day: waits, and when people were through, in us in this order; and who was busy.
+
+    ``busy`` are shares of the time from first to last event, 0 to 1: of robots, of lifts, of bays, means of each kind.
+    """
+
+    in_us: list[int] = field(default_factory=list)
+    out_us: list[int] = field(default_factory=list)
+    refused: int = 0
+    parked_us: list[int] = field(default_factory=list)
+    gone_us: list[int] = field(default_factory=list)
+    busy: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass
+class _BayModel:
+    node: int
+    front: Segment
+    use: BayUse
+    drivers: "deque[_Person]" = field(default_factory=deque)
+    askers: "deque[_Person]" = field(default_factory=deque)
+    people: int = 0
+    is_free: bool = True
+    open_us: int = 0
+    free_from_us: int = 0
+    outs: int = 0
+    is_queued: bool = False
+    enters_at_us: int | None = None
+    #: Next car to go out, called for already, and when it is set down.
+    ahead: "tuple[_Person, ServedCall] | None" = None
+    #: From when on, and for when, the next car may be called for; None while it may not.
+    ahead_ready_us: int | None = None
+    busy_us: int = 0
+
+
+class DayModel:
+    """One demand on one site; ``play`` gives what came of it."""
+
+    def __init__(self, site: CarPark, demand: Demand, seed: int) -> None:
+        self._site, self._fleet = site, FleetModel(site)
+        flow = FreeFlow.of(site)
+        self._close_us, self._open_us = flow.close_us + STEP_US, flow.open_us + STEP_US
+        uses = site.bay_uses
+        self._bays = [
+            _BayModel(node, station.segment, uses.get(node, BayUse.BOTH)) for node, station in site.compartments.items()
+        ]
+        self._bays.sort(key=lambda one: one.node)
+        self._calls_on_arrival = site.call_at is CallAt.ARRIVAL and not site.classes and not site.measures_width
+        self._events: list[tuple[int, int, Callable[[int], None]]] = []
+        self._number = 0
+        self._found = Modelled()
+        for stay in demand.stays:
+            person = _Person(stay, Acts.of(stay, seed), stay.arrival_us)
+            self._at(stay.arrival_us, partial(self._arrive, person))
+
+    def play(self) -> Modelled:
+        """All events in the order of their times."""
+        found = self._found
+        first_us = self._events[0][0] if self._events else 0
+        while self._events:
+            now_us, _, act = heappop(self._events)
+            act(now_us)
+        span_us = max([first_us + 1, *found.parked_us[-1:], *found.gone_us[-1:]]) - first_us
+        fleet = self._fleet
+        lifts = fleet.traffic.lifts.values()
+        found.busy = {
+            "robots": sum(one.busy_us for one in fleet.robots) / len(fleet.robots) / span_us,
+            "lifts": sum(one.used_us for one in lifts) / max(1, len(lifts)) / span_us,
+            "compartments": sum(one.busy_us for one in self._bays) / len(self._bays) / span_us,
+        }
+        return found
+
+    def _at(self, time_us: int, act: Callable[[int], None]) -> None:
+        self._number += 1
+        heappush(self._events, (time_us, self._number, act))
+
+    def _choose(self, closed: BayUse) -> _BayModel:
+        return min((one for one in self._bays if one.use is not closed), key=lambda one: (one.people, one.node))
+
+    # --- people ------------------------------------------------------------------------------------------------
+
+    def _arrive(self, person: _Person, now_us: int) -> None:
+        bay = self._choose(BayUse.EXIT)
+        bay.people += 1
+        bay.drivers.append(person)
+        self._look(bay, now_us)
+
+    def _ask(self, person: _Person, now_us: int) -> None:
+        bay = self._choose(BayUse.ENTRY)
+        bay.people += 1
+        person.asked_us = now_us
+        bay.askers.append(person)
+        if person.stored_us > now_us:
+            self._at(person.stored_us, lambda then_us: self._look(bay, then_us))
+        self._look(bay, now_us)
+
+    # --- a bay -------------------------------------------------------------------------------------------------
+
+    def _is_asked_for(self, bay: _BayModel, now_us: int) -> bool:
+        return bool(bay.askers) and bay.askers[0].stored_us <= now_us
+
+    def _is_drivers_turn(self, bay: _BayModel) -> bool:
+        if bay.use is BayUse.EXIT:
+            return False
+        return bay.is_queued or bay.outs >= MOST_OUT
+
+    def _look(self, bay: _BayModel, now_us: int) -> None:
+        """Something has changed: whoever is next for a free bay, or whose car can be called for."""
+        if not bay.is_free:
+            self._call_ahead(bay, now_us)
+            return
+        is_out = bay.ahead is not None or self._is_asked_for(bay, now_us)
+        was_open = now_us >= bay.free_from_us + QUEUED_US
+        if is_out and (was_open or not self._is_drivers_turn(bay)):
+            bay.outs = 0 if was_open else bay.outs
+            bay.is_queued = False
+            bay.outs += 1
+            self._begin_out(bay, now_us, now_us + self._close_us, now_us)
+            return
+        if bay.drivers:
+            enters_us = max(now_us, bay.open_us) + REACTION_US
+            if bay.enters_at_us is None or bay.enters_at_us < now_us:
+                bay.enters_at_us = enters_us
+                self._at(enters_us, lambda then_us: self._enter(bay, then_us))
+        if is_out:
+            self._at(bay.free_from_us + QUEUED_US, lambda then_us: self._look(bay, then_us) if bay.is_free else None)
+
+    def _set_free(self, bay: _BayModel, now_us: int, opens_us: int) -> None:
+        bay.is_free, bay.open_us, bay.free_from_us = True, opens_us, opens_us
+        bay.enters_at_us = bay.ahead_ready_us = None
+        self._at(opens_us, lambda then_us: self._look(bay, then_us) if bay.is_free else None)
+
+    def _enter(self, bay: _BayModel, now_us: int) -> None:
+        bay.enters_at_us = None
+        if not bay.is_free or not bay.drivers:
+            return
+        person = bay.drivers.popleft()
+        bay.is_free, bay.outs = False, 0
+        bay.is_queued = now_us - bay.free_from_us <= QUEUED_US
+        keyed_us = now_us + person.acts.drive_in_us
+        parked_us = keyed_us + STEP_US + person.acts.walk_us
+        call_us = now_us if self._calls_on_arrival else keyed_us
+        served = self._fleet.park(bay.front, call_us, parked_us + self._close_us)
+        if served is None:
+            self._found.refused += 1
+            bay.people -= 1
+            gone_us = keyed_us + person.acts.drive_out_us
+            self._at(gone_us, lambda then_us: self._set_free(bay, then_us, then_us))
+            return
+        person.place, person.stored_us = served.place, served.done_us
+        self._at(parked_us, lambda then_us: self._walk_away(bay, person, then_us))
+        bay.busy_us += served.at_bay_us + self._close_us + self._open_us - now_us
+        locked_us = served.at_bay_us + self._close_us
+        known_us = call_us + self._site.timing.call_window_us + KNOWN_AFTER_US
+        self._at(known_us, lambda then_us: self._may_call_ahead(bay, locked_us, then_us))
+        self._at(locked_us, lambda then_us: self._taken(bay, then_us))
+
+    def _walk_away(self, bay: _BayModel, person: _Person, now_us: int) -> None:
+        bay.people -= 1
+        self._found.in_us.append(now_us - person.arrived_us)
+        self._found.parked_us.append(now_us)
+        leaves_us = person.stay.departure_us
+        if leaves_us is not None:
+            self._at(max(now_us, leaves_us), lambda then_us: self._ask(person, then_us))
+
+    def _taken(self, bay: _BayModel, now_us: int) -> None:
+        """The bay is empty and locked on both sides: the next car comes in from behind, or the input door opens."""
+        bay.ahead_ready_us = None
+        if bay.ahead is not None:
+            self._begin_out(bay, now_us, now_us, now_us)
+        else:
+            self._set_free(bay, now_us, now_us + self._open_us)
+
+    def _may_call_ahead(self, bay: _BayModel, ready_us: int, now_us: int) -> None:
+        bay.ahead_ready_us = ready_us
+        self._call_ahead(bay, now_us)
+
+    def _call_ahead(self, bay: _BayModel, now_us: int) -> None:
+        ready_us = bay.ahead_ready_us
+        if ready_us is None or bay.ahead is not None or not self._is_asked_for(bay, now_us):
+            return
+        if self._site.call_at is CallAt.ARRIVAL:
+            bay.ahead = self._fetch(bay, now_us, ready_us)
+
+    def _fetch(self, bay: _BayModel, now_us: int, ready_us: int) -> "tuple[_Person, ServedCall]":
+        person = bay.askers.popleft()
+        assert person.place is not None, "who asks has parked"
+        return person, self._fleet.retrieve(person.place, bay.front, now_us, ready_us)
+
+    def _begin_out(self, bay: _BayModel, now_us: int, locked_us: int, since_us: int) -> None:
+        bay.is_free = False
+        person, served = bay.ahead or self._fetch(bay, now_us, locked_us)
+        bay.ahead, bay.ahead_ready_us = None, None
+        handed_us = max(served.at_bay_us, locked_us) + self._close_us
+        gone_us = handed_us + self._open_us + REACTION_US + person.acts.drive_out_us
+        bay.busy_us += gone_us - since_us
+        self._at(handed_us, lambda then_us: self._hand_over(bay, gone_us + self._close_us, then_us))
+        self._at(gone_us, lambda then_us: self._drive_away(bay, person, then_us))
+
+    def _hand_over(self, bay: _BayModel, ready_us: int, now_us: int) -> None:
+        if not self._is_drivers_turn(bay):
+            self._may_call_ahead(bay, ready_us, now_us)
+
+    def _drive_away(self, bay: _BayModel, person: _Person, now_us: int) -> None:
+        bay.people -= 1
+        self._found.out_us.append(now_us - person.asked_us)
+        self._found.gone_us.append(now_us)
+        self._set_free(bay, now_us, now_us)
