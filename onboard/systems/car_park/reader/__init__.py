@@ -12,7 +12,7 @@ from onboard.systems.car_park.reader.constants import read_constants
 from onboard.systems.car_park.reader.machines import read_fleet, read_stewards
 from onboard.systems.car_park.reader.positions import BASE
 from onboard.systems.car_park.reader.whole import check_whole, sound_tracks
-from onboard.systems.car_park.site import CallAt, CarPark, RideCalls
+from onboard.systems.car_park.site import CallAt, CarPark, DeskPolicy, RideCalls
 from onboard.ways.site import BayUse, charted
 
 
@@ -34,6 +34,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
     negotiation = root.table("negotiation")
     rides = RideCalls(negotiation.choice("rides", [one.value for one in RideCalls], "planned"))
     call_at = CallAt(negotiation.choice("call_at", [one.value for one in CallAt], "arrival"))
+    desk = DeskPolicy(negotiation.choice("desk", [one.value for one in DeskPolicy], "any"))
     tells_offers = negotiation.choice("offers", ["kept", "told"], "kept") == "told"
     timing = replace(timing, sub_call_percent=negotiation.integer("sub_call_percent", 20, 80, 50))
     root.check_unknown()
@@ -58,6 +59,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
         timing=timing,
         rides=rides,
         call_at=call_at,
+        desk=desk,
         tells_offers=tells_offers,
         bay_uses={bay.node: bay.use for bay in bays if bay.use is not BayUse.BOTH},
         classes=classes,
