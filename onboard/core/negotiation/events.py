@@ -60,8 +60,6 @@ class RequestedTerms:
     detail: tuple[Message, ...] = ()
     #: What nobody can be better than, where the initiator knows it: a bid below it is no bid.
     floor: Callable[[CallForProposals, int], int] | None = field(default=None, compare=False)
-    #: What it costs the initiator itself, where it can do the task too: its own bid, said right behind the call.
-    own: Callable[[CallForProposals, int], int] | None = field(default=None, compare=False)
 
 
 class SubCallAnswer(NamedTuple):

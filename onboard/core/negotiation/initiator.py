@@ -184,15 +184,7 @@ class Initiator:
         last = self.attempt >= self.timing.max_attempts
         self.left_out = self.trust.left_out(terms.task, now_us, last_attempt=last) | self.left_out_above
         before = [*left_out_words(self.node_id, self.call.call, self.left_out), *self.terms.detail]
-        return [*(Send(message) for message in before), Send(self.call), *self._bid_myself(now_us)]
-
-    def _bid_myself(self, now_us: int) -> list[Effect]:
-        """Where I can do the task too, others hear at once what they have to beat."""
-        assert self.call is not None
-        if self.terms.own is None:
-            return []
-        cost = self.bids[self.node_id] = self.terms.own(self.call, now_us)
-        return [Send(Bid(self.node_id, self.node_id, self.call.call, cost, 0))]
+        return [*(Send(message) for message in before), Send(self.call)]
 
     def on_bid(self, bid: Bid, now_us: int) -> Outcome:
         """A bid counts if received before the deadline minus the guard, by my own bus time (decision on flag 11)."""
@@ -303,11 +295,8 @@ class Initiator:
     # --- actions -----------------------------------------------------------------------------------------------
 
     def decide(self, now_us: int) -> Outcome:
-        """The best bid has won; in the silent form everybody is taken to know that, and I know of my own."""
-        if self.silent:
-            return self._fire(InitiatorEvent.HEARD, now_us)
-        is_mine = self.best is not None and self.best[1] == self.node_id
-        return self.award(now_us) + (self._fire(InitiatorEvent.HEARD, now_us) if is_mine else [])
+        """The best bid has won; in the silent form everybody is taken to know that."""
+        return self._fire(InitiatorEvent.HEARD, now_us) if self.silent else self.award(now_us)
 
     def award(self, now_us: int) -> Outcome:
         """Say who has won.

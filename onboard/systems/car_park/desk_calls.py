@@ -23,7 +23,7 @@ from onboard.contract.codes import (
     TaskPhase,
 )
 from onboard.contract.constants import ANY_STATION, NOBODY, OUTSIDE, TASK_VERSION_BITS
-from onboard.contract.messages import Award, CallForProposals, Message, Reference, TaskReport
+from onboard.contract.messages import Award, Bid, CallForProposals, Message, Reference, TaskReport
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.negotiation import EVENT_TYPES, Awarded, Closed, RequestedTerms
 from onboard.core.negotiation.winners import patience_us
@@ -171,6 +171,7 @@ class DeskCalls:
         for car, one in list(self.asked.items()):
             if one.winner and not one.since_us:
                 one.since_us = now_us
+            effects += self._hear_myself(one, now_us)
             if self._is_lost(car, one, now_us):
                 effects += self._free(car, one, Reason.NODE_SILENT, now_us)
             elif one.winner and self._is_off(one, now_us) and not one.is_told_off:
@@ -229,9 +230,25 @@ class DeskCalls:
             load_mm=self.fleet.mirror.cars[car].wheelbase_mm,
             task_version=one.version,
             floor=self.generation.floor,
-            own=self.generation.cost if self.generation.may_take else None,
         )
-        return list(self.fleet.negotiation.open(terms, now_us))
+        said = list(self.fleet.negotiation.open(terms, now_us))
+        calls = [effect.message for effect in said if isinstance(effect, Send)]
+        mine = [call for call in calls if isinstance(call, CallForProposals)] if self.generation.may_take else []
+        for call in mine:
+            # Others hear at once what they have to beat.
+            bid = Bid(call.sender, call.sender, call.call, self.generation.cost(call, now_us), 0)
+            self.fleet.negotiation.receive(bid, now_us)
+            said.append(Send(bid))
+        return said
+
+    def _hear_myself(self, one: AskedTicket, now_us: int) -> list[Effect]:
+        """An own call that this machine has won itself is over with its award."""
+        node, negotiation = self.fleet.node_id, self.fleet.negotiation
+        if not one.is_open or negotiation.trust.winner(one.task) != node:
+            return []
+        heard = TaskReport(node, one.task, TaskPhase.AWARDED, self.outputs.bay.number, Reason.NONE)
+        outcome = negotiation.receive(heard, now_us)
+        return [effect for event in outcome if isinstance(event, Closed) for effect in self.closed(event, now_us)]
 
     def _free(self, car: Reference, one: AskedTicket, reason: Reason, now_us: int) -> list[Effect]:
         """Whoever had it has it no more, and it is called for anew: noted before anybody hears of it."""
