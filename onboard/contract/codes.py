@@ -247,6 +247,7 @@ class DeskText(IntEnum):
     NO_CHARGING = 9
     TOO_MANY_TRIES = 10
     INSERT_AGAIN = 11
+    GO_TO = 12
 
 
 class DriveMode(IntEnum):

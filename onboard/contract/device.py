@@ -94,6 +94,8 @@ class DeskOrder(Message):
     #: ``origin``: Node-ID that named the car; 0 with number 0: none. 0 to 255.
     #: ``number``: Serial number of the car at its origin; 0 with origin 0: none. 0 to 65535.
     car: Reference
+    #: With GO_TO the node-ID of the compartment to which the car is brought, else 0. 0 to 250.
+    compartment: int = 0
 
 
 @message(frozen=True, slots=True)

@@ -46,6 +46,7 @@ _LIGHT_COLOUR = tuple(LightColour)
 _SHUTTLE_ACTION = tuple(ShuttleAction)
 _SHUTTLE_MODE = tuple(ShuttleMode)
 _SIDE = tuple(Side)
+_FROM_0_TO_250_AT_12 = {value: value << 12 for value in range(251)}
 _FROM_0_TO_255_AT_2 = {value: value << 2 for value in range(256)}
 _FROM_0_TO_255_AT_4 = {value: value << 4 for value in range(256)}
 _PACK_BBBIX = struct.Struct("<BBBIx").pack
@@ -129,27 +130,32 @@ def unpack_light_order(sender: int, data: bytes) -> LightOrder | None:
 def pack_desk_order(message: DeskOrder) -> bytes:
     car = message.car
     car_number = car[1]
-    if car_number > 65535:
+    if car_number < 0 or car_number > 65535:
         raise OutOfRangeError("DeskOrder.car_number", car_number, 0, 65535)
     try:
-        return _PACK_BIXXX(message.sequence, message.text + _FROM_0_TO_255_AT_4[car[0]] + car_number * 0x1000)
+        return _PACK_BHIX(
+            message.sequence,
+            message.text + _FROM_0_TO_255_AT_4[car[0]] + (car_number & 0xF) * 0x1000,
+            (car_number >> 4) + _FROM_0_TO_250_AT_12[message.compartment],
+        )
     except (KeyError, struct.error) as error:
         raise refusal(
-            message,
-            ("DeskOrder.sequence", 0, 255),
-            ("DeskOrder.car.origin", 0, 255),
-            ("DeskOrder.car.number", 0, 65535),
+            message, ("DeskOrder.sequence", 0, 255), ("DeskOrder.car.origin", 0, 255), ("DeskOrder.compartment", 0, 250)
         ) from error
 
 
 def unpack_desk_order(sender: int, data: bytes) -> DeskOrder | None:
-    sequence, word_1 = _UNPACK_BIXXX(data)
-    text = word_1 & 0xF
-    if text > 11:
+    (word_0,) = _UNPACK_Q(data)
+    sequence = word_0 & 0xFF
+    text = word_0 >> 8 & 0xF
+    if text > 12:
         return None
-    car_origin = word_1 >> 4 & 0xFF
-    car_number = word_1 >> 12 & 0xFFFF
-    return DeskOrder(sender, sequence, _DESK_TEXT[text], _new(Reference, (car_origin, car_number)))
+    car_origin = word_0 >> 12 & 0xFF
+    car_number = word_0 >> 20 & 0xFFFF
+    compartment = word_0 >> 36 & 0xFF
+    if compartment > 250:
+        return None
+    return DeskOrder(sender, sequence, _DESK_TEXT[text], _new(Reference, (car_origin, car_number)), compartment)
 
 
 def pack_state_request(message: StateRequest) -> bytes:

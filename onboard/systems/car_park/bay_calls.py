@@ -24,7 +24,7 @@ from onboard.core.negotiation import EVENT_TYPES
 from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Station
 from onboard.systems.car_park import bay_task, custody
-from onboard.systems.car_park.bay_memory import BayMemory, ahead_over_record, ahead_record, job_record
+from onboard.systems.car_park.bay_memory import BayMemory, ahead_over_record, ahead_record, job_over_record, job_record
 from onboard.systems.car_park.bay_task import REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask
 from onboard.systems.car_park.site import open_end
 from onboard.systems.car_park.stewardship import Stewardship
@@ -240,6 +240,25 @@ class BayCalls:
         """The car of the next task has left from another bay."""
         ahead, self.ahead = self.ahead, None
         return [] if ahead is None else [ahead_over_record(ahead.task)]
+
+    def outs(self) -> int:
+        """How many cars that go out are in hand."""
+        return sum(task.operation is Operation.RETRIEVE for task in self.in_hand())
+
+    def give_up(self, car: Reference | None, phase: BayPhase, now_us: int) -> tuple[list[Effect], bool]:
+        """A car goes out at another bay: whoever has won to fetch it here hears so; whether the bay waited for it."""
+        task = None if car is None else self.of_car(car)
+        is_job, waits = task is self.job, phase in (BayPhase.LOCKING, BayPhase.AWAITING)
+        if task is None or task.operation is not Operation.RETRIEVE or (is_job and (task.was_granted or not waits)):
+            return [], False
+        over = job_over_record() if is_job else ahead_over_record(task.task)
+        if is_job:
+            self.job = None
+        else:
+            self.ahead = None
+        outcome = self.fleet.negotiation.abandon(task.task, Reason.CANCELLED, now_us)
+        said = [item for item in outcome if not isinstance(item, EVENT_TYPES)]
+        return [over, *said, Send(bay_task.void_award(self.fleet.node_id, task.task))], is_job
 
     def bay_came_back(self, now_us: int, *, is_loaded: bool) -> tuple[BayPhase | None, list[Effect]]:
         """The robot that had the bay gives it back: the next phase, None while it has the car or sensors are behind.

@@ -1,21 +1,32 @@
 """The compartment's task-generation function: when could this bay receive a car for its customer?
 
-Independent of the others' plans (row P21), unlike the robot's: it knows only its own doors and its own queue.
+Independent of the others' plans (row P21), unlike the robot's: it knows only its own doors and its own queue, and where
+the site lets the car come to the compartment that suits it (``DeskPolicy``) the way of the car to each bay.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from onboard.contract.codes import Criterion, Operation
 from onboard.contract.messages import CallForProposals
-from onboard.core.negotiation import Proposal
+from onboard.core.negotiation import Awarded, CallKey, NegotiationEvent, PreAssigned, Proposal, Released
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine
-from onboard.systems.car_park.site import CarPark
+from onboard.systems.car_park.site import CarPark, DeskPolicy
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.site import BayUse
 
 #: A driver gets in and drives out within this, us: 10 to 30 s (constants of the SimPy study in the systems list).
 DRIVER_US = 20_000_000
+#: Each car that a bay has before another makes it as much less suitable as a way so much longer, us. Not the time that
+#: one takes there: its robot, for which most customers wait, may well come from beside this bay (docs/figures.md).
+BEFORE_US = 5_000_000
+#: A bay takes no more cars that another could have: the one that it works for, and the next, which it calls for
+#: meanwhile.
+MOST_TAKEN = 2
+#: Where cars come out at which they came in, any other bay is worse by this than whatever is between two, us.
+NOT_OWN_US = 3_600_000_000
 #: The operating sequence for a car that is to be given out, in the order of its steps.
 PROGRAM = (
     "turn the light red",
@@ -31,26 +42,89 @@ PROGRAM = (
 
 @dataclass
 class BayGeneration:
-    """Estimates for calls of operation RECEIVE. ``is_free`` and ``queue`` are kept up to date by the compartment."""
+    """Estimates for calls of operation RECEIVE. ``is_free`` and ``queue`` are kept up to date by the compartment.
+
+    ``least_ms`` is when a car can be at a bay at the earliest (bus ms), by a call to fetch it there.
+    """
 
     site: CarPark
     machine: Machine
+    least_ms: Callable[[CallForProposals, int], int]
     is_free: bool = False
     queue: int = 0
+    #: Cars to be handed out here, and calls in which a bid for one more stands.
+    taken: int = 0
+    tentative: set[CallKey] = field(default_factory=set)
 
     def floor(self, call: CallForProposals, now_us: int) -> int:
-        """A free bay has only to lock its input door (bus ms)."""
-        return to_bus_ms(from_bus_ms(call.deadline_ms, now_us) + self.site.timing.door_us)
+        """A free bay has only to lock its input door, and is the one that the car comes to soonest (bus ms)."""
+        ready_us = self._ready_us(call, now_us)
+        bays = self.exits() if self._is_by_way(call) else []
+        return to_bus_ms(min((self._there_us(call, node, now_us) for node in bays), default=ready_us))
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
-        """When this bay stands locked and empty (bus ms), or None for anything but RECEIVE."""
+        """When this bay stands locked and empty (bus ms), or None for anything but RECEIVE.
+
+        For a car that may go to any bay: when it is here, and later by what those before it and the site's policy cost.
+        """
         if self.site.bay_uses.get(self.machine.node_id) is BayUse.ENTRY:
             return None
         if call.operation is not Operation.RECEIVE or call.criterion is not Criterion.FINISH_TIME:
             return None
-        ready_us = from_bus_ms(call.deadline_ms, now_us) + self.site.timing.door_us
-        cycles = self.queue + (0 if self.is_free else 1)
-        return to_bus_ms(ready_us + cycles * self._cycle_us())
+        before = self.queue + (0 if self.is_free else 1)
+        if self.site.desk is DeskPolicy.NEAREST and not self._has_room(CallKey(call.sender, call.call)):
+            return None
+        if not self._is_by_way(call):
+            return to_bus_ms(self._ready_us(call, now_us) + before * self._cycle_us())
+        me = self.machine.node_id
+        if self.site.desk is DeskPolicy.OWN and call.car.origin == me:
+            return self.floor(call, now_us)
+        return to_bus_ms(self._there_us(call, me, now_us) + before * BEFORE_US)
+
+    def cost(self, call: CallForProposals, now_us: int) -> int:
+        """The bid of this bay in an own call of its desk (bus ms); only where it gives cars out."""
+        found = self.lower_bound(call, now_us)
+        assert found is not None, "a compartment where cars only come in bids for none"
+        return found
+
+    @property
+    def may_take(self) -> bool:
+        """Whether the desk of this bay bids in its own calls."""
+        has_room = self.site.desk is DeskPolicy.OWN or self._has_room(None)
+        return has_room and self.machine.node_id in self.exits()
+
+    def note(self, event: NegotiationEvent) -> None:
+        """A bid stands, or does no more: what may be won counts as taken."""
+        if isinstance(event, PreAssigned):
+            self.tentative.add(event.call_key)
+        elif isinstance(event, Released | Awarded):
+            self.tentative.discard(event.call_key)
+
+    def _has_room(self, call: CallKey | None) -> bool:
+        return self.taken + len(self.tentative - {call}) < MOST_TAKEN
+
+    def exits(self) -> list[int]:
+        """Compartments that give cars out."""
+        return [node for node in self.site.compartments if self.site.bay_uses.get(node) is not BayUse.ENTRY]
+
+    def _is_by_way(self, call: CallForProposals) -> bool:
+        """Whether the site lets a car come to the bay that suits it, and it stands at a place."""
+        return self.site.desk is not DeskPolicy.ANY and call.from_station in self._place_numbers
+
+    @cached_property
+    def _place_numbers(self) -> frozenset[int]:
+        return frozenset(place.number for place in self.site.places)
+
+    def _there_us(self, call: CallForProposals, node: int, now_us: int) -> int:
+        """When the car can be at the bay of ``node``, nobody in its way and nobody before it there, bus us."""
+        bay = self.site.compartments[node].number
+        fetched = replace(call, operation=Operation.RETRIEVE, to_station=bay, ready_ms=0)
+        there_us = from_bus_ms(self.least_ms(fetched, now_us), now_us)
+        is_other = self.site.desk is DeskPolicy.OWN and node != call.car.origin
+        return there_us + (NOT_OWN_US if is_other else 0)
+
+    def _ready_us(self, call: CallForProposals, now_us: int) -> int:
+        return from_bus_ms(call.deadline_ms, now_us) + self.site.timing.door_us
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
         """The same as the bound: nothing that others plan changes it. The program is what the bay will do."""

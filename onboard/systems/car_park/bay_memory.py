@@ -23,7 +23,10 @@ from onboard.systems.car_park.records import (
     BayFreeRecord,
     BayJobRecord,
     CarAtRecord,
+    DeskForRecord,
     NumberRecord,
+    ReceivedRecord,
+    TicketGoneRecord,
     TicketRecord,
     WinnerRecord,
 )
@@ -98,6 +101,9 @@ _READ = (
     WinnerRecord,
     RetiredRecord,
     TicketRecord,
+    DeskForRecord,
+    ReceivedRecord,
+    TicketGoneRecord,
     BayJobRecord,
     AheadRecord,
     AheadOverRecord,
@@ -118,6 +124,10 @@ class BayMemory:
     #: For which task, and under which version of it, somebody may fetch a car, or might.
     tasks: dict[Reference, tuple[Reference, int]] = field(default_factory=dict)
     tickets: deque[Reference] = field(default_factory=deque)
+    #: Tickets read here: task, version, and the compartment that has taken it (``DeskForRecord``).
+    desks: dict[Reference, tuple[Reference, int, int]] = field(default_factory=dict)
+    #: Tickets read elsewhere that are served here: their task and its version.
+    received: dict[Reference, tuple[Reference, int]] = field(default_factory=dict)
     #: The last number that was given to a car or a task; 0 before any.
     number: int = 0
     #: Task, operation, car and wheelbase of the task in hand, or None.
@@ -144,14 +154,21 @@ class BayMemory:
             case CarAtRecord(car=car):
                 self.cars[car] = CarAt(self.node_id, car, record.station, record.version, record.wheelbase_mm)
                 self.winners.pop(car, None)
-                if record.station == OUTSIDE and car in self.tickets:
-                    self.tickets.remove(car)
+                if record.station == OUTSIDE:
+                    self._forget_ticket(car)
             case WinnerRecord():
                 self._take_winner(record)
             case RetiredRecord():
                 self._forget(record.load)
             case TicketRecord():
                 queue_ticket(self.tickets, record.car, urgent=record.urgent)
+                self.desks.pop(record.car, None)
+            case DeskForRecord():
+                self.desks[record.car] = record.task, record.version, record.winner
+            case ReceivedRecord():
+                self.received[record.car] = record.task, record.version
+            case TicketGoneRecord():
+                self._forget_ticket(record.car)
             case _:
                 self._take_task(record)
 
@@ -192,8 +209,12 @@ class BayMemory:
 
     def _forget(self, car: Reference) -> None:
         """It left long ago."""
-        for table in (self.cars, self.winners, self.tasks):
+        for table in (self.cars, self.winners, self.tasks, self.desks):
             table.pop(car, None)
+        self._forget_ticket(car)
+
+    def _forget_ticket(self, car: Reference) -> None:
+        self.received.pop(car, None)
         if car in self.tickets:
             self.tickets.remove(car)
 

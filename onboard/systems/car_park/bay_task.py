@@ -95,6 +95,11 @@ class BayTask:
         """Whether it is a car that nobody came to park: its driver may have it, and while he does not it is a task."""
         return self.operation is Operation.PARK and self.refusals > 0
 
+    @property
+    def may_be_given_back(self) -> bool:
+        """Whether nobody is asked for just now to park it: its driver may have it at once."""
+        return self.is_given_back and self.retry_at_us is not None
+
     def has_left(self, bay: BayState, mirror: WayMirror) -> bool:
         """Whether its car is gone: out with the driver who brought it, or from another bay."""
         return is_gone(self.car, mirror) or (self.operation is Operation.PARK and not bay.load_kg)

@@ -7,6 +7,7 @@ the input door is locked and the robot stands before it (docs/decisions.md, flag
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 from onboard.contract.codes import (
     CallResult,
@@ -51,13 +52,13 @@ from onboard.systems.car_park.bay_memory import (
     BayMemory,
     job_over_record,
     job_record,
-    ticket_record,
 )
 from onboard.systems.car_park.bay_task import (
     DESK_INPUT,
     BayPhase,
     BayTask,
 )
+from onboard.systems.car_park.desk_calls import DeskCalls
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.outputs import BayOutputs
 from onboard.systems.car_park.pipeline import Pipeline
@@ -88,6 +89,7 @@ class Compartment:
     outputs: BayOutputs = field(init=False)
     slot: TicketSlot = field(init=False)
     calls: BayCalls = field(init=False)
+    desks: DeskCalls = field(init=False)
     pipeline: Pipeline = field(init=False)
     _key: DeskInput | None = None
     _robot_waits: bool = False
@@ -105,6 +107,7 @@ class Compartment:
         self.calls = BayCalls(self.fleet, self.station, self.stewardship, self.memory, self._robots.floor, self._on_won)
         self.calls.take_up()
         self.pipeline = Pipeline(self.fleet, self._park, self.calls, self.memory, self.tickets, self.outputs)
+        self.desks = DeskCalls(self.fleet, self._park, self.memory, self.generation, self.outputs, self.tickets)
         self._table: dict[BayPhase, Callable[[int], list[Effect]]] = {
             BayPhase.STARTING: self._when_starting,
             BayPhase.FREE: self._when_free,
@@ -159,14 +162,18 @@ class Compartment:
             self.bay = message
             return self.outputs.again(message, now_us)
         if isinstance(message, DeskEvent | TicketRead):
-            return self.slot.take(message, now_us, self._at_desk)
+            return self.slot.take(message, now_us, partial(self._at_desk, now_us=now_us))
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Awards tell who may fetch a stored car; a car given into my custody is stated anew; an operator's press."""
+        answered, lost = self.desks.hear(message, now_us)
+        if answered or lost is not None:
+            given_up, waited = self.calls.give_up(lost, self.phase, now_us)
+            return answered + given_up + (self._to_free() if waited else [])
         if isinstance(message, OperatorOrder) and message.compartment == self.fleet.node_id:
             urgent = message.action is OperatorAction.URGENT_TICKET
-            return self._at_desk(DESK_INPUT[message.action], message.car, urgent=urgent)
+            return self._at_desk(DESK_INPUT[message.action], message.car, now_us, urgent=urgent)
         if isinstance(message, TaskReport):
             is_starting, heard = self.phase is BayPhase.STARTING, self.stewardship.hear(message, now_us)
             return heard + self.calls.on_report(message, now_us, is_starting=is_starting)
@@ -177,11 +184,15 @@ class Compartment:
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """An own call closed: note the winner, or tell why not. Awarded a RECEIVE: the car is fetched to this bay."""
+        self.generation.note(event)
         if isinstance(event, Awarded):
             steps = Report("program: " + "; ".join(event.proposal.program))
-            return [steps, self._accepts(event.call.task), *self._take_ticket(event.call.car)]
+            noted = [*self.desks.won(event), *self._take_ticket(event.call.car, now_us, mine=True)]
+            return [steps, *noted, self.desks.accepts(event.call.task)]
         if isinstance(event, AwardedAgain):
-            return [self._accepts(event.call.task)]
+            return [self.desks.accepts(event.call.task)]
+        if isinstance(event, Closed) and event.call.operation is Operation.RECEIVE:
+            return self.desks.closed(event, now_us)
         task = self.calls.named(event.call.task) if isinstance(event, Closed) else None
         if not isinstance(event, Closed) or task is None:
             return []
@@ -191,9 +202,6 @@ class Compartment:
             # The winner gave the task back before it began: it is called anew, by the custodian of the car.
             return self.calls.call_again(task, now_us)
         return self._refused(task, event.reason, now_us)
-
-    def _accepts(self, task: Reference) -> Effect:
-        return Send(TaskReport(self.fleet.node_id, task, TaskPhase.AWARDED, self.station.number, Reason.NONE))
 
     def _on_won(self, task: BayTask) -> None:
         if task is self.job:
@@ -219,7 +227,8 @@ class Compartment:
 
     def advance(self, now_us: int) -> list[Effect]:
         """One step of the phase table, where its condition is met."""
-        effects = self.calls.review(now_us)
+        self.generation.taken = self.calls.outs() + len(self.tickets)
+        effects = self.calls.review(now_us) + self.desks.review(now_us)
         if self.doors is None or self.bay is None:
             return effects
         return effects + self._table[self.phase](now_us) + self.pipeline.look_ahead(self.phase, now_us)
@@ -227,7 +236,7 @@ class Compartment:
     def next_wake(self) -> int | None:
         """When a refused call is made again, or a winner counts as lost."""
         waits = self.phase in (BayPhase.AWAITING, BayPhase.HANDOVER)
-        times = self.calls.next_wake(is_job_asked=waits), self.pipeline.next_wake(self.phase)
+        times = self.calls.next_wake(is_job_asked=waits), self.pipeline.next_wake(self.phase), self.desks.next_wake()
         return min((one for one in times if one is not None), default=None)
 
     def looks_from(self) -> int:
@@ -240,31 +249,20 @@ class Compartment:
 
     def statements(self, now_us: int) -> list[Effect]:
         """The cars in my custody and the tokens that I hold."""
-        return self.stewardship.car_statements() + self.fleet.tokens.statements()
+        return self.stewardship.car_statements() + self.fleet.tokens.statements() + self.desks.statements()
 
     # --- the desk ----------------------------------------------------------------------------------------------
 
-    def _at_desk(self, event: DeskInput, car: Reference, *, urgent: bool = False) -> list[Effect]:
+    def _at_desk(self, event: DeskInput, car: Reference, now_us: int, *, urgent: bool = False) -> list[Effect]:
         if event in bay_task.KEYS:
             self._key = event
             return []
         # Whoever cancels wants the car back at once: the same as coming for it.
-        return self._take_ticket(car, urgent=urgent)
+        return self._take_ticket(car, now_us, urgent=urgent)
 
-    def _take_ticket(self, car: Reference, *, urgent: bool = False) -> list[Effect]:
-        record = self.fleet.mirror.cars.get(car)
-        if record is None or record.station == OUTSIDE:
-            return [self.outputs.show(DeskText.UNKNOWN_TICKET, car)]
-        job = self.job if self.job is not None and self.job.car == car else None
-        if self._use is BayUse.ENTRY and job is None:
-            return [self.outputs.show(DeskText.OUT_OF_ORDER, car)]
-        about = self.calls.of_car(car)
-        in_hand = about is not None and about.operation is Operation.RETRIEVE
-        new = not in_hand and bay_task.queue_ticket(self.tickets, car, urgent=urgent)
-        noted: list[Effect] = [ticket_record(car, urgent=urgent)] if new else []
-        if job is not None and job.is_given_back and job.retry_at_us is not None:
-            return noted + self._give_back(job)
-        return [*noted, self.outputs.show(DeskText.PLEASE_WAIT, car)]
+    def _take_ticket(self, car: Reference, now_us: int, *, urgent: bool = False, mine: bool = False) -> list[Effect]:
+        job, taken = self.job, self.desks.take(car, self.calls, now_us, urgent=urgent, mine=mine)
+        return taken + (self._give_back(job) if job is not None and job.car == car and job.may_be_given_back else [])
 
     # --- the phases --------------------------------------------------------------------------------------------
 

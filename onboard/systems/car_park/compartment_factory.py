@@ -8,9 +8,11 @@ from onboard.core.negotiation import Estimator
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park.bay_generation import BayGeneration
 from onboard.systems.car_park.compartment import Compartment
+from onboard.systems.car_park.generation import CarParkGeneration
+from onboard.systems.car_park.program import Program
 from onboard.systems.car_park.site import car_park
 from onboard.systems.car_park.tickets import TicketCodes
-from onboard.ways.mirror import WayFleet, way_fleet
+from onboard.ways.mirror import WayFleet, way_fleet, way_mirror
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,9 @@ class CompartmentFactory(BehaviourFactory):
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> BayGeneration:
         """What a task at the bay costs: a compartment bids to receive cars."""
-        return BayGeneration(car_park(site), machine)
+        park = car_park(site)
+        robots = CarParkGeneration(park, machine, way_mirror(mirror), Program(park))
+        return BayGeneration(park, machine, robots.floor)
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Compartment:
         """The compartment's steps; ``estimator`` is the one made above."""

@@ -8,6 +8,7 @@ which do nothing when they come twice; a desk that hears the number of its last 
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import DeskText, DoorAction, DoorName, DoorPosition, LightColour, Reason
+from onboard.contract.constants import NOBODY
 from onboard.contract.messages import BayState, DeskOrder, DoorOrder, DoorState, LightOrder, Reference, TicketPrint
 from onboard.core.authority import TokenKey
 from onboard.core.effects import Effect, Record, Tell
@@ -65,10 +66,10 @@ class BayOutputs:
         is_away = (door, action) in _INTO_THE_BAY and not self.motion.tokens.is_mine_by_journal(self.bay)
         return authorised(self.motion, ALONE, Reason.TOKEN_HELD_BY_OTHER if is_away else Reason.NONE)
 
-    def show(self, text: DeskText, car: Reference) -> Effect:
-        """What the desk is to show, printing aside."""
+    def show(self, text: DeskText, car: Reference, compartment: int = NOBODY) -> Effect:
+        """What the desk is to show, printing aside; GO_TO names the compartment to which the car comes."""
         self._print = []
-        return self._order_desk(self._next(), text, car)
+        return self._order_desk(self._next(), text, car, compartment)
 
     def prepare_ticket(self, car: Reference) -> list[Effect]:
         """The code goes before all else, so that it is there when what the ticket stands for is on the disk."""
@@ -83,8 +84,8 @@ class BayOutputs:
         """The same ticket once more: a code does not change."""
         return [*self.prepare_ticket(car), self.print_ticket(car)]
 
-    def _order_desk(self, sequence: int, text: DeskText, car: Reference) -> Effect:
-        self._desk, self._desk_left = DeskOrder(self.node_id, sequence, text, car), DESK_TIMES
+    def _order_desk(self, sequence: int, text: DeskText, car: Reference, compartment: int = NOBODY) -> Effect:
+        self._desk, self._desk_left = DeskOrder(self.node_id, sequence, text, car, compartment), DESK_TIMES
         self._unheard.ordered("desk")
         return Tell(self._desk)
 

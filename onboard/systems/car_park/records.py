@@ -155,13 +155,44 @@ class WinnerRecord(CarRecord):
 
 @dataclass(frozen=True, slots=True)
 class TicketRecord(JournalRecord):
-    """A ticket came; an urgent one goes before those that wait."""
+    """A ticket came, or is this bay's to serve; an urgent one goes before those that wait."""
 
     NAME = "ticket"
-    RULES = (Keep("ticket", _CAR, Which.ALL),)
+    RULES = (Keep("ticket", _CAR, Which.ALL), RecordEnd(("desk_for",), _CAR))
 
     car: Reference
     urgent: bool = field(default=False, metadata=UNSAID)
+
+
+@dataclass(frozen=True, slots=True)
+class DeskForRecord(CarRecord):
+    """A ticket read here is called for under ``version`` of a task, and which compartment has taken it; 0: none yet."""
+
+    NAME = "desk_for"
+    RULES = (Keep("desk_for", _CAR),)
+
+    task: Reference
+    version: int
+    winner: int
+
+
+@dataclass(frozen=True, slots=True)
+class ReceivedRecord(CarRecord):
+    """A ticket that was read at another desk is this compartment's, for a task of that desk."""
+
+    NAME = "received"
+    RULES = (Keep("received", _CAR),)
+
+    task: Reference
+    version: int
+
+
+@dataclass(frozen=True, slots=True)
+class TicketGoneRecord(CarRecord):
+    """That desk has given the ticket to another compartment."""
+
+    NAME = "ticket_gone"
+    RULES = (RecordEnd(("ticket", "received"), _CAR),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,6 +300,9 @@ RECORDS: RecordTypes = (
     CarAtRecord,
     WinnerRecord,
     TicketRecord,
+    DeskForRecord,
+    ReceivedRecord,
+    TicketGoneRecord,
     BayJobRecord,
     AheadRecord,
     AheadOverRecord,

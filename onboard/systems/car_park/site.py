@@ -118,6 +118,18 @@ class RestAt(Enum):
     DEMAND = "demand"
 
 
+class DeskPolicy(Enum):
+    """To which compartment a car is fetched, whichever desk has read its ticket.
+
+    ANY: to that desk's own. NEAREST: to the one that suits it, by its way there and by who waits there. OWN: to the one
+    at which it came in; where that is off, or gives no cars out, to the one that suits it.
+    """
+
+    ANY = "any"
+    NEAREST = "nearest"
+    OWN = "own"
+
+
 @dataclass(frozen=True, kw_only=True)
 class CarPark(WaySite):
     """A robotized car park (rows P30 to P33)."""
@@ -139,6 +151,7 @@ class CarPark(WaySite):
     rides: RideCalls = RideCalls.PLANNED
     call_at: CallAt = CallAt.ARRIVAL
     rest_at: RestAt = RestAt.NEAREST
+    desk: DeskPolicy = DeskPolicy.ANY
     #: Whether a bid brings its tentative itinerary: to be seen, as in the paper; nobody plans around it.
     tells_offers: bool = False
     #: In the order in which a car is tried against them; numbers are from 1.

@@ -135,8 +135,15 @@ class WaitingStory:
             return
         if award.result is CallResult.AWARDED:
             story.owner = award.winner
+            if story.operation is Operation.RECEIVE and story.owner == story.caller:
+                self._is_received(story, self._now_us or story.begin_us)
         else:
             story.result, story.reason = award.result, award.reason
+
+    def _is_received(self, story: TaskStory, time_us: int) -> None:
+        """It is known where a load is handed out: whoever does it calls for that under a task of its own."""
+        story.phases.setdefault(TaskPhase.DONE, time_us)
+        self._end(story, time_us)
 
     def _on_report(self, report: TaskReport, time_us: int) -> None:
         story = self.tasks.get(report.task)
@@ -145,6 +152,8 @@ class WaitingStory:
         story.phases.setdefault(report.phase, time_us)
         if report.phase in _ENDS:
             self._end(story, time_us)
+        elif story.operation is Operation.RECEIVE and report.phase is TaskPhase.AWARDED:
+            self._is_received(story, time_us)
         elif report.phase is TaskPhase.FORFEITED:
             story.owner = 0
 
@@ -308,6 +317,8 @@ def task_lines(story: TaskStory, words: Words, start_us: int) -> list[str]:
     state = (
         "served" if TaskPhase.DONE in story.phases else "not served in this log" if story.end_us is None else "refused"
     )
+    if story.operation is Operation.RECEIVE and story.owner:
+        what += f" at {words.machine(story.owner)}"
     lines = [
         f"task {words.reference(story.task)}: {what}, called by {words.machine(story.caller)} at "
         f"{(story.begin_us - start_us) / 1e6:.3f} s, {state}; waited {story.waited_us / 1e6:.3f} s"

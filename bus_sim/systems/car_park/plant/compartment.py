@@ -51,6 +51,8 @@ class CompartmentPlant:
         self.light = LightColour.RED
         self.text = DeskText.WELCOME
         self.text_car = NO_CAR
+        #: The compartment that the desk's text names; 0: none.
+        self.text_compartment = 0
         self.tickets_printed: list[Ticket] = []
         self._world = world
         self._timers = timers
@@ -186,6 +188,7 @@ class CompartmentPlant:
         self._desk_order = order
         if is_ticket and code is not None:
             self.tickets_printed.append(Ticket(order.car, code))
+        self.text_compartment = order.compartment
         self._show(order.text, order.car)
 
     def _show(self, text: DeskText, car: Reference) -> None:

@@ -63,7 +63,12 @@ class CustomerEvent(Enum):
     WAIT = "please wait"
     UNKNOWN = "unknown ticket"
     READY = "car ready"
+    SENT = "go to another compartment"
     DOOR_OPEN = "door open"
+
+
+#: Whoever reads these at a desk has to do with the compartment that they are about.
+_GOES_THERE = (CustomerEvent.SENT, CustomerEvent.READY)
 
 
 class VisitOutcome(Enum):
@@ -98,6 +103,7 @@ TABLE: dict[tuple[CustomerState, CustomerEvent], tuple[CustomerState, str]] = {
     (CustomerState.PARKED, CustomerEvent.CANCEL): (CustomerState.AT_DESK, "cancel"),
     (CustomerState.AT_DESK, CustomerEvent.TIMER): (CustomerState.AT_DESK, "insert_ticket"),
     (CustomerState.AT_DESK, CustomerEvent.WAIT): (CustomerState.AT_DESK, "be_patient"),
+    (CustomerState.AT_DESK, CustomerEvent.SENT): (CustomerState.AT_DESK, "be_patient"),
     (CustomerState.AT_DESK, CustomerEvent.UNKNOWN): (CustomerState.AT_DESK, "try_later"),
     (CustomerState.AT_DESK, CustomerEvent.READY): (CustomerState.AWAITING_DOOR, "be_patient"),
     (CustomerState.AWAITING_DOOR, CustomerEvent.DOOR_OPEN): (CustomerState.DRIVING_OUT, "fetch"),
@@ -150,6 +156,8 @@ class Customer:
         self.compartment: CompartmentPlant | None = None
         #: Dawdles so long in the compartment before driving out, us; set by faults.
         self.dawdle_us = 0
+        #: Has read to which compartment the car comes; until then one stands beside a desk and in no bay's way.
+        self.is_sent = False
         #: Has nothing to put into the desk; set by faults.
         self.has_lost_ticket = False
         self._world = world
@@ -189,6 +197,12 @@ class Customer:
         self.state = following[0]
         self._ACTIONS[following[1]](self)
         self._on_step(self)
+
+    def reads(self, event: CustomerEvent, where: CompartmentPlant | None) -> None:
+        """A desk's text about this customer's car: one goes where it says, and where the car is ready."""
+        if self.state is CustomerState.AT_DESK and event in _GOES_THERE and where is not None:
+            self.compartment, self.is_sent = where, True
+        self.on(event)
 
     @property
     def _place(self) -> CompartmentPlant:

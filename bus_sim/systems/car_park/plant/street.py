@@ -12,6 +12,7 @@ from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.world import CarParkWorld
 from onboard.contract.codes import DeskText
 from onboard.contract.messages import Reference
+from onboard.systems.car_park.site import DeskPolicy, car_park
 from onboard.systems.car_park.tickets import Ticket
 from onboard.ways.site import BayUse
 
@@ -28,6 +29,7 @@ TEXTS: dict[DeskText, CustomerEvent] = {
     # A minute later the desk takes tickets again.
     DeskText.TOO_MANY_TRIES: CustomerEvent.UNKNOWN,
     DeskText.CAR_READY: CustomerEvent.READY,
+    DeskText.GO_TO: CustomerEvent.SENT,
 }
 
 
@@ -54,7 +56,7 @@ class StreetSummary:
 
 
 class Street:
-    """All customers of a run. They go to the compartment with the fewest waiting, the lowest node-ID among equals."""
+    """All customers of a run. Each goes to the compartment with the fewest before, of equals to the lowest node-ID."""
 
     def __init__(
         self, compartments: dict[int, CompartmentPlant], world: CarParkWorld, oracle: Oracle, timers: Timers, seed: int
@@ -146,8 +148,13 @@ class Street:
         closed = BayUse.EXIT if customer.ticket is None else BayUse.ENTRY
         uses = self._world.site.bay_uses
         open_to = [node for node in self._waiting if uses.get(node, BayUse.BOTH) is not closed]
-        node_id = min(open_to, key=lambda node: (len(self._waiting[node]), node))
+        node_id = min(open_to, key=lambda node: (self._before(node), node))
         return self._compartments[node_id]
+
+    def _before(self, node: int) -> int:
+        """Who has to do with a bay; who was not told yet to which the car comes stands aside, where desks tell that."""
+        is_any = car_park(self._world.site).desk is DeskPolicy.ANY
+        return sum(is_any or one.is_sent or one.state is not CustomerState.AT_DESK for one in self._waiting[node])
 
     def _after_step(self, customer: Customer) -> None:
         """Keep the lists of who waits where, and let people look at what they now wait for."""
@@ -204,7 +211,8 @@ class Street:
             if text is DeskText.TAKE_TICKET:
                 self._take(reader, self._compartments[node_id].tickets_printed[-1])
         if reader is not None:
-            reader.on(event)
+            there = self._compartments[node_id].text_compartment if event is CustomerEvent.SENT else node_id
+            reader.reads(event, self._compartments.get(there))
 
     def _at_key(self, node_id: int) -> Customer | None:
         waiting = self._waiting[node_id]

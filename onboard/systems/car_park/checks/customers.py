@@ -129,6 +129,11 @@ class CustomersServed(Rule):
         if word.text in _ANSWERS_TO_KEY:
             self._asked.pop(node, None)
             self._answered.add(node)
+        if word.text is DeskText.GO_TO:
+            # From now on the car is waited for there, whichever desk has said so.
+            asked = [self._tickets.pop(one) for one in list(self._tickets) if one[1] == word.car]
+            if asked:
+                self._tickets[word.compartment, word.car] = asked[0]
         if word.text in (DeskText.CAR_READY, DeskText.UNKNOWN_TICKET):
             self._tickets.pop((node, word.car), None)
             self._told.discard((node, word.car))

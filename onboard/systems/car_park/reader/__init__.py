@@ -12,7 +12,7 @@ from onboard.systems.car_park.reader.constants import read_constants
 from onboard.systems.car_park.reader.machines import read_fleet, read_stewards
 from onboard.systems.car_park.reader.positions import BASE
 from onboard.systems.car_park.reader.whole import check_whole, sound_tracks
-from onboard.systems.car_park.site import CallAt, CarPark, RestAt, RideCalls
+from onboard.systems.car_park.site import CallAt, CarPark, DeskPolicy, RestAt, RideCalls
 from onboard.ways.site import BayUse, charted
 
 
@@ -35,6 +35,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
     rides = RideCalls(negotiation.choice("rides", [one.value for one in RideCalls], "planned"))
     call_at = CallAt(negotiation.choice("call_at", [one.value for one in CallAt], "arrival"))
     rest_at = RestAt(negotiation.choice("rest_at", [one.value for one in RestAt], "nearest"))
+    desk = DeskPolicy(negotiation.choice("desk", [one.value for one in DeskPolicy], "any"))
     tells_offers = negotiation.choice("offers", ["kept", "told"], "kept") == "told"
     timing = replace(timing, sub_call_percent=negotiation.integer("sub_call_percent", 20, 80, 50))
     root.check_unknown()
@@ -60,6 +61,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
         rides=rides,
         call_at=call_at,
         rest_at=rest_at,
+        desk=desk,
         tells_offers=tells_offers,
         bay_uses={bay.node: bay.use for bay in bays if bay.use is not BayUse.BOTH},
         classes=classes,
