@@ -186,6 +186,8 @@ class Always:
         if self._is_in_turn(word) or (before is not None and before.message.state is not word.message.state):
             self.in_turn = word
         is_one = before is not None and before.message.state is word.message.state
+        # Who starts may not know bus time yet.
+        is_one = is_one and word.message.state is not MachineState.STARTING
         if before is not None and is_one and before.message.boot == word.message.boot:
             gap_us = word.time_us - before.time_us
             is_kept = gap_us <= stage.site.timing.heartbeat_us + 4 * stage.means.late_us

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from onboard.conform.checks import Findings, Shown
 from onboard.contract.codes import Reason
-from onboard.contract.messages import Award, Diagnostic, Message, Reference
+from onboard.contract.messages import Award, Diagnostic, Heartbeat, Message, Reference
 from onboard.contract.runs import singles
 from onboard.core.frame import Frame
 from onboard.core.site import Machine, Site
@@ -70,6 +70,8 @@ class Stage:
     #: Frames that are to be sent, and power that is to be switched.
     out: list[Frame] = field(default_factory=list)
     power: list[bool] = field(default_factory=list)
+    #: The node was switched off, and has not been heard since.
+    is_off: bool = False
     words: dict[type[Message], list[Word]] = field(default_factory=lambda: defaultdict(list))
     #: Frames of the node under test that are no message, with why.
     wrong: list[tuple[Shown, Reason]] = field(default_factory=list)
@@ -85,11 +87,13 @@ class Stage:
     def __post_init__(self) -> None:
         self.decoder = Decoder(self.codec)
         self.machine: Machine = self.site.machines[self.node]
-        fixed = [node for node, one in self.site.machines.items() if one.station is not None]
-        #: The first compartment: it calls, is the bus time and the steward; and another machine, 0 where there is none.
+        fixed = sorted(node for node, one in self.site.machines.items() if one.station is not None)
+        #: The first compartment: it calls, is the bus time and the steward; and another, 0 where there is none.
         self.caller = min(fixed)
         self.stranger = next(node for node in range(250, 0, -1) if node not in self.site.machines)
-        self.other = next((node for node in sorted(self.site.machines) if node not in (self.caller, self.node)), 0)
+        self.other = next((node for node in fixed if node != self.caller), 0)
+        #: Another robot that the kit plays, 0 where there is none.
+        self.rival = next((node for node in self.site.machines if node not in (*fixed, self.node)), 0)
 
     # --- in ------------------------------------------------------------------------------------------------------
 
@@ -97,7 +101,7 @@ class Stage:
         """A frame of the bus."""
         if frame.arbitration_id & 0xFF != self.node:
             return
-        self.heard_us = self.now_us
+        self.heard_us, self.is_off = self.now_us, False
         part = self.codec.decode_part(frame)
         if isinstance(part, Reason):
             self.wrong.append((self.shown(frame), part))
@@ -171,6 +175,11 @@ class Stage:
         """Frames as they are, wrong ones too."""
         self.out.extend(frames)
 
+    def switch(self, *, on: bool) -> None:
+        """The node's power. While it is off nobody else acknowledges a frame: what is said then comes late."""
+        self.power.append(on)
+        self.is_off = not on or self.is_off
+
     # --- judging -------------------------------------------------------------------------------------------------
 
     def shown(self, frame: Frame, time_us: int | None = None) -> Shown:
@@ -187,8 +196,12 @@ class Stage:
         self.judge(name, not words, why, *words)
 
     def count_of(self, reason: Reason) -> int:
-        """What the node last told of its drops for a reason."""
-        told = [one.message.count for one in self.words[Diagnostic] if one.message.reason is reason]
+        """What the node last told of its drops for a reason, in its life of now."""
+        beats = self.words[Heartbeat]
+        born_us = next(
+            (a.time_us for a, b in zip(beats[-2::-1], beats[:0:-1], strict=True) if a.message.boot != b.message.boot), 0
+        )
+        told = [one.message.count for one in self.since(Diagnostic, born_us) if one.message.reason is reason]
         return told[-1] if told else 0
 
     # --- time ----------------------------------------------------------------------------------------------------

@@ -40,9 +40,9 @@ FIRST = (
 def first(stage: Stage, cast: Cast) -> Play:
     """Off and on, on a bus without time; then the fleet comes."""
     if stage.means.power:
-        stage.power.append(False)
+        stage.switch(on=False)
         yield from stage.pause(1.0)
-        stage.power.append(True)
+        stage.switch(on=True)
     begin_us = stage.now_us
     yield from stage.pause(3.0)
     known_us = stage.now_us
@@ -280,12 +280,12 @@ def another_life(stage: Stage, cast: Cast) -> Play:
     """Off and on while the fleet lives; one machine of it does not answer at first."""
     slow = cast.parts.get(stage.other)
     last = stage.last(Heartbeat)
-    stage.power.append(False)
+    stage.switch(on=False)
     yield from stage.pause(1.0)
     begin_us = stage.now_us
     if slow is not None:
         slow.answers = False
-    stage.power.append(True)
+    stage.switch(on=True)
     beat = yield from stage.hears(Heartbeat, within_s=12.0)
     if beat is not None and last is not None:
         grown = beat.message.boot == last.message.boot % 255 + 1

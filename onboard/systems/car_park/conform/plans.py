@@ -5,9 +5,9 @@ from itertools import pairwise
 from onboard.conform.cast import Cast
 from onboard.conform.checks import Check
 from onboard.conform.stage import Stage, Word
-from onboard.contract.codes import Grade, LegAction, TokenKind
+from onboard.contract.codes import Grade, LegAction
 from onboard.contract.messages import Itinerary, Leg, Progress, TaskReport
-from onboard.core.token_keys import TokenKey
+from onboard.core.site import Segment
 from onboard.systems.car_park.conform.desk import Desk
 from onboard.systems.car_park.site import car_park
 
@@ -57,7 +57,7 @@ class PlanJudge:
         if plan.grade is not Grade.FIRM or not plan.legs:
             return
         stage, pairs = self.stage, list(pairwise(plan.legs))
-        joined = all((a.track, a.to_index) == (b.track, b.from_index) for a, b in pairs)
+        joined = all((a.track, a.to_index) == (b.track, b.from_index) or self._turns(a, b) for a, b in pairs)
         stage.judge("legs-follow-in-place", joined, "a leg begins where none ends", word)
         ordered = all((b.end_ms - a.end_ms) % 2**32 < 2**31 for a, b in pairs)
         stage.judge("legs-follow-in-time", ordered, "a leg ends before the one before it", word)
@@ -71,8 +71,17 @@ class PlanJudge:
             is_refuge = (last.track, last.to_index) not in {bay.segment for bay in self.site.compartments.values()}
             stage.judge("plan-ends-in-a-refuge", is_refuge, "ends before a compartment", word)
 
+    def _turns(self, before: Leg, leg: Leg) -> bool:
+        """Whether a leg goes over a linked end, from where the one before it ends."""
+        here, there = Segment(before.track, before.to_index), Segment(leg.track, leg.from_index)
+        tracks = [self.site.tracks[one] for one in {here.track, there.track} if one in self.site.tracks]
+        ends = [{mouth, track.inside(index)} for track in tracks for index, mouth in track.ends]
+        return leg.action is LegAction.TRAVEL and leg.from_index == leg.to_index and {here, there} in ends
+
     def _lasts(self, before: Leg, leg: Leg) -> bool:
         lasts_us = (leg.end_ms - before.end_ms) % 2**32 * 1000
+        if leg.from_index == leg.to_index:
+            return lasts_us >= self.desk.run_us(0, 1) + self.site.carrier_turn_us - 2_000
         return lasts_us >= self.desk.run_us(leg.from_index, leg.to_index) - 2_000
 
     def _on_leg(self, word: Word, leg: Leg) -> None:
@@ -94,7 +103,7 @@ class PlanJudge:
             is_its = at.itinerary_version == plan.message.version
             stage.judge("place-names-its-plan", is_its, f"the plan is {plan.message.version}", plan, word)
             stage.judge("place-names-a-leg", at.leg <= len(plan.message.legs), "no such leg", plan, word)
-        holder = self.cast.holder(TokenKey(TokenKind.SEGMENT, at.track << 8 | at.index))[0]
+        holder = self.cast.holder(self.desk.segment_key(at.track, at.index))[0]
         if stage.means.power:
             stage.judge("is-only-where-it-may-be", holder == stage.node, f"node {holder} has the segment", word)
 
