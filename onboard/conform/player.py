@@ -21,6 +21,7 @@ class Scene(NamedTuple):
     needs_power: bool = False
     needs_car: bool = False
     needs_other: bool = False
+    needs_rival: bool = False
 
     def lacks(self, stage: Stage) -> str:
         """Why it cannot be played; empty where it can."""
@@ -30,6 +31,8 @@ class Scene(NamedTuple):
             return "no car stands in the bay: --car"
         if self.needs_other and not stage.other:
             return "the site has no further machine that the kit could speak as"
+        if self.needs_rival and not stage.rival:
+            return "the site has no further robot that the kit could speak as"
         return ""
 
 
