@@ -168,7 +168,7 @@ class Always:
         stage.judge("heartbeat-tells-the-contract", beat.contract == CONTRACT_VERSION, f"not {CONTRACT_VERSION}", word)
         stage.judge("heartbeat-tells-the-site", beat.site_digest == stage.site.digest, f"not {stage.site.digest}", word)
         stage.judge("heartbeat-tells-the-kind", beat.kind is stage.machine.kind, "another kind", word)
-        stage.judge("heartbeat-tells-the-epoch", beat.epoch == 0, "no rights were made anew", word)
+        stage.judge("heartbeat-tells-the-epoch", beat.epoch <= stage.epoch, f"the epoch is {stage.epoch}", word)
         known = self.boots.setdefault(beat.boot, word)
         is_one = not any(b.time_us > known.time_us for boot, b in self.boots.items() if boot != beat.boot)
         stage.judge("one-boot-a-life", is_one, "an earlier life's boot", known, word)
@@ -238,7 +238,7 @@ class Always:
 
     def _on_diagnostic(self, word: Word) -> None:
         before = self.diagnostics.get(word.message.reason)
-        if before is not None:
+        if before is not None and self._is_one_life(before, word):
             gap_us = word.time_us - before.time_us
             least_us = self.stage.site.timing.heartbeat_us - self.stage.means.late_us
             self.stage.judge("diagnostics-keep-apart", gap_us >= least_us, f"{gap_us} us", before, word)
@@ -254,7 +254,8 @@ class Always:
         said: TokenGrant = word.message
         key = TokenKey(said.token_kind, said.token)
         is_again = self.given.get(key) == (said.version, said.holder)
-        self.stage.judge("grants-only-what-it-holds", is_again or key in self.held, "it does not hold it", word)
+        is_its = is_again or key in self.held or self.cast.holder(key)[0] == self.stage.node
+        self.stage.judge("grants-only-what-it-holds", is_its, "it does not hold it", word)
         if not is_again:
             before = self.held.get(key, self.cast.holder(key)[1])
             self.stage.judge("grants-under-newer-versions", said.version > before, f"not above {before}", word)

@@ -108,7 +108,8 @@ class Cast:
         self.answer, self.confirms, self.is_on, self.gives_time, self.time_error_us = grants, True, True, True, 0
         for part in self.parts.values():
             part.state, part.is_there, part.answers, part.digest_error = MachineState.IDLE, True, True, 0
-            part.contract, part.site_digest, part.epoch = CONTRACT_VERSION, self.stage.site.digest, 0
+            part.contract, part.site_digest = CONTRACT_VERSION, self.stage.site.digest
+            part.epoch = max(0, self.stage.epoch)
 
     # --- what it knows -------------------------------------------------------------------------------------------
 
@@ -149,6 +150,8 @@ class Cast:
             case CarAt() as at:
                 self.cars[at.car] = at
             case Heartbeat() as beat:
+                for part in self.parts.values() if self.boot == 0 else ():
+                    part.epoch = beat.epoch
                 if beat.boot != self.boot:
                     # Duty R4: of who was restarted the plan is forgotten.
                     self.boot = beat.boot
@@ -277,14 +280,15 @@ class Cast:
         self.is_on, self.time_due_us = True, self.stage.now_us
         for node, part in self.parts.items():
             if part.kind is KindCode.ROBOT:
-                self._stand(node)
+                self.stand(node)
         for rank, part in enumerate(self.parts.values()):
             part.due_us = self.stage.now_us + 5 * MS * (rank + 1)
 
-    def _stand(self, node: int) -> None:
+    def stand(self, node: int) -> None:
         """A robot of the fleet is at its home (duty J5)."""
         home, now_ms = self.stage.site.machines[node].home, self.stage.bus_ms()
         leg = Leg(LegAction.STAND, home.track, home.index, home.index, Side.NEAR, now_ms + 1)
-        self.plans[node] = Itinerary(node, 1, Grade.FIRM, Stamp(now_ms, node, 0), (leg,))
+        version = self.plans[node].version % 255 + 1 if node in self.plans else 1
+        self.plans[node] = Itinerary(node, version, Grade.FIRM, Stamp(now_ms, node, 0), (leg,))
         self.places[node] = Progress(node, 0, 0, home.track, home.index, 0, 0)
         self.stage.say(self.places[node], self.plans[node])

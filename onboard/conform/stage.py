@@ -77,6 +77,8 @@ class Stage:
     wrong: list[tuple[Shown, Reason]] = field(default_factory=list)
     #: Tasks that the fleet has awarded to the node.
     awarded: set[Reference] = field(default_factory=set)
+    #: In which epoch the site is: that of the node's first heartbeat, until rights are made anew.
+    epoch: int = -1
     #: When the node was last heard.
     heard_us: int = 0
     #: Told every word of the node.
@@ -111,6 +113,8 @@ class Stage:
             for single in singles(one) if one is not None else ():
                 word = Word(self.now_us, single, frame)
                 self.words[type(single)].append(word)
+                if isinstance(single, Heartbeat) and self.epoch < 0:
+                    self.epoch = single.epoch
                 for tell in self.hearers:
                     tell(word)
 

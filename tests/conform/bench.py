@@ -19,6 +19,8 @@ from onboard.systems.car_park.site import CarPark, car_park
 from onboard.wire.codec import fleet_codec
 
 SITE = car_park(load_site(Path(__file__).parent / "bench.toml"))
+#: The robot alone, then with another.
+SITES = (SITE, car_park(load_site(Path(__file__).parent / "pair.toml")))
 WHEELBASE_MM = 2_870
 #: No play is longer, s of virtual time.
 LIMIT_S = 3_600.0
