@@ -149,13 +149,16 @@ class Cast:
                     self._planned(plan)
             case CarAt() as at:
                 self.cars[at.car] = at
-            case Heartbeat() as beat:
-                for part in self.parts.values() if self.boot == 0 else ():
-                    part.epoch = beat.epoch
-                if beat.boot != self.boot:
-                    # Duty R4: of who was restarted the plan is forgotten.
-                    self.boot = beat.boot
-                    self.plans.pop(beat.sender, None)
+            case Heartbeat() as beat if beat.boot != self.boot:
+                self._begins(beat)
+
+    def _begins(self, beat: Heartbeat) -> None:
+        """A life of the node: its plan is forgotten (duty R4), and the first tells in which epoch the site is."""
+        if self.boot == 0:
+            for part in self.parts.values():
+                part.epoch = beat.epoch
+        self.boot = beat.boot
+        self.plans.pop(beat.sender, None)
 
     def _planned(self, plan: Itinerary) -> None:
         if plan.grade is Grade.FIRM:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.conform.cast import Cast
-from onboard.conform.checks import Check, Findings
+from onboard.conform.checks import Check, Findings, Verdict
 from onboard.conform.stage import SECOND, Means, Play, Stage, Wait
 from onboard.core.frame import Frame
 from onboard.core.site import Site
@@ -54,6 +54,8 @@ class Player:
     means: Means = field(default_factory=Means)
     watchers: tuple[Watching, ...] = ()
     tell: Callable[[str], None] = lambda _: None
+    #: Whether a scene in which a duty is broken is the last: enough to know that the node is not to be taken.
+    stops_at_first: bool = False
 
     def __post_init__(self) -> None:
         self.scenes = tuple(self.scenes)
@@ -121,6 +123,8 @@ class Player:
             yield from scene.play(self.stage, self.cast)
             self.cast.reset()
             yield from self.stage.pause(1.0)
+            if self.stops_at_first and self.findings.of(Verdict.FAILED):
+                break
         yield Wait(self.stage.now_us + SECOND)
         for close in self.stage.closers:
             close()

@@ -70,7 +70,7 @@ class Stage:
     #: Frames that are to be sent, and power that is to be switched.
     out: list[Frame] = field(default_factory=list)
     power: list[bool] = field(default_factory=list)
-    #: The node was switched off, and has not been heard since.
+    #: The kit has switched the node off.
     is_off: bool = False
     words: dict[type[Message], list[Word]] = field(default_factory=lambda: defaultdict(list))
     #: Frames of the node under test that are no message, with why.
@@ -103,7 +103,7 @@ class Stage:
         """A frame of the bus."""
         if frame.arbitration_id & 0xFF != self.node:
             return
-        self.heard_us, self.is_off = self.now_us, False
+        self.heard_us = self.now_us
         part = self.codec.decode_part(frame)
         if isinstance(part, Reason):
             self.wrong.append((self.shown(frame), part))
@@ -182,7 +182,7 @@ class Stage:
     def switch(self, *, on: bool) -> None:
         """The node's power. While it is off nobody else acknowledges a frame: what is said then comes late."""
         self.power.append(on)
-        self.is_off = not on or self.is_off
+        self.is_off = not on
 
     # --- judging -------------------------------------------------------------------------------------------------
 

@@ -27,8 +27,8 @@ from onboard.core.token_keys import TokenKey
 from onboard.systems.car_park.conform.desk import Desk
 
 _TOLD = (
-    "To its question I add `TokenSeen` for each token that it held by its own word before and does not say now, and for "
-    "what it gave away by its own word and nobody has confirmed"
+    "To its question I add `TokenSeen` for each token that it held by its own word before and does not say now, and "
+    "for what it gave away by its own word and nobody has confirmed"
 )
 
 MEMORY = (

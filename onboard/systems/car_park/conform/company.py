@@ -5,7 +5,7 @@ from collections.abc import Generator
 from onboard.conform.cast import Cast, grants
 from onboard.conform.checks import Check
 from onboard.conform.player import Scene
-from onboard.conform.stage import SECOND, Play, Stage, Wait, Word
+from onboard.conform.stage import Play, Stage, Wait, Word
 from onboard.contract.codes import Grade, LegAction, MachineState, Reason, TaskPhase, TokenKind
 from onboard.contract.messages import (
     CallForProposals,
@@ -37,7 +37,10 @@ _KNOWS_NO_PLAN = (
     "A holder refuses with MIRROR_BEHIND where it knows no plan of the requester, or none as new as `itinerary_version`"
 )
 _OTHER_ORDER = "where, of the same version, it sees another `predecessor` than the request names."
-_NEEDS = "What its body is in, and what it needs on its own way, a robot refuses with that reason whatever the request names."
+_NEEDS = (
+    "What its body is in, and what it needs on its own way, a robot refuses with that reason whatever the request "
+    "names."
+)
 _ASKS = (
     "With MIRROR_BEHIND it asks those whom it is about for their plans (`SyncRequest`, each at most every `T_view`)."
 )

@@ -6,7 +6,7 @@ from onboard.conform.cast import Cast, grants
 from onboard.conform.checks import Check
 from onboard.conform.player import Scene
 from onboard.conform.stage import OPERATOR, SECOND, Play, Stage, Wait, Word
-from onboard.contract.codes import Grade, LegAction, MachineState, Reason, TaskPhase, TokenKind
+from onboard.contract.codes import LegAction, MachineState, Reason, TaskPhase, TokenKind
 from onboard.contract.constants import ACTING, ANY_STATION
 from onboard.contract.messages import (
     CallForProposals,

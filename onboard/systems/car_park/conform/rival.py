@@ -51,8 +51,8 @@ class Rival:
 
     # --- plans ---------------------------------------------------------------------------------------------------
 
-    def way(self, *stops: tuple[int, int], first_s: float = 0.0) -> "Rival":
-        """Begin a plan at home: out of the spur after ``first_s``, then to each index of the alley to work so long, s."""
+    def way(self, *stops: tuple[int, float], first_s: float = 0.0) -> "Rival":
+        """A plan from home: out of the spur after ``first_s``, then to each index of the alley to work so long, s."""
         self.legs = []
         if first_s:
             self._add(LegAction.STAND, self.home.track, self.home.index, self.home.index, round(first_s * 1000))

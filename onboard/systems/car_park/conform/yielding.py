@@ -189,7 +189,10 @@ def _at_once(stage: Stage, desk: Desk, rival: Rival, name: str, *, older: bool) 
     yield from stage.pause(2.0)
 
 
-_ALL = "Where no order comes about for `T_order`, a robot asks for all segments to its next refuge with `itinerary_version` 0."
+_ALL = (
+    "Where no order comes about for `T_order`, a robot asks for all segments to its next refuge with "
+    "`itinerary_version` 0."
+)
 _WHOLE = "It moves when it has all; what it has of an incomplete set it gives back to the stewards after `T_whole`"
 ALL_OR_NONE = (
     Check("asks-for-all-or-none", "K13", _ALL),
