@@ -39,6 +39,8 @@ _SHARE = (
 )
 #: Bits of a frame of 8 bytes with 29-bit identifier without stuffing, and the least of a play for a share to be judged.
 _FRAME_BITS, _LONG_RUN_US = 131, 60 * SECOND
+#: Grants that follow each other so soon are given in one go.
+_ONE_GO_US = 20 * MS
 _HELD = "A token leaves by its holder's own hand"
 
 ALWAYS = (
@@ -84,6 +86,11 @@ ALWAYS = (
     Check("bids-improve", "B5", "So the bids of one call strictly improve on the bus."),
     Check("grants-only-what-it-holds", "K3", _HELD),
     Check("grants-under-newer-versions", "K3", "then say `TokenGrant` with a new version and the new holder."),
+    Check(
+        "grants-of-a-line-have-one-version",
+        "K4",
+        ("of a segment one more than the highest among those in line with it (15 to either side) that I hold too"),
+    ),
     Check("grants-to-machines-of-the-site", "K3", "then say `TokenGrant` with a new version and the new holder."),
     Check("holds-only-what-it-was-given", "K5", "A grant counts if it names me"),
     Check("diagnostics-keep-apart", "F3", "at most once in `T_beat` for each reason."),
@@ -103,6 +110,9 @@ class Always:
     held: dict[TokenKey, int] = field(default_factory=dict)
     #: The last give of each token by the node: version and holder.
     given: dict[TokenKey, tuple[int, int]] = field(default_factory=dict)
+    #: What it held when it began to give segments away, and when it last did.
+    line: dict[TokenKey, int] = field(default_factory=dict)
+    line_us: int = -SECOND
     bids: dict[tuple[int, int], Word] = field(default_factory=dict)
     diagnostics: dict[int, Word] = field(default_factory=dict)
     plan: Word | None = None
@@ -259,10 +269,26 @@ class Always:
         if not is_again:
             before = self.held.get(key, self.cast.holder(key)[1])
             self.stage.judge("grants-under-newer-versions", said.version > before, f"not above {before}", word)
+        if not is_again and key.kind is TokenKind.SEGMENT and key in self.held:
+            self._on_line(word, key)
         is_known = said.holder in self.stage.site.machines and said.holder != self.stage.node
         self.stage.judge("grants-to-machines-of-the-site", is_known, "to nobody of the site", word)
         self.held.pop(key, None)
         self.given[key] = (said.version, said.holder)
+
+    def _on_line(self, word: Word, key: TokenKey) -> None:
+        """One that leaves with others, in one frame or one after another, has the version that all have."""
+        if word.time_us - self.line_us > _ONE_GO_US:
+            self.line = dict(self.held)
+        self.line_us = word.time_us
+        found = [self.line.get(key, self.held.get(key, 0))]
+        for step in (-1, 1):
+            number = key.number + step
+            while TokenKey(key.kind, number) in self.line and abs(number - key.number) <= 15:
+                found.append(self.line[TokenKey(key.kind, number)])
+                number += step
+        wanted = max(found) + 1
+        self.stage.judge("grants-of-a-line-have-one-version", word.message.version == wanted, f"not {wanted}", word)
 
     def _on_held(self, word: Word) -> None:
         said: TokenHeld = word.message

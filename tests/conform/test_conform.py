@@ -9,7 +9,7 @@ import pytest
 
 from onboard.cli import main as onboard
 from onboard.conform.checks import Check, CheckResult, Findings, Verdict
-from onboard.conform.player import Player
+from onboard.conform.player import Player, Scene
 from onboard.conform.report import NodeUnderTest, frame_words, junit, lines_of, protocol, status, totals
 from onboard.conform.stage import Means
 from onboard.conform.suite import scenes_of, watchers_of
@@ -18,7 +18,7 @@ from onboard.core.negotiation.participant import Participant
 from onboard.holon.holding import HoldResponse, MachineHolds
 from onboard.wire.codec import fleet_codec
 from tests.conform import foreign
-from tests.conform.bench import ALL, SITE, play
+from tests.conform.bench import ALL, SITE, SITES, play
 from tests.project.rows import ROOT
 
 PAGE = ROOT / "docs" / "protocol.md"
@@ -27,6 +27,8 @@ CHECKS: tuple[Check, ...] = (
     *(check for scene in scenes_of(SITE) for check in scene.checks),
     *(check for checks, _ in watchers_of(SITE) for check in checks),
 )
+#: Scenes that are played only where there is a second robot.
+WITH_ANOTHER = [one for one in scenes_of(SITE) if one.needs_rival]
 SUBJECT = NodeUnderTest(
     11, "MR1", "robot", "bench", 0xABCD, 254, "onboard 0", "virtual bench", "2026-01-01T00:00:00+00:00"
 )
@@ -74,8 +76,18 @@ def test_the_page_lists_the_duties_that_no_check_judges() -> None:
 def test_our_robot_keeps_to_all_of_it() -> None:
     findings = ours().findings
     broken = [line for one in findings.of(Verdict.FAILED) for line in lines_of(one, frame_words)]
-    assert broken == [] and names(findings, Verdict.NOT_REACHED) == []
-    assert status(findings) == 0
+    assert broken == [] and status(findings) == 0
+    alone = "the site has no further robot that the kit could speak as"
+    assert {one.scene for one in findings.of(Verdict.NOT_REACHED)} == {one.name for one in WITH_ANOTHER}
+    assert {one.why for one in findings.of(Verdict.NOT_REACHED)} == {alone}
+
+
+@pytest.mark.parametrize("scene", WITH_ANOTHER, ids=lambda one: one.name)
+def test_our_robot_keeps_to_all_of_it_beside_another(scene: Scene) -> None:
+    findings = play((scene.name,), site=SITES[1]).findings
+    broken = [line for one in findings.of(Verdict.FAILED) for line in lines_of(one, frame_words)]
+    reached = {one.check.name for one in findings.of(Verdict.PASSED)}
+    assert broken == [] and {one.name for one in scene.checks} <= reached
 
 
 def test_without_a_switch_and_a_car_it_is_judged_as_far_as_it_can_be() -> None:
@@ -179,10 +191,10 @@ MISTAKES = [
 ]
 
 
-def test_a_site_with_lifts_and_further_robots_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_site_with_lifts_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["conform", "--node", "11", "--kind", "robot", "--site", "small", "-i", "virtual", "-c", "none"]
     assert onboard(words) == 2
-    assert "--site small: it has ER1, ER2, MR2 beside MR1; only compartments are played" in capsys.readouterr().err
+    assert "--site small: it has ER1, ER2; lifts are not played yet" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("words", "told"), MISTAKES)

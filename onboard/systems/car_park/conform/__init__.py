@@ -1,6 +1,18 @@
 """What the kit of conformity (onboard/conform) plays and judges of a car park's nodes."""
 
-from onboard.systems.car_park.conform import anew, awards, blocked, calls, company, lives, plans, rights, work, yielding
+from onboard.systems.car_park.conform import (
+    anew,
+    awards,
+    blocked,
+    calls,
+    company,
+    lives,
+    meanwhile,
+    plans,
+    rights,
+    work,
+    yielding,
+)
 
 SCENES = (
     *calls.SCENES,
@@ -9,6 +21,7 @@ SCENES = (
     *rights.SCENES,
     *work.SCENES,
     *lives.SCENES,
+    *meanwhile.SCENES,
     *company.SCENES,
     *yielding.SCENES,
 )
