@@ -13,6 +13,8 @@ from onboard.systems.car_park.site import car_park
 
 #: Duty P13.
 _MOST_LEGS = 31
+#: Duty P9, and what a word may take, ms.
+_LATE_MS, _SOON_MS = 2_300, 800
 _FOLLOW = "The legs follow each other in time and place: leg n begins when and where leg n - 1 ends"
 
 PLANS = (
@@ -30,6 +32,16 @@ PLANS = (
     Check("plan-ends-in-a-refuge", "P5", "A plan ends in a refuge: a segment that is before no compartment"),
     Check("place-names-its-plan", "P10", "`itinerary_version` and `leg` are of the plan in hand."),
     Check("place-names-a-leg", "P10", "`itinerary_version` and `leg` are of the plan in hand."),
+    Check(
+        "is-where-its-plan-has-it",
+        "P9",
+        ("A robot whose step is, or will be, 2 s late tells its plan anew while the step still lasts"),
+    ),
+    Check(
+        "is-there-no-sooner-than-planned",
+        "P9",
+        "where what follows begins more than 0.5 s later or sooner than planned.",
+    ),
     Check("is-only-where-it-may-be", "K2", "I move, or let move, only within segments whose tokens I hold"),
     Check("reports-only-what-was-awarded", "B9", "I act on a task only when `Award` names me with AWARDED."),
 )
@@ -102,10 +114,23 @@ class PlanJudge:
         if plan is not None and at.itinerary_version:
             is_its = at.itinerary_version == plan.message.version
             stage.judge("place-names-its-plan", is_its, f"the plan is {plan.message.version}", plan, word)
+            self._in_time(plan, word, at)
             stage.judge("place-names-a-leg", at.leg <= len(plan.message.legs), "no such leg", plan, word)
         holder = self.cast.holder(self.desk.segment_key(at.track, at.index))[0]
         if stage.means.power:
             stage.judge("is-only-where-it-may-be", holder == stage.node, f"node {holder} has the segment", word)
+
+    def _in_time(self, plan: Word, word: Word, at: Progress) -> None:
+        """A place that it tells while it moves is one of the leg in hand, between its begin and its end."""
+        stage, legs = self.stage, plan.message.legs
+        if at.itinerary_version != plan.message.version or not (at.speed_mm_s and at.leg < len(legs)):
+            return
+        begin_ms = legs[at.leg - 1].end_ms if at.leg else plan.message.stamp.award_ms
+        now_ms = stage.bus_ms()
+        late_ms = (now_ms - legs[at.leg].end_ms + 2**31) % 2**32 - 2**31
+        soon_ms = (begin_ms - now_ms + 2**31) % 2**32 - 2**31
+        stage.judge("is-where-its-plan-has-it", late_ms <= _LATE_MS, f"{late_ms} ms behind the leg's end", plan, word)
+        stage.judge("is-there-no-sooner-than-planned", soon_ms <= _SOON_MS, f"{soon_ms} ms before it", plan, word)
 
 
 def watch(stage: Stage, cast: Cast) -> None:
