@@ -20,8 +20,9 @@ SCENES = (
     *blocked.SCENES,
     *rights.SCENES,
     *work.SCENES,
-    *lives.SCENES,
+    lives.CUT,
     *meanwhile.SCENES,
+    lives.STOP,
     *company.SCENES,
     *yielding.SCENES,
 )

@@ -319,7 +319,5 @@ def _stopped_on_the_way(stage: Stage, cast: Cast, desk: Desk) -> Play:
     stage.say(Go(OPERATOR, OPERATOR))
 
 
-SCENES = (
-    Scene("power cuts at work", CUTS, cuts, needs_power=True, needs_car=True),
-    Scene("stops at work", STOPS, stops, needs_car=True),
-)
+CUT = Scene("power cuts at work", CUTS, cuts, needs_power=True, needs_car=True)
+STOP = Scene("stops at work", STOPS, stops, needs_car=True)
