@@ -138,6 +138,7 @@ YIELDS = (
     Check("keeps-to-the-other-plan", "P6", "no window of mine overlaps one of theirs by more than `T_round`."),
     Check("lower-stamp-keeps-its-windows", "P7", _LOWER),
     Check("keeps-its-plan-though-it-is-told-one", "P7", _LOWER),
+    Check("who-holds-the-token-goes-first", "P7", "whoever holds the segment's token goes first"),
 )
 
 
@@ -154,9 +155,22 @@ def yields(stage: Stage, cast: Cast) -> Play:
         cast.answer = grants
         rival.stands()
         yield from stage.pause(45.0)
+    cast.answer = lambda key, _: (
+        Reason.NONE if key.kind is TokenKind.SEGMENT and key.number >> 8 > 127 else Reason.TOKEN_NOT_GRANTABLE_YET
+    )
+    mouth = desk.segment_at(rival.home.track, 0)
+    low, high = sorted((mouth.index, desk.bay.index))
+    way = [Segment(mouth.track, index) for index in range(low, high + 1)]
+    rival.takes(*way)
+    yield from stage.pause(1.0)
+    yield from _at_once(stage, desk, rival, "who-holds-the-token-goes-first", older=False, holds=True)
+    cast.answer = grants
+    rival.stands()
+    rival.gives_back(*way)
+    yield from stage.pause(45.0)
 
 
-def _at_once(stage: Stage, desk: Desk, rival: Rival, name: str, *, older: bool) -> Play:
+def _at_once(stage: Stage, desk: Desk, rival: Rival, name: str, *, older: bool, holds: bool = False) -> Play:
     call, bid = yield from desk.wins()
     if bid is None:
         return
@@ -179,6 +193,8 @@ def _at_once(stage: Stage, desk: Desk, rival: Rival, name: str, *, older: bool) 
             stage.judge("gives-way-under-its-old-stamp", is_same, "another stamp", plan, anew)
             meets = meeting(desk, anew.message, rival.plan, stage.bus_ms())
             stage.judge("keeps-to-the-other-plan", meets is None, f"{meets}", anew)
+    elif holds:
+        stage.judge(name, anew, "keeps its windows before who holds the tokens", plan, anew)
     else:
         stage.judge(name, anew is None, "makes its plan anew", plan, anew)
         last = stage.last(Itinerary)
