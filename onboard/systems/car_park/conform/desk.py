@@ -60,7 +60,7 @@ class Desk:
         return self.site.mouths.get(Segment(track, index), Segment(track, index))
 
     def segment_key(self, track: int, index: int) -> TokenKey:
-        """Its token."""
+        """The token of the segment that a position is in, so of the mouth for one beyond a linked end."""
         return TokenKey(TokenKind.SEGMENT, self.segment_at(track, index).number)
 
     @property

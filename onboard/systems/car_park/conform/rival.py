@@ -36,17 +36,17 @@ class Rival:
 
     @property
     def node(self) -> int:
-        """Its node-ID."""
+        """The node-ID under which the kit speaks as it; the site has one where a scene needs it."""
         return self.stage.rival
 
     @property
     def home(self) -> Segment:
-        """Where it rests."""
+        """The segment in a spur where it rests, its home by the site file."""
         return self.stage.site.machines[self.node].home
 
     @property
     def plan(self) -> Itinerary:
-        """What it told last."""
+        """The firm itinerary that it told last; all digests have it."""
         return self.cast.plans[self.node]
 
     # --- plans ---------------------------------------------------------------------------------------------------
