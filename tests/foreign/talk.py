@@ -45,6 +45,7 @@ class Talk:
     quiet_until_us: int = 0
     apart: int = 0
     askers: set[int] = field(default_factory=set)
+    boots: dict[int, int] = field(default_factory=dict)
     drive: Signals | None = None
     shuttle: Signals | None = None
     sets: dict[tuple[int, int], dict[str, Signals]] = field(default_factory=dict)
@@ -199,9 +200,14 @@ class Talk:
             case "TokenRequest" if self.stops.is_held(self.now_us):
                 pass
             case "Heartbeat":
+                self.boots[word.sender] = given["boot"]
                 self._compare(word)
             case "SyncRequest" if given["whom"] in (0, self.alley.node):
                 self.askers.add(word.sender)
+                if not given["whom"] and word.sender in self.boots:
+                    # R5: it was started again.
+                    self.rights.asked.add(word.sender)
+                    self.say("SyncRequest", {"whom": word.sender, "boot_before": self.boots[word.sender]})
             case "SyncDone" if given["whom"] in (0, self.alley.node):
                 self.answered.add(word.sender)
                 self.rights.asked.discard(word.sender)
