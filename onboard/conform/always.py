@@ -39,6 +39,8 @@ _SHARE = (
 )
 #: Bits of a frame of 8 bytes with 29-bit identifier without stuffing, and the least of a play for a share to be judged.
 _FRAME_BITS, _LONG_RUN_US = 131, 60 * SECOND
+#: Grants that follow each other so soon are given in one go.
+_ONE_GO_US = 20 * MS
 _HELD = "A token leaves by its holder's own hand"
 
 ALWAYS = (
@@ -84,6 +86,11 @@ ALWAYS = (
     Check("bids-improve", "B5", "So the bids of one call strictly improve on the bus."),
     Check("grants-only-what-it-holds", "K3", _HELD),
     Check("grants-under-newer-versions", "K3", "then say `TokenGrant` with a new version and the new holder."),
+    Check(
+        "grants-of-a-line-have-one-version",
+        "K4",
+        ("of a segment one more than the highest among those in line with it (15 to either side) that I hold too"),
+    ),
     Check("grants-to-machines-of-the-site", "K3", "then say `TokenGrant` with a new version and the new holder."),
     Check("holds-only-what-it-was-given", "K5", "A grant counts if it names me"),
     Check("diagnostics-keep-apart", "F3", "at most once in `T_beat` for each reason."),
@@ -103,6 +110,9 @@ class Always:
     held: dict[TokenKey, int] = field(default_factory=dict)
     #: The last give of each token by the node: version and holder.
     given: dict[TokenKey, tuple[int, int]] = field(default_factory=dict)
+    #: What it held when it began to give segments away, and when it last did.
+    line: dict[TokenKey, int] = field(default_factory=dict)
+    line_us: int = -SECOND
     bids: dict[tuple[int, int], Word] = field(default_factory=dict)
     diagnostics: dict[int, Word] = field(default_factory=dict)
     plan: Word | None = None
@@ -168,7 +178,7 @@ class Always:
         stage.judge("heartbeat-tells-the-contract", beat.contract == CONTRACT_VERSION, f"not {CONTRACT_VERSION}", word)
         stage.judge("heartbeat-tells-the-site", beat.site_digest == stage.site.digest, f"not {stage.site.digest}", word)
         stage.judge("heartbeat-tells-the-kind", beat.kind is stage.machine.kind, "another kind", word)
-        stage.judge("heartbeat-tells-the-epoch", beat.epoch == 0, "no rights were made anew", word)
+        stage.judge("heartbeat-tells-the-epoch", beat.epoch <= stage.epoch, f"the epoch is {stage.epoch}", word)
         known = self.boots.setdefault(beat.boot, word)
         is_one = not any(b.time_us > known.time_us for boot, b in self.boots.items() if boot != beat.boot)
         stage.judge("one-boot-a-life", is_one, "an earlier life's boot", known, word)
@@ -186,6 +196,8 @@ class Always:
         if self._is_in_turn(word) or (before is not None and before.message.state is not word.message.state):
             self.in_turn = word
         is_one = before is not None and before.message.state is word.message.state
+        # Who starts may not know bus time yet.
+        is_one = is_one and word.message.state is not MachineState.STARTING
         if before is not None and is_one and before.message.boot == word.message.boot:
             gap_us = word.time_us - before.time_us
             is_kept = gap_us <= stage.site.timing.heartbeat_us + 4 * stage.means.late_us
@@ -236,7 +248,7 @@ class Always:
 
     def _on_diagnostic(self, word: Word) -> None:
         before = self.diagnostics.get(word.message.reason)
-        if before is not None:
+        if before is not None and self._is_one_life(before, word):
             gap_us = word.time_us - before.time_us
             least_us = self.stage.site.timing.heartbeat_us - self.stage.means.late_us
             self.stage.judge("diagnostics-keep-apart", gap_us >= least_us, f"{gap_us} us", before, word)
@@ -252,14 +264,31 @@ class Always:
         said: TokenGrant = word.message
         key = TokenKey(said.token_kind, said.token)
         is_again = self.given.get(key) == (said.version, said.holder)
-        self.stage.judge("grants-only-what-it-holds", is_again or key in self.held, "it does not hold it", word)
+        is_its = is_again or key in self.held or self.cast.holder(key)[0] == self.stage.node
+        self.stage.judge("grants-only-what-it-holds", is_its, "it does not hold it", word)
         if not is_again:
             before = self.held.get(key, self.cast.holder(key)[1])
             self.stage.judge("grants-under-newer-versions", said.version > before, f"not above {before}", word)
+        if not is_again and key.kind is TokenKind.SEGMENT and key in self.held:
+            self._on_line(word, key)
         is_known = said.holder in self.stage.site.machines and said.holder != self.stage.node
         self.stage.judge("grants-to-machines-of-the-site", is_known, "to nobody of the site", word)
         self.held.pop(key, None)
         self.given[key] = (said.version, said.holder)
+
+    def _on_line(self, word: Word, key: TokenKey) -> None:
+        """One that leaves with others, in one frame or one after another, has the version that all have."""
+        if word.time_us - self.line_us > _ONE_GO_US:
+            self.line = dict(self.held)
+        self.line_us = word.time_us
+        found = [self.line.get(key, self.held.get(key, 0))]
+        for step in (-1, 1):
+            number = key.number + step
+            while TokenKey(key.kind, number) in self.line and abs(number - key.number) <= 15:
+                found.append(self.line[TokenKey(key.kind, number)])
+                number += step
+        wanted = max(found) + 1
+        self.stage.judge("grants-of-a-line-have-one-version", word.message.version == wanted, f"not {wanted}", word)
 
     def _on_held(self, word: Word) -> None:
         said: TokenHeld = word.message

@@ -8,14 +8,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from onboard.conform.stage import MS, SECOND, Stage, Word
-from onboard.contract.codes import CONTRACT_VERSION, Grade, KindCode, MachineState, Reason, TokenKind
+from onboard.contract.codes import CONTRACT_VERSION, Grade, KindCode, LegAction, MachineState, Reason, Side, TokenKind
 from onboard.contract.constants import OUTSIDE
 from onboard.contract.messages import (
     BusTime,
     CarAt,
     Heartbeat,
     Itinerary,
+    Leg,
+    Progress,
     Reference,
+    Stamp,
     SyncDone,
     SyncRequest,
     TokenGrant,
@@ -79,6 +82,8 @@ class Cast:
     tokens: dict[TokenKey, tuple[int, int]] = field(default_factory=dict)
     cars: dict[Reference, CarAt] = field(default_factory=dict)
     plans: dict[int, Itinerary] = field(default_factory=dict)
+    #: Where the fleet's robots are.
+    places: dict[int, Progress] = field(default_factory=dict)
     blocked: set[int] = field(default_factory=set)
     flights: dict[TokenKey, Flight] = field(default_factory=dict)
     answer: Answer = grants
@@ -103,7 +108,8 @@ class Cast:
         self.answer, self.confirms, self.is_on, self.gives_time, self.time_error_us = grants, True, True, True, 0
         for part in self.parts.values():
             part.state, part.is_there, part.answers, part.digest_error = MachineState.IDLE, True, True, 0
-            part.contract, part.site_digest, part.epoch = CONTRACT_VERSION, self.stage.site.digest, 0
+            part.contract, part.site_digest = CONTRACT_VERSION, self.stage.site.digest
+            part.epoch = max(0, self.stage.epoch)
 
     # --- what it knows -------------------------------------------------------------------------------------------
 
@@ -143,11 +149,16 @@ class Cast:
                     self._planned(plan)
             case CarAt() as at:
                 self.cars[at.car] = at
-            case Heartbeat() as beat:
-                if beat.boot != self.boot:
-                    # Duty R4: of who was restarted the plan is forgotten.
-                    self.boot = beat.boot
-                    self.plans.pop(beat.sender, None)
+            case Heartbeat() as beat if beat.boot != self.boot:
+                self._begins(beat)
+
+    def _begins(self, beat: Heartbeat) -> None:
+        """A life of the node: its plan is forgotten (duty R4), and the first tells in which epoch the site is."""
+        if self.boot == 0:
+            for part in self.parts.values():
+                part.epoch = beat.epoch
+        self.boot = beat.boot
+        self.plans.pop(beat.sender, None)
 
     def _planned(self, plan: Itinerary) -> None:
         if plan.grade is Grade.FIRM:
@@ -161,8 +172,10 @@ class Cast:
                 continue
             if part.node == self._time_giver() and self.gives_time:
                 self._tell_time()
-            for car, at in self.cars.items():
-                if self.holder(TokenKey(TokenKind.CAR, car.origin << 16 | car.number))[0] == part.node:
+            if part.node in self.plans:
+                self.stage.say(self.plans[part.node], self.places[part.node])
+            for at in self.cars.values():
+                if at.sender == part.node:
                     self.stage.say(at)
             self.stage.say(*(TokenHeld(part.node, *key, self.tokens[key][1]) for key in self.held_by(part.node)))
             self.stage.say(SyncDone(part.node, asked.sender, part.boot))
@@ -231,7 +244,8 @@ class Cast:
         now_us = self.stage.now_us
         if self.time_due_us <= now_us:
             self.time_due_us = now_us + self.stage.site.timing.bus_time_us
-            if self.is_on and self.gives_time:
+            # One that nobody acknowledged would come stale.
+            if self.is_on and self.gives_time and not self.stage.is_off:
                 self._tell_time()
         for part in self.parts.values():
             if part.due_us <= now_us:
@@ -267,5 +281,17 @@ class Cast:
     def begin(self) -> None:
         """The fleet comes to the bus: time first, then everybody in turn."""
         self.is_on, self.time_due_us = True, self.stage.now_us
+        for node, part in self.parts.items():
+            if part.kind is KindCode.ROBOT:
+                self.stand(node)
         for rank, part in enumerate(self.parts.values()):
             part.due_us = self.stage.now_us + 5 * MS * (rank + 1)
+
+    def stand(self, node: int) -> None:
+        """A robot of the fleet is at its home (duty J5)."""
+        home, now_ms = self.stage.site.machines[node].home, self.stage.bus_ms()
+        leg = Leg(LegAction.STAND, home.track, home.index, home.index, Side.NEAR, now_ms + 1)
+        version = self.plans[node].version % 255 + 1 if node in self.plans else 1
+        self.plans[node] = Itinerary(node, version, Grade.FIRM, Stamp(now_ms, node, 0), (leg,))
+        self.places[node] = Progress(node, 0, 0, home.track, home.index, 0, 0)
+        self.stage.say(self.places[node], self.plans[node])

@@ -107,10 +107,10 @@ def _player(args: argparse.Namespace, site: Site) -> Player:
         raise ConformError(f"--kind {args.kind}: {machine.name} is a {machine.kind.name.lower()} by the site file")
     if machine.kind is not KindCode.ROBOT or part(site.system, "conform") is None:
         raise ConformError(f"--kind {args.kind}: only robots of a car park can be judged yet; name a robot's node")
-    others = [one.name for one in site.machines.values() if one is not machine and one.station is None]
+    others = [one.name for one in site.machines.values() if one.kind is KindCode.LIFT]
     if others:
-        what = "only compartments are played yet; take a site of one floor with this robot alone"
-        raise ConformError(f"--site {site.name}: it has {', '.join(others)} beside {machine.name}; {what}")
+        what = "lifts are not played yet; take a site of one floor"
+        raise ConformError(f"--site {site.name}: it has {', '.join(others)}; {what}")
     scenes = scenes_of(site)
     unknown = [name for name in args.scene if name not in {scene.name for scene in scenes}]
     if unknown:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.conform.cast import Cast
-from onboard.conform.checks import Check, Findings
+from onboard.conform.checks import Check, Findings, Verdict
 from onboard.conform.stage import SECOND, Means, Play, Stage, Wait
 from onboard.core.frame import Frame
 from onboard.core.site import Site
@@ -21,6 +21,7 @@ class Scene(NamedTuple):
     needs_power: bool = False
     needs_car: bool = False
     needs_other: bool = False
+    needs_rival: bool = False
 
     def lacks(self, stage: Stage) -> str:
         """Why it cannot be played; empty where it can."""
@@ -30,6 +31,8 @@ class Scene(NamedTuple):
             return "no car stands in the bay: --car"
         if self.needs_other and not stage.other:
             return "the site has no further machine that the kit could speak as"
+        if self.needs_rival and not stage.rival:
+            return "the site has no further robot that the kit could speak as"
         return ""
 
 
@@ -51,6 +54,8 @@ class Player:
     means: Means = field(default_factory=Means)
     watchers: tuple[Watching, ...] = ()
     tell: Callable[[str], None] = lambda _: None
+    #: Whether a scene in which a duty is broken is the last: enough to know that the node is not to be taken.
+    stops_at_first: bool = False
 
     def __post_init__(self) -> None:
         self.scenes = tuple(self.scenes)
@@ -118,6 +123,8 @@ class Player:
             yield from scene.play(self.stage, self.cast)
             self.cast.reset()
             yield from self.stage.pause(1.0)
+            if self.stops_at_first and self.findings.of(Verdict.FAILED):
+                break
         yield Wait(self.stage.now_us + SECOND)
         for close in self.stage.closers:
             close()

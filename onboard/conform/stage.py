@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from onboard.conform.checks import Findings, Shown
 from onboard.contract.codes import Reason
-from onboard.contract.messages import Award, Diagnostic, Message, Reference
+from onboard.contract.messages import Award, Diagnostic, Heartbeat, Message, Reference
 from onboard.contract.runs import singles
 from onboard.core.frame import Frame
 from onboard.core.site import Machine, Site
@@ -70,11 +70,15 @@ class Stage:
     #: Frames that are to be sent, and power that is to be switched.
     out: list[Frame] = field(default_factory=list)
     power: list[bool] = field(default_factory=list)
+    #: The kit has switched the node off.
+    is_off: bool = False
     words: dict[type[Message], list[Word]] = field(default_factory=lambda: defaultdict(list))
     #: Frames of the node under test that are no message, with why.
     wrong: list[tuple[Shown, Reason]] = field(default_factory=list)
     #: Tasks that the fleet has awarded to the node.
     awarded: set[Reference] = field(default_factory=set)
+    #: In which epoch the site is: that of the node's first heartbeat, until rights are made anew.
+    epoch: int = -1
     #: When the node was last heard.
     heard_us: int = 0
     #: Told every word of the node.
@@ -85,11 +89,13 @@ class Stage:
     def __post_init__(self) -> None:
         self.decoder = Decoder(self.codec)
         self.machine: Machine = self.site.machines[self.node]
-        fixed = [node for node, one in self.site.machines.items() if one.station is not None]
-        #: The first compartment: it calls, is the bus time and the steward; and another machine, 0 where there is none.
+        fixed = sorted(node for node, one in self.site.machines.items() if one.station is not None)
+        #: The first compartment: it calls, is the bus time and the steward; and another, 0 where there is none.
         self.caller = min(fixed)
         self.stranger = next(node for node in range(250, 0, -1) if node not in self.site.machines)
-        self.other = next((node for node in sorted(self.site.machines) if node not in (self.caller, self.node)), 0)
+        self.other = next((node for node in fixed if node != self.caller), 0)
+        #: Another robot that the kit plays, 0 where there is none.
+        self.rival = next((node for node in self.site.machines if node not in (*fixed, self.node)), 0)
 
     # --- in ------------------------------------------------------------------------------------------------------
 
@@ -107,6 +113,8 @@ class Stage:
             for single in singles(one) if one is not None else ():
                 word = Word(self.now_us, single, frame)
                 self.words[type(single)].append(word)
+                if isinstance(single, Heartbeat) and self.epoch < 0:
+                    self.epoch = single.epoch
                 for tell in self.hearers:
                     tell(word)
 
@@ -171,6 +179,11 @@ class Stage:
         """Frames as they are, wrong ones too."""
         self.out.extend(frames)
 
+    def switch(self, *, on: bool) -> None:
+        """The node's power. While it is off nobody else acknowledges a frame: what is said then comes late."""
+        self.power.append(on)
+        self.is_off = not on
+
     # --- judging -------------------------------------------------------------------------------------------------
 
     def shown(self, frame: Frame, time_us: int | None = None) -> Shown:
@@ -187,8 +200,12 @@ class Stage:
         self.judge(name, not words, why, *words)
 
     def count_of(self, reason: Reason) -> int:
-        """What the node last told of its drops for a reason."""
-        told = [one.message.count for one in self.words[Diagnostic] if one.message.reason is reason]
+        """What the node last told of its drops for a reason, in its life of now."""
+        beats = self.words[Heartbeat]
+        born_us = next(
+            (a.time_us for a, b in zip(beats[-2::-1], beats[:0:-1], strict=True) if a.message.boot != b.message.boot), 0
+        )
+        told = [one.message.count for one in self.since(Diagnostic, born_us) if one.message.reason is reason]
         return told[-1] if told else 0
 
     # --- time ----------------------------------------------------------------------------------------------------

@@ -13,7 +13,8 @@ WATCHERS: tuple[Watching, ...] = ((always.ALWAYS, always.watch),)
 def scenes_of(site: Site) -> tuple[Scene, ...]:
     """The scenes in the order in which they are played."""
     own = part(site.system, "conform")
-    return (*joining.SCENES, *(own.SCENES if own is not None else ()), *hostile.SCENES, *halting.SCENES)
+    scenes, last = ((), ()) if own is None else (own.SCENES, own.LAST)
+    return (*joining.SCENES, *scenes, *hostile.SCENES, *halting.SCENES, *last)
 
 
 def watchers_of(site: Site) -> tuple[Watching, ...]:

@@ -89,17 +89,8 @@ class Mirror:
                 self._forget_plan(beat.sender)
             self.boots_before[beat.sender] = known.boot if known is not None else 0
         since_us = now_us if known is None or fresh else known.since_us
-        self.peers[beat.sender] = Peer(
-            beat.kind,
-            beat.state,
-            beat.boot,
-            beat.mirror_digest,
-            now_us,
-            beat.contract,
-            beat.site_digest,
-            since_us,
-            beat,
-        )
+        word = (beat.kind, beat.state, beat.boot, beat.mirror_digest)
+        self.peers[beat.sender] = Peer(*word, now_us, beat.contract, beat.site_digest, since_us, beat)
         return fresh
 
     def _has_just_come(self, peer: Peer, now_us: int) -> bool:

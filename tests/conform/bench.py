@@ -19,6 +19,8 @@ from onboard.systems.car_park.site import CarPark, car_park
 from onboard.wire.codec import fleet_codec
 
 SITE = car_park(load_site(Path(__file__).parent / "bench.toml"))
+#: The robot alone, then with another.
+SITES = (SITE, car_park(load_site(Path(__file__).parent / "pair.toml")))
 WHEELBASE_MM = 2_870
 #: No play is longer, s of virtual time.
 LIMIT_S = 3_600.0
@@ -80,13 +82,14 @@ def play(
     site: CarPark = SITE,
     means: Means = ALL,
     joins: Callable[[Simulation], Switch] = ours,
+    stops_at_first: bool = False,
 ) -> Player:
     """The whole play, or these scenes of it behind the first; the player when it is over."""
     names, every = set(scenes), scenes_of(site)
     wanted: list[Scene] = [one for one in every if not names or one.name in names or one is every[0]]
     loop = VirtualTimeLoop()
     try:
-        return loop.run_until_complete(_play(wanted, site, means, joins, loop))
+        return loop.run_until_complete(_play(wanted, site, means, joins, loop, stops_at_first))
     finally:
         loop.close()
 
@@ -97,6 +100,7 @@ async def _play(
     means: Means,
     joins: Callable[[Simulation], Switch],
     loop: VirtualTimeLoop,
+    stops_at_first: bool,
 ) -> Player:
     nobody = frozenset(one.name for one in site.machines.values())
     simulation = build(site, RunOptions(seed=1, without=nobody), loop)
@@ -106,7 +110,7 @@ async def _play(
     simulation.start()
     switch = joins(simulation)
     node = site.machine("MR1").node_id
-    player = Player(site, node, fleet_codec(), scenes, means, watchers_of(site))
+    player = Player(site, node, fleet_codec(), scenes, means, watchers_of(site), stops_at_first=stops_at_first)
     if not means.power:
         switch(True)
     bench = VirtualBench(player, simulation, switch)

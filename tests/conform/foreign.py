@@ -37,8 +37,12 @@ class ForeignLife:
             self.timer.cancel()
 
     def on_frame(self, name: str, frame: Frame, _: int) -> None:
-        if self.is_on and frame.is_extended and not frame.is_remote:
+        if not self.is_on:
+            return
+        if frame.is_extended and not frame.is_remote:
             self.carry_out(self.robot.receive(name, frame.arbitration_id, frame.data, self.loop.now_us()))
+        elif name == FLEET:
+            self.carry_out(self.robot.drop("UNKNOWN_IDENTIFIER", self.loop.now_us()))
 
     def wake(self) -> None:
         self.carry_out(self.robot.wake(self.loop.now_us()))

@@ -13,7 +13,7 @@ import pytest
 
 from onboard.cli import main as onboard
 from onboard.conform.checks import Check, CheckResult, Findings, Verdict
-from onboard.conform.player import Player
+from onboard.conform.player import Player, Scene
 from onboard.conform.report import NodeUnderTest, frame_words, junit, lines_of, protocol, status, totals
 from onboard.conform.stage import Means
 from onboard.conform.suite import scenes_of, watchers_of
@@ -22,7 +22,7 @@ from onboard.core.negotiation.participant import Participant
 from onboard.holon.holding import HoldResponse, MachineHolds
 from onboard.wire.codec import fleet_codec
 from tests.conform import foreign
-from tests.conform.bench import ALL, SITE, play
+from tests.conform.bench import ALL, SITE, SITES, play
 from tests.project.rows import ROOT
 from tests.tools import DEADLINE_S
 
@@ -32,6 +32,8 @@ CHECKS: tuple[Check, ...] = (
     *(check for scene in scenes_of(SITE) for check in scene.checks),
     *(check for checks, _ in watchers_of(SITE) for check in checks),
 )
+#: Scenes that are played only where there is a second robot.
+WITH_ANOTHER = [one for one in scenes_of(SITE) if one.needs_rival]
 SUBJECT = NodeUnderTest(
     11, "MR1", "robot", "bench", 0xABCD, 254, "onboard 0", "virtual bench", "2026-01-01T00:00:00+00:00"
 )
@@ -79,8 +81,18 @@ def test_the_page_lists_the_duties_that_no_check_judges() -> None:
 def test_our_robot_keeps_to_all_of_it() -> None:
     findings = ours().findings
     broken = [line for one in findings.of(Verdict.FAILED) for line in lines_of(one, frame_words)]
-    assert broken == [] and names(findings, Verdict.NOT_REACHED) == []
-    assert status(findings) == 0
+    assert broken == [] and status(findings) == 0
+    alone = "the site has no further robot that the kit could speak as"
+    assert {one.scene for one in findings.of(Verdict.NOT_REACHED)} == {one.name for one in WITH_ANOTHER}
+    assert {one.why for one in findings.of(Verdict.NOT_REACHED)} == {alone}
+
+
+@pytest.mark.parametrize("scene", WITH_ANOTHER, ids=lambda one: one.name)
+def test_our_robot_keeps_to_all_of_it_beside_another(scene: Scene) -> None:
+    findings = play((scene.name,), site=SITES[1]).findings
+    broken = [line for one in findings.of(Verdict.FAILED) for line in lines_of(one, frame_words)]
+    reached = {one.check.name for one in findings.of(Verdict.PASSED)}
+    assert broken == [] and {one.name for one in scene.checks} <= reached
 
 
 def test_without_a_switch_and_a_car_it_is_judged_as_far_as_it_can_be() -> None:
@@ -93,14 +105,15 @@ def test_without_a_switch_and_a_car_it_is_judged_as_far_as_it_can_be() -> None:
     }
 
 
-def test_the_robot_of_the_page_keeps_to_what_a_calm_park_needs_and_no_more() -> None:
-    """It was never asked before what it does about a stop, strangers or its own number: nothing (docs/conform.md)."""
-    findings = play(("questions", "bids", "emergency stop"), joins=foreign.joins).findings
+def test_the_robot_of_the_page_keeps_to_much_and_not_to_all() -> None:
+    """It parks, stops and tells what was wrong; it does not notice a second node of its number (docs/conform.md)."""
+    scenes = ("questions", "bids", "emergency stop", "short frames", "parking", "its own number")
+    findings = play(scenes, joins=foreign.joins).findings
     kept = [one.scene for one in findings.of(Verdict.PASSED)]
-    assert {"joining", "questions", "bids"} <= set(kept)
+    assert {"joining", *scenes[:4]} <= set(kept)
     broken = {one.scene for one in findings.of(Verdict.FAILED)}
-    assert "bids" not in broken and "joining" not in broken
-    assert "stop-is-obeyed" in names(findings, Verdict.FAILED)
+    assert not broken & {"joining", *scenes[:4]}
+    assert "own-number-holds-it" in names(findings, Verdict.FAILED)
 
 
 def test_who_is_not_there_does_not_conform() -> None:
@@ -184,10 +197,10 @@ MISTAKES = [
 ]
 
 
-def test_a_site_with_lifts_and_further_robots_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_site_with_lifts_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["conform", "--node", "11", "--kind", "robot", "--site", "small", "-i", "virtual", "-c", "none"]
     assert onboard(words) == 2
-    assert "--site small: it has ER1, ER2, MR2 beside MR1; only compartments are played" in capsys.readouterr().err
+    assert "--site small: it has ER1, ER2; lifts are not played yet" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("words", "told"), MISTAKES)

@@ -11,6 +11,7 @@ from tests.foreign.site import side_of
 from tests.foreign.talk import Frame, Talk
 from tests.foreign.words import Word, decode, singles
 from tests.foreign.work import Step
+from tests.foreign.wrong import fault_of
 
 _ABOARD = 65535
 _RETRACTED = ("REACH", "GRIP", "RETRACT"), ("REACH", "RELEASE", "RETRACT")
@@ -23,10 +24,11 @@ class Robot(Talk):
 
     def receive(self, bus: str, number: int, data: bytes, local_us: int) -> list[Frame]:
         """A frame of either bus."""
+        fault = fault_of(self.alley.nodes, self.alley.node, number, data) if bus == "fleet" else ""
+        if fault:
+            return self.drop(fault, local_us)
         word = decode(bus, number, data)
         if word is None or (bus == "fleet" and word.sender == self.alley.node):
-            return []
-        if bus == "fleet" and word.sender not in (*self.alley.nodes, *range(251, 256)):
             return []
         if word.name == "BusTime":
             self._on_time(word, local_us)
@@ -41,6 +43,11 @@ class Robot(Talk):
             for one in singles(word):
                 self._hear(one)
         return self._go_on()
+
+    def drop(self, reason: str, local_us: int) -> list[Frame]:
+        """A frame that does not count (duty F3)."""
+        self.drops.add(reason)
+        return self.wake(local_us)
 
     def wake(self, local_us: int) -> list[Frame]:
         """Something is due."""
@@ -71,9 +78,13 @@ class Robot(Talk):
             self.program.stamp = 0, self.alley.node, 0
             self._place()
             self._publish()
-        if self.rights.is_synced and self.program.version:
+        if self.stops.is_held(self.now_us):
+            self.order_due_us = None
+            self.rights.wanted.clear()
+        elif self.rights.is_synced and self.program.version:
             self._work()
         self.rights.wake(self.now_us)
+        self.words += self.drops.due(self.alley.beat_us, self.now_us)
         self._answer()
         if self.beat_due_us <= self.now_us:
             self._beat()

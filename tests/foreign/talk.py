@@ -12,6 +12,7 @@ from tests.foreign.rights import Key, Rights
 from tests.foreign.site import Alley, delay_us
 from tests.foreign.words import FOLDER, Signals, Word, encode, joined
 from tests.foreign.work import Call, Program, Step, Task, least_us, solve
+from tests.foreign.wrong import Drops, Stops
 
 #: Bus ("fleet", "device"), identifier, bytes.
 Frame = tuple[str, int, bytes]
@@ -44,6 +45,7 @@ class Talk:
     quiet_until_us: int = 0
     apart: int = 0
     askers: set[int] = field(default_factory=set)
+    boots: dict[int, int] = field(default_factory=dict)
     drive: Signals | None = None
     shuttle: Signals | None = None
     sets: dict[tuple[int, int], dict[str, Signals]] = field(default_factory=dict)
@@ -62,6 +64,7 @@ class Talk:
     def __post_init__(self) -> None:
         self.program = Program(self.alley)
         self.rights = Rights(self.alley.node, self._first_holder, self.say)
+        self.drops, self.stops = Drops(), Stops()
 
     def _first_holder(self, key: Key) -> int:
         if key[0] in ("CAR", "TASK"):
@@ -83,13 +86,13 @@ class Talk:
         """When ``wake`` is wanted, own clock."""
         if self.offset_us is None:
             return None
-        times = [self.beat_due_us, self.order_due_us, self.rights.next_due()]
+        times = [self.beat_due_us, self.order_due_us, self.rights.next_due(), self.drops.next_due(self.alley.beat_us)]
         times += [one.due_us for one in self.calls.values()]
         if self.askers:
             times.append(self.quiet_until_us)
         if not self.rights.is_synced:
             times.append(max(self.asked_us + 500_000, self.started_us + self.alley.beat_us))
-        if self.program.steps:
+        if self.program.steps and not self.stops.is_held(self.now_us):
             step = self.program.steps[0]
             times.append(step.end_us if step.action == "STAND" else step.end_us + 2_000_000)
         return max(self.now_us, min(one for one in times if one is not None)) - self.offset_us
@@ -143,6 +146,8 @@ class Talk:
         """J5, and what it does."""
         if not self.program.version:
             return "STARTING"
+        if self.stops.is_held(self.now_us):
+            return "OBSTACLE"
         return "WORKING" if self.program.steps else "IDLE"
 
     def digest(self) -> int:
@@ -155,6 +160,9 @@ class Talk:
     def _beat(self) -> None:
         mine = {"contract": self.contract, "site_digest": self.alley.digest, "mirror_digest": self.digest()}
         self.say("Heartbeat", {**mine, "boot": self.boot, "kind": "ROBOT", "state": self.state, "epoch": 0})
+        if self.stops.since_us:
+            why = {"reason": "EMERGENCY_STOP", "cause": min(self.stops.since_us), "needs_person": 0}
+            self.say("Halted", {"machine": self.alley.node, **why, "boot": self.boot})
         nodes, beat_us = sorted(self.alley.nodes), self.alley.beat_us
         phase_us = nodes.index(self.alley.node) * beat_us // len(nodes)
         self.beat_us = self.now_us
@@ -185,10 +193,21 @@ class Talk:
     def _hear(self, word: Word) -> None:
         given = word.signals
         match word.name:
+            case "EmergencyStop":
+                self.stops.since_us[word.sender] = self.beat_due_us = self.now_us
+            case "Go":
+                self.stops.go(given["stopper"], self.now_us)
+            case "TokenRequest" if self.stops.is_held(self.now_us):
+                pass
             case "Heartbeat":
+                self.boots[word.sender] = given["boot"]
                 self._compare(word)
             case "SyncRequest" if given["whom"] in (0, self.alley.node):
                 self.askers.add(word.sender)
+                if not given["whom"] and word.sender in self.boots:
+                    # R5: it was started again.
+                    self.rights.asked.add(word.sender)
+                    self.say("SyncRequest", {"whom": word.sender, "boot_before": self.boots[word.sender]})
             case "SyncDone" if given["whom"] in (0, self.alley.node):
                 self.answered.add(word.sender)
                 self.rights.asked.discard(word.sender)
@@ -271,6 +290,7 @@ class Talk:
         """B4 to B6, B8."""
         call.due_us = None
         is_ready = self.rights.is_synced and self.program.version and self.far_us is None
+        is_ready = is_ready and not self.stops.is_held(self.now_us)
         if not is_ready or self.now_us >= call.deadline_us - 2 * self.alley.guard_us or not self._solve(call):
             return
         mine = -(-call.cost_us // 1000), self.alley.node
@@ -284,6 +304,7 @@ class Talk:
         given = word.signals
         task = given["task_origin"], given["task_number"]
         if given["winner"] != self.alley.node or given["result"] != "AWARDED":
+            self._lose(word, task)
             return
         call = self.calls.get((word.sender, given["call"]))
         in_hand = [step for step in self.program.works() if step.call is not None and step.call.task == task]
@@ -300,6 +321,28 @@ class Talk:
             self.rights.journal.append(("won", task))
             self._publish()
             self._report(task, "AWARDED", next(step.station for step in reversed(call.steps) if step.call is not None))
+
+    def _lose(self, word: Word, task: Task) -> None:
+        """U6, B7: its initiator takes it back, or gives it to another; without work left the robot goes home."""
+        given = word.signals
+        self.calls.pop((word.sender, given["call"]), None)
+        mine = [step for step in self.program.works() if step.call is not None and step.call.task == task]
+        is_newer = given["result"] == "AWARDED" and given["task_version"] > 1
+        is_taken = bool(mine) and mine[0].takes and mine[0].call is not None and mine[0].call.initiator == word.sender
+        if not is_taken or not (is_newer or given["result"] in ("REJECTED", "WITHDRAWN")):
+            return
+        others = [step.call for step in self.program.works() if step.takes and step.call is not None]
+        first = self.program.steps[:1] if self.program.steps[0].action == "TRAVEL" else []
+        self.program.steps, self.begun = first, first[0] if first and self.begun is first[0] else None
+        for call in others:
+            if call.task != task and self._solve(call):
+                kept, _, _ = self.program.free_from(self._here, self.now_us)
+                self.program.steps = [*kept, *call.steps]
+        if not self.program.works():
+            self.program.go_home(self._here, self.now_us)
+        self.actions = []
+        self.rights.wanted.clear()
+        self._publish()
 
     # --- words ---------------------------------------------------------------------------------------------------
 

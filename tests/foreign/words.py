@@ -36,7 +36,8 @@ def _by_name(bus: str) -> dict[str, Message]:
 
 
 @cache
-def _by_number(bus: str) -> dict[int, Message]:
+def by_number(bus: str) -> dict[int, Message]:
+    """All messages of a DBC file by their identifier without a node-ID."""
     return {one.frame_id: one for one in database(bus).messages}
 
 
@@ -48,7 +49,7 @@ def encode(bus: str, sender: int, name: str, signals: Signals) -> tuple[int, byt
 
 def decode(bus: str, number: int, data: bytes) -> Word | None:
     """The word of a frame; None for one that the DBC does not have (duties F2, F3)."""
-    message = _by_number(bus).get(number & ~0xFF)
+    message = by_number(bus).get(number & ~0xFF)
     if message is None or not number & 0xFF or len(data) < message.length:
         return None
     found = message.decode(data)

@@ -103,6 +103,11 @@ class Program:
         last = self.steps[kept - 1]
         return self.steps[:kept], last.end, max(last.end_us, now_us)
 
+    def go_home(self, place: int, now_us: int) -> None:
+        """Behind the run in hand to the refuge, without work."""
+        end, us = (self.steps[-1].end, self.steps[-1].end_us) if self.steps else (place, now_us)
+        _go(self.alley, self.steps, end, self.alley.home, max(us, now_us))
+
     def works(self) -> list[Step]:
         """Work in hand."""
         return [step for step in self.steps if step.action == "WORK"]

@@ -40,9 +40,9 @@ FIRST = (
 def first(stage: Stage, cast: Cast) -> Play:
     """Off and on, on a bus without time; then the fleet comes."""
     if stage.means.power:
-        stage.power.append(False)
+        stage.switch(on=False)
         yield from stage.pause(1.0)
-        stage.power.append(True)
+        stage.switch(on=True)
     begin_us = stage.now_us
     yield from stage.pause(3.0)
     known_us = stage.now_us
@@ -107,6 +107,7 @@ ANSWERS = (
     Check("done-is-the-last", "R3", "then `SyncDone` naming who asked."),
     Check("done-tells-the-life", "R3", "then `SyncDone` naming who asked."),
     Check("answers-who-asks-all", "R3", "A `SyncRequest` to me or to all is answered with what I vouch for"),
+    Check("asks-who-asks-all", "R5", "Whoever asks all was started again: it is asked at once"),
     Check("answers-a-tool", "R3", "A `SyncRequest` to me or to all is answered with what I vouch for"),
     Check(
         "shares-an-answer",
@@ -137,10 +138,14 @@ def answers(stage: Stage, cast: Cast) -> Play:
         stage.judge("done-tells-the-life", beat and beat.message.boot == done.message.boot, "another boot", done, beat)
     yield from stage.pause(1.0)
     for name, sender, whom in (("answers-who-asks-all", stage.caller, 0), ("answers-a-tool", OPERATOR, stage.node)):
+        begin_us = stage.now_us
         stage.say(SyncRequest(sender, whom))
         done = yield from stage.hears(SyncDone, within_s=2.0)
         stage.judge(name, done, "no SyncDone within 2 s", done)
         yield from stage.pause(1.0)
+        if not whom:
+            asks = [one for one in stage.since(SyncRequest, begin_us) if one.message.whom == sender]
+            stage.judge("asks-who-asks-all", asks, "asks nothing", done, *asks)
     yield from _shared(stage, cast)
     for name, sender, whom in (
         ("leaves-questions-to-others", stage.caller, stage.other or stage.stranger),
@@ -280,12 +285,12 @@ def another_life(stage: Stage, cast: Cast) -> Play:
     """Off and on while the fleet lives; one machine of it does not answer at first."""
     slow = cast.parts.get(stage.other)
     last = stage.last(Heartbeat)
-    stage.power.append(False)
+    stage.switch(on=False)
     yield from stage.pause(1.0)
     begin_us = stage.now_us
     if slow is not None:
         slow.answers = False
-    stage.power.append(True)
+    stage.switch(on=True)
     beat = yield from stage.hears(Heartbeat, within_s=12.0)
     if beat is not None and last is not None:
         grown = beat.message.boot == last.message.boot % 255 + 1

@@ -209,9 +209,8 @@ class Initiator:
         assert self.call is not None
         self.best = None
         for node, cost in self.bids.items():
-            if self.is_obstacle(node):
-                continue
-            if self.best is None or beats(cost, node, *self.best, self.call.criterion):
+            is_best = self.best is None or beats(cost, node, *self.best, self.call.criterion)
+            if is_best and not self.is_obstacle(node):
                 self.best = (cost, node)
 
     def _is_below_floor(self, cost: int) -> bool:

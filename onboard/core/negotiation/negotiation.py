@@ -99,18 +99,12 @@ class Negotiation:
 
     def call_off(self, task: Reference, reason: Reason, now_us: int) -> Outcome:
         """Nobody is to do a ``task`` of mine any more: its open call is withdrawn, an award under way given up."""
-        outcome: Outcome = []
-        for initiator in self.initiators:
-            if initiator.terms.task == task:
-                outcome += initiator.withdraw(now_us)
-        return outcome + self.abandon(task, reason, now_us)
+        withdrawn = [item for one in self.initiators if one.terms.task == task for item in one.withdraw(now_us)]
+        return withdrawn + self.abandon(task, reason, now_us)
 
     def abandon(self, task: Reference, reason: Reason, now_us: int) -> Outcome:
         """Give up own awards for a ``task`` whose winner was not heard; see ``Initiator.abandon``."""
-        outcome: Outcome = []
-        for initiator in self.initiators:
-            if initiator.terms.task == task:
-                outcome += initiator.abandon(reason, now_us)
+        outcome = [item for one in self.initiators if one.terms.task == task for item in one.abandon(reason, now_us)]
         self.trust.forfeited(task, now_us)
         self._forget(now_us)
         return outcome

@@ -61,7 +61,7 @@ class ShuttleWork:
     sequence: int = 0
     sensed: ShuttleState | None = None
     fault: bool = False
-    stall: Stall = field(default_factory=Stall)
+    stall: Stall = field(default_factory=lambda: Stall(repeats=False))
     _resuming: bool = False
     _ordered: ShuttleOrder | None = None
     _unheard: Unheard = field(default_factory=Unheard)

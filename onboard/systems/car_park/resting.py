@@ -9,7 +9,6 @@ second time, by the next one every second time of those left, and so on (Daskin,
 Model", 1983, has the same independent chance of being busy).
 """
 
-from bisect import insort
 from collections import Counter, deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -90,9 +89,7 @@ class Resting:
         return self._due_us if self.is_on and self.program.step is None else None
 
     def sets_off(self, now_us: int) -> bool:
-        """Whether a robot with nothing to do goes elsewhere: its program leads there then, and is to be told."""
-        if not self.is_on:
-            return False
+        """Whether a robot with nothing to do goes elsewhere, where that ``is_on``: its program leads there then."""
         if self.program.version != self._version:
             self._version, self._due_us = self.program.version, max(self._due_us or 0, now_us + self._rest_us)
         if self._due_us is None or now_us < self._due_us:
@@ -155,6 +152,5 @@ class Resting:
 
 def _met_us(mine_us: int, others_us: list[int]) -> int:
     """How long a call waits for its robot on average, where each is busy every second time."""
-    times = list(others_us)
-    insort(times, mine_us)
+    times = sorted((*others_us, mine_us))
     return sum(time_us >> place for place, time_us in enumerate(times, start=1))

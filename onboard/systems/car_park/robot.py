@@ -306,7 +306,7 @@ class ParkingRobot:
                 return effects + self.holding.come_to_rest(now_us)
             step = self.program.step
             if step is None:
-                if not self.resting.sets_off(now_us):
+                if not (self.resting.is_on and self.resting.sets_off(now_us)):
                     return effects + self.carriage.advance(now_us)
                 effects += self._publish(now_us)
                 continue

@@ -14,6 +14,8 @@ STALL_US = 8_000_000
 #: A word on the way is said where the last is this old, us: plan and speed tell the rest, a segment goes back after the
 #: word, and who is thought to stand is given 20 s (``onboard/ways/standing.py``).
 PLACE_US = 8_000_000
+#: Orders to a drive are repeated; one whose last is older has none, us: five times the longest period of their repeat.
+FRESH_US = 1_000_000
 
 MOVES = (DriveMode.MOVING, DriveMode.BRAKING)
 
@@ -22,15 +24,24 @@ Place = TypeVar("Place")
 
 @dataclass
 class Stall:
-    """Watches one drive; all times in us of one clock."""
+    """Watches one drive; all times in us of one clock.
 
+    ``repeats``: its orders are repeated, and who ceased to (a stop holds the machine) has not ordered anything.
+    """
+
+    repeats: bool = True
+    _ordered_us: int = 0
     _since_us: int | None = None
     _position_mm: int | None = None
 
     def ordered(self, now_us: int) -> None:
         """The drive has an order to go on."""
-        if self._since_us is None:
+        if self._since_us is None or not self._is_fresh(now_us):
             self._since_us = now_us
+        self._ordered_us = now_us
+
+    def _is_fresh(self, now_us: int) -> bool:
+        return not self.repeats or now_us - self._ordered_us < FRESH_US
 
     def rests(self) -> None:
         """Nothing is asked of the drive."""
@@ -49,7 +60,7 @@ class Stall:
 
     def is_stuck(self, now_us: int) -> bool:
         """Whether it has not by now."""
-        return self._since_us is not None and now_us - self._since_us >= STALL_US
+        return self._since_us is not None and now_us - self._since_us >= STALL_US and self._is_fresh(now_us)
 
 
 @dataclass

@@ -1,6 +1,31 @@
 """What the kit of conformity (onboard/conform) plays and judges of a car park's nodes."""
 
-from onboard.systems.car_park.conform import awards, blocked, calls, plans, rights, work
+from onboard.systems.car_park.conform import (
+    anew,
+    awards,
+    blocked,
+    calls,
+    company,
+    lives,
+    meanwhile,
+    plans,
+    rights,
+    work,
+    yielding,
+)
 
-SCENES = (*calls.SCENES, *awards.SCENES, *blocked.SCENES, *rights.SCENES, *work.SCENES)
+SCENES = (
+    *calls.SCENES,
+    *awards.SCENES,
+    *blocked.SCENES,
+    *rights.SCENES,
+    *work.SCENES,
+    lives.CUT,
+    *meanwhile.SCENES,
+    lives.STOP,
+    *company.SCENES,
+    *yielding.SCENES,
+)
 WATCHERS = ((plans.PLANS, plans.watch),)
+#: Behind all others: rights that are made anew, and a node that has lost its own.
+LAST = anew.LAST

@@ -6,8 +6,8 @@ from onboard.conform.cast import Cast, silent
 from onboard.conform.checks import Check
 from onboard.conform.player import Scene
 from onboard.conform.stage import SECOND, Play, Stage, Wait, Word
-from onboard.contract.codes import CallResult, Grade, LegAction, TaskPhase, TokenKind
-from onboard.contract.messages import CallForProposals, Itinerary, Reference, TaskReport, TokenRequest
+from onboard.contract.codes import CallResult, Grade, LegAction, Reason, TaskPhase, TokenKind
+from onboard.contract.messages import Award, CallForProposals, Itinerary, Reference, TaskReport, TokenRequest
 from onboard.systems.car_park.conform.desk import Desk
 
 _ONLY = "I act on a task only when `Award` names me with AWARDED."
@@ -173,6 +173,8 @@ OTHERS = (
     Check("rejected-task-is-dropped", "U6", _LOST),
     Check("award-of-an-unknown-task-is-answered", "U4", _UNKNOWN),
     Check("unknown-task-is-forfeited", "U3", "or FORFEITED where I do not have it"),
+    Check("award-of-an-unknown-call-to-another-is-not-answered", "U4", "An award for me, in a call that I do not know"),
+    Check("withdrawal-of-an-unknown-call-is-not-answered", "U4", "An award for me, in a call that I do not know"),
     Check("late-award-counts", "B9", "An award that comes after `T_belief` still counts"),
     Check("gives-its-bid-up-after-T-belief", "B7", "or `T_belief` after the deadline."),
     Check("withdrawal-of-a-stranger-is-none", "U6", "from its initiator."),
@@ -206,6 +208,16 @@ def others(stage: Stage, cast: Cast) -> Play:
     stage.judge("award-of-an-unknown-task-is-answered", answer, "no answer within 2 s", answer)
     forfeited = answer is not None and answer.message.phase is TaskPhase.FORFEITED
     stage.judge("unknown-task-is-forfeited", forfeited, "not FORFEITED", answer)
+    for name, winner, result in (
+        ("award-of-an-unknown-call-to-another-is-not-answered", stage.other or stage.stranger, CallResult.AWARDED),
+        ("withdrawal-of-an-unknown-call-is-not-answered", stage.node, CallResult.WITHDRAWN),
+    ):
+        task = Reference(stage.caller, 9_998)
+        begin_us = stage.now_us
+        stage.say(Award(stage.caller, 0x0EEE, winner, task, 1, result, Reason.NONE))
+        yield from stage.pause(1.5)
+        told = [one for one in stage.since(TaskReport, begin_us) if one.message.task == task]
+        stage.none_of(name, told, "it answers")
     yield from _late(stage, desk)
 
 

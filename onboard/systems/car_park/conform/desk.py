@@ -10,7 +10,7 @@ from onboard.conform.stage import SECOND, Stage, Wait, Word
 from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, Reason, TokenKind
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import Award, Bid, CallForProposals, CarAt, Reference
-from onboard.core.site import Station
+from onboard.core.site import Segment, Station
 from onboard.core.token_keys import TokenKey
 from onboard.systems.car_park.site import CarPark, car_park
 
@@ -54,6 +54,14 @@ class Desk:
     def car_key(self) -> TokenKey:
         """The token of the car."""
         return TokenKey(TokenKind.CAR, self.car.origin << 16 | self.car.number)
+
+    def segment_at(self, track: int, index: int) -> Segment:
+        """The segment that a position is in: beyond a linked end it is the mouth."""
+        return self.site.mouths.get(Segment(track, index), Segment(track, index))
+
+    def segment_key(self, track: int, index: int) -> TokenKey:
+        """The token of the segment that a position is in, so of the mouth for one beyond a linked end."""
+        return TokenKey(TokenKind.SEGMENT, self.segment_at(track, index).number)
 
     @property
     def wheelbase_mm(self) -> int:
@@ -126,6 +134,10 @@ class Desk:
         else:
             self.award(call, self.stage.node)
         return call, bid
+
+    def wins_back(self, place: int) -> Generator[Wait, None, tuple[CallForProposals, Word | None]]:
+        """The same for the car to be fetched from where it stands."""
+        return (yield from self.wins(operation=Operation.RETRIEVE, from_station=place, to_station=self.bay.number))
 
     # --- figures -------------------------------------------------------------------------------------------------
 

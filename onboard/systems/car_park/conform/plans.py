@@ -5,14 +5,16 @@ from itertools import pairwise
 from onboard.conform.cast import Cast
 from onboard.conform.checks import Check
 from onboard.conform.stage import Stage, Word
-from onboard.contract.codes import Grade, LegAction, TokenKind
+from onboard.contract.codes import Grade, LegAction
 from onboard.contract.messages import Itinerary, Leg, Progress, TaskReport
-from onboard.core.token_keys import TokenKey
+from onboard.core.site import Segment
 from onboard.systems.car_park.conform.desk import Desk
 from onboard.systems.car_park.site import car_park
 
 #: Duty P13.
 _MOST_LEGS = 31
+#: Duty P9, and what a word may take, ms.
+_LATE_MS, _SOON_MS = 2_300, 800
 _FOLLOW = "The legs follow each other in time and place: leg n begins when and where leg n - 1 ends"
 
 PLANS = (
@@ -30,6 +32,16 @@ PLANS = (
     Check("plan-ends-in-a-refuge", "P5", "A plan ends in a refuge: a segment that is before no compartment"),
     Check("place-names-its-plan", "P10", "`itinerary_version` and `leg` are of the plan in hand."),
     Check("place-names-a-leg", "P10", "`itinerary_version` and `leg` are of the plan in hand."),
+    Check(
+        "is-where-its-plan-has-it",
+        "P9",
+        ("A robot whose step is, or will be, 2 s late tells its plan anew while the step still lasts"),
+    ),
+    Check(
+        "is-there-no-sooner-than-planned",
+        "P9",
+        "where what follows begins more than 0.5 s later or sooner than planned.",
+    ),
     Check("is-only-where-it-may-be", "K2", "I move, or let move, only within segments whose tokens I hold"),
     Check("reports-only-what-was-awarded", "B9", "I act on a task only when `Award` names me with AWARDED."),
 )
@@ -57,7 +69,7 @@ class PlanJudge:
         if plan.grade is not Grade.FIRM or not plan.legs:
             return
         stage, pairs = self.stage, list(pairwise(plan.legs))
-        joined = all((a.track, a.to_index) == (b.track, b.from_index) for a, b in pairs)
+        joined = all((a.track, a.to_index) == (b.track, b.from_index) or self._turns(a, b) for a, b in pairs)
         stage.judge("legs-follow-in-place", joined, "a leg begins where none ends", word)
         ordered = all((b.end_ms - a.end_ms) % 2**32 < 2**31 for a, b in pairs)
         stage.judge("legs-follow-in-time", ordered, "a leg ends before the one before it", word)
@@ -71,8 +83,17 @@ class PlanJudge:
             is_refuge = (last.track, last.to_index) not in {bay.segment for bay in self.site.compartments.values()}
             stage.judge("plan-ends-in-a-refuge", is_refuge, "ends before a compartment", word)
 
+    def _turns(self, before: Leg, leg: Leg) -> bool:
+        """Whether a leg goes over a linked end, from where the one before it ends."""
+        here, there = Segment(before.track, before.to_index), Segment(leg.track, leg.from_index)
+        tracks = [self.site.tracks[one] for one in {here.track, there.track} if one in self.site.tracks]
+        ends = [{mouth, track.inside(index)} for track in tracks for index, mouth in track.ends]
+        return leg.action is LegAction.TRAVEL and leg.from_index == leg.to_index and {here, there} in ends
+
     def _lasts(self, before: Leg, leg: Leg) -> bool:
         lasts_us = (leg.end_ms - before.end_ms) % 2**32 * 1000
+        if leg.from_index == leg.to_index:
+            return lasts_us >= self.desk.run_us(0, 1) + self.site.carrier_turn_us - 2_000
         return lasts_us >= self.desk.run_us(leg.from_index, leg.to_index) - 2_000
 
     def _on_leg(self, word: Word, leg: Leg) -> None:
@@ -93,10 +114,23 @@ class PlanJudge:
         if plan is not None and at.itinerary_version:
             is_its = at.itinerary_version == plan.message.version
             stage.judge("place-names-its-plan", is_its, f"the plan is {plan.message.version}", plan, word)
+            self._in_time(plan, word, at)
             stage.judge("place-names-a-leg", at.leg <= len(plan.message.legs), "no such leg", plan, word)
-        holder = self.cast.holder(TokenKey(TokenKind.SEGMENT, at.track << 8 | at.index))[0]
+        holder = self.cast.holder(self.desk.segment_key(at.track, at.index))[0]
         if stage.means.power:
             stage.judge("is-only-where-it-may-be", holder == stage.node, f"node {holder} has the segment", word)
+
+    def _in_time(self, plan: Word, word: Word, at: Progress) -> None:
+        """A place that it tells while it moves is one of the leg in hand, between its begin and its end."""
+        stage, legs = self.stage, plan.message.legs
+        if at.itinerary_version != plan.message.version or not (at.speed_mm_s and at.leg < len(legs)):
+            return
+        begin_ms = legs[at.leg - 1].end_ms if at.leg else plan.message.stamp.award_ms
+        now_ms = stage.bus_ms()
+        late_ms = (now_ms - legs[at.leg].end_ms + 2**31) % 2**32 - 2**31
+        soon_ms = (begin_ms - now_ms + 2**31) % 2**32 - 2**31
+        stage.judge("is-where-its-plan-has-it", late_ms <= _LATE_MS, f"{late_ms} ms behind the leg's end", plan, word)
+        stage.judge("is-there-no-sooner-than-planned", soon_ms <= _SOON_MS, f"{soon_ms} ms before it", plan, word)
 
 
 def watch(stage: Stage, cast: Cast) -> None:

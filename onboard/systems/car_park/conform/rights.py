@@ -3,7 +3,7 @@
 from collections.abc import Generator
 from itertools import pairwise
 
-from onboard.conform.cast import Cast, grants, silent
+from onboard.conform.cast import Cast, silent
 from onboard.conform.checks import Check
 from onboard.conform.player import Scene
 from onboard.conform.stage import MS, SECOND, Play, Stage, Wait, Word
@@ -190,7 +190,7 @@ def taking(stage: Stage, cast: Cast) -> Play:
         yield from _lied_to(stage, cast, key)
     else:
         yield from _granted(stage, cast, key)
-    cast.answer = grants
+    cast.answer = lambda key, _: Reason.NONE if key.kind is TokenKind.SEGMENT else Reason.DOOR_NOT_READY
     yield from stage.pause(0.5)
     moved = yield from stage.hears(Progress, lambda one: one.speed_mm_s != 0, 10.0, asked.time_us)
     stage.judge("moves-when-it-may", moved, "does not move", moved)
@@ -357,7 +357,6 @@ GIVING = (
 
 def _given_away(stage: Stage, cast: Cast, desk: Desk, call: CallForProposals) -> Play:
     """It stands before the bay, whose tokens are refused; what it holds is claimed, asked for and disputed."""
-    cast.answer = lambda key, _: Reason.NONE if key.kind is TokenKind.SEGMENT else Reason.DOOR_NOT_READY
     yield from stage.pause(3.0)
     asked = {one.message.token_kind for one in stage.since(TokenRequest, stage.now_us - 6 * SECOND)}
     for name, kind in (("asks-for-the-bay", TokenKind.STATION), ("asks-for-the-car", TokenKind.CAR)):

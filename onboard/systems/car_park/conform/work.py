@@ -6,7 +6,15 @@ from onboard.conform.player import Scene
 from onboard.conform.stage import SECOND, Heard, Play, Stage, Word
 from onboard.contract.codes import MachineState, Operation, Reason, TaskPhase, TokenKind
 from onboard.contract.constants import ANY_STATION
-from onboard.contract.messages import CallForProposals, CarAt, Heartbeat, TaskReport, TokenGrant, TokenRequest
+from onboard.contract.messages import (
+    CallForProposals,
+    CarAt,
+    Heartbeat,
+    Itinerary,
+    TaskReport,
+    TokenGrant,
+    TokenRequest,
+)
 from onboard.core.token_keys import TokenKey
 from onboard.systems.car_park.conform.desk import Desk
 
@@ -201,6 +209,8 @@ FETCHED = (
     Check("fetched-car-is-at-the-bay", "C3", _LEFT),
     Check("fetched-car-goes-to-the-compartment", "C3", "then the car's token and the station's go to the keeper."),
     Check("fetch-is-done", "U2", "DONE with the station where the car is left when the shuttle is home."),
+    Check("fetch-is-done-when-it-was-promised", "B2", "What it promises it keeps as well as it can"),
+    Check("plan-is-told-anew-only-where-it-changes", "P1", "under `version`, newer with each change"),
     Check("leaves-the-front-of-the-bay", "P5", ("A plan ends in a refuge: a segment that is before no compartment")),
 )
 
@@ -238,6 +248,12 @@ def fetched(stage: Stage, cast: Cast) -> Play:
     stage.judge("fetched-car-goes-to-the-compartment", is_given, "not to the compartment", *given)
     done = yield from _report(stage, call, TaskPhase.DONE, 10.0, begin_us)
     stage.judge("fetch-is-done", done, "no DONE within 10 s", done)
+    if done is not None:
+        late_ms = (stage.bus_ms() - bid.message.cost + 2**31) % 2**32 - 2**31
+        stage.judge("fetch-is-done-when-it-was-promised", abs(late_ms) <= 3_000, f"{late_ms} ms later", bid, done)
+        plans = stage.since(Itinerary, begin_us)
+        # As many as it has steps: one that is over may have taken a little longer or shorter.
+        stage.judge("plan-is-told-anew-only-where-it-changes", len(plans) <= 10, f"{len(plans)} times", *plans)
     front = TokenKey(TokenKind.SEGMENT, desk.bay.segment.number)
     is_free = yield from stage.until(lambda: cast.holder(front)[0] != stage.node, 60.0)
     stage.judge("leaves-the-front-of-the-bay", is_free, "still before the bay after 60 s")
