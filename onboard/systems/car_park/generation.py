@@ -17,6 +17,7 @@ from onboard.core.site import Machine, Segment, Station
 from onboard.systems.car_park.ahead import Ahead, Checked, key_of
 from onboard.systems.car_park.alternatives import Alternative, Solution
 from onboard.systems.car_park.clearance import MAX_EXPANSIONS, Clearance, Seen
+from onboard.systems.car_park.fetching import to_fetch_from
 from onboard.systems.car_park.program import (
     MAX_STEPS,
     STAMP_AHEAD_US,
@@ -299,8 +300,7 @@ class CarParkGeneration:
     ) -> Search[tuple[Solution | None, list[Alternative]]]:
         kept, segment, start_us = start
         bounds = yield from self._bounds(call, now_us, start, reservations)
-        best: Solution | None = None
-        alternatives: list[Alternative] = []
+        best, alternatives = None, list[Alternative]()
         # Places on both sides of a segment are reached and served alike.
         routes: dict[Segment, Route | None] = {}
         for bound_us, _, place in bounds:
@@ -465,7 +465,7 @@ class CarParkGeneration:
         """Places for a class of car at which none stands and that nobody has promised, in the site's order."""
         promised = self._promised(now_us, bid)
         free = [place for place in self.mirror.free_places() if place.number not in promised]
-        return self.site.best_for(car_class, free)
+        return self.site.best_for(car_class, to_fetch_from(self.site, free))
 
     def _promised(self, now_us: int, bid: CallKey | None) -> set[int]:
         """Places at which somebody's plan, or mine, will work: two parkings never aim at one place (row P42)."""

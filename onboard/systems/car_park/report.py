@@ -5,6 +5,7 @@ from collections import Counter
 from onboard.config.site_report import counted, machines_line
 from onboard.contract.codes import KindCode
 from onboard.core.site import Machine, Segment, Station
+from onboard.systems.car_park.fetching import to_fetch_from
 from onboard.systems.car_park.room import (
     MORE,
     ranges_text,
@@ -73,6 +74,14 @@ def _alley_words(site: CarPark, track: Track) -> str:
 
 
 def _places_line(site: CarPark) -> str:
+    unused = len(site.places) - len(to_fetch_from(site, site.places))
+    but = (
+        f"; {unused} of them are not used, as no itinerary can tell the way to fetch a car from there" if unused else ""
+    )
+    return f"{_places_words(site)}{but}"
+
+
+def _places_words(site: CarPark) -> str:
     if not site.classes:
         return f"places: {len(site.places)}"
     numbers = Counter(site.place_class.get(place.number, 0) for place in site.places)
