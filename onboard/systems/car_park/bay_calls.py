@@ -207,8 +207,12 @@ class BayCalls:
         """Nobody brings a car, or another than was thought: the task is over before it began."""
         job, self.job = self.job, None
         assert job is not None
-        outcome = self.fleet.negotiation.call_off(job.task, Reason.CANCELLED, now_us)
-        over = bay_task.void_award(self.fleet.node_id, job.task)
+        return self._call_off(job, now_us)
+
+    def _call_off(self, task: BayTask, now_us: int) -> list[Effect]:
+        """Nobody is to do a task any more: whoever has won it, or might, hears so."""
+        outcome = self.fleet.negotiation.call_off(task.task, Reason.CANCELLED, now_us)
+        over = bay_task.void_award(self.fleet.node_id, task.task)
         return [*(item for item in outcome if not isinstance(item, EVENT_TYPES)), Send(over)]
 
     def review(self, now_us: int) -> list[Effect]:
@@ -256,9 +260,7 @@ class BayCalls:
             self.job = None
         else:
             self.ahead = None
-        outcome = self.fleet.negotiation.abandon(task.task, Reason.CANCELLED, now_us)
-        said = [item for item in outcome if not isinstance(item, EVENT_TYPES)]
-        return [over, *said, Send(bay_task.void_award(self.fleet.node_id, task.task))], is_job
+        return [over, *self._call_off(task, now_us)], is_job
 
     def bay_came_back(self, now_us: int, *, is_loaded: bool) -> tuple[BayPhase | None, list[Effect]]:
         """The robot that had the bay gives it back: the next phase, None while it has the car or sensors are behind.
