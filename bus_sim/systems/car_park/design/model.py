@@ -205,6 +205,8 @@ class DayModel:
         """The bay is empty and locked on both sides: the next car comes in from behind, or the input door opens."""
         bay.ahead_ready_us = None
         if bay.ahead is not None:
+            # Its input door does not open in between.
+            bay.busy_us -= self._open_us
             self._begin_out(bay, now_us, now_us, now_us)
         else:
             self._set_free(bay, now_us, now_us + self._open_us)
