@@ -7,7 +7,7 @@ costs time, never safety: what moves is guarded by tokens.
 
 from binascii import crc_hqx
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
@@ -216,5 +216,6 @@ class Mirror:
         """What a machine vouches for: version of the token, and the word about it, as I remember them."""
         return {}
 
-    def takes_over(self, keys: Collection[TokenKey]) -> None:
-        """These tokens are this machine's now: it vouches by what others remember."""
+    def takes_over(self, versions: Mapping[TokenKey, int], *, counts: bool) -> list[Effect]:
+        """These tokens are this machine's once the list ``counts``; journalled before: what others remember of them."""
+        return []

@@ -204,17 +204,20 @@ class Regenerating:
         if self.is_kept or (count, digest) != (word.tokens, word.digest):
             return [state]
         self.phase = RegenerationPhase.READ_BACK
-        lines = [self._line(one) for one in self._list.values()]
+        # What others remember they say once: a life that begins before the list counts has to know it.
+        lines = [*map(self._line, self._list.values()), *self._take_over(counts=False)]
         return [*lines, Record(ReadBackRecord(self._next, self._lost)), state]
 
+    def _take_over(self, *, counts: bool) -> list[Effect]:
+        mine = {key: one.version for key, one in self._list.items() if one.holder == self.node_id}
+        return self.mirror.takes_over(mine, counts=counts)
+
     def _commit(self, now_us: int) -> list[Effect]:
-        effects = self._take_up()
-        self.mirror.takes_over({key for key, one in self._list.items() if one.holder == self.node_id})
+        effects = self._take_up() + self._take_over(counts=True)
         self.epoch, self.phase = self._next, RegenerationPhase.NONE
         self.tokens.changes += 1
-        effects.append(Record(EpochRecord(self.epoch)))
-        effects.append(self._state(RegenerationPhase.COMMIT, 0, 0))
-        return [*effects, *self.on_end(self._lost, now_us)]
+        effects += [Record(EpochRecord(self.epoch)), self._state(RegenerationPhase.COMMIT, 0, 0)]
+        return effects + self.on_end(self._lost, now_us)
 
     def _give_up(self, why: str, now_us: int) -> list[Effect]:
         # The journal says the epoch once more: what was read back is over.
@@ -239,7 +242,7 @@ class Regenerating:
         # What others took from this node since is no token of the site, and would be its own by an empty journal.
         known = {*self.mirror.site_tokens(), *(TokenKey(*pair) for pair in book.beliefs.verified)}
         first = {key for key in known if book.is_mine_by_journal(key)}
-        for key in sorted({*book.held, *book.leaving, *first} - set(self._list)):
+        for key in sorted({*book.seen, *book.held, *book.leaving, *first} - set(self._list)):
             version = max(book.seen.get(key, 0), book.beliefs.of(key).version)
             holder = book.beliefs.latest(key).holder
             effects += self._set(key, version, holder if holder != self.node_id else NOBODY)

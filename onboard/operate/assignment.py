@@ -12,7 +12,7 @@ from typing import NamedTuple
 from onboard.contract.codes import TokenKind
 from onboard.contract.constants import ANY_STATION, MOBILE_KINDS, NOBODY, OUTSIDE
 from onboard.contract.messages import CarAt, TokenAssigned
-from onboard.core.authority import TokenKey, genesis_holder, may_exist
+from onboard.core.authority import TokenKey, genesis_holder, may_exist, station_token
 from onboard.core.site import Machine, Segment, Site, Station
 from onboard.ways.lifts import gate, lift_at, platform
 from onboard.ways.site import way_site
@@ -211,12 +211,21 @@ def _heir_of_car(statements: Statements, key: TokenKey, whose: Whose) -> int:
     word = statements.cars.get(key)
     if word is not None and word.station not in (ANY_STATION, OUTSIDE):
         station = Station.from_number(word.station)
+        if _is_at_hand(statements, key, station, whose):
+            return whose.lost
         keeper = next((node for node, one in way_site(statements.site).compartments.items() if one == station), None)
         keeper = statements.site.stewards.get(station.track, NOBODY) if keeper is None else keeper
         if keeper in statements.site.machines and keeper != whose.absent:
             return keeper
         return _lowest_fixed(statements.site, whose.absent)
     return NOBODY if whose.lost == whose.absent else whose.lost
+
+
+def _is_at_hand(statements: Statements, key: TokenKey, station: Station, whose: Whose) -> bool:
+    """Whether the lost machine had the rights to a car and to the station beside it: its shuttle may be at the car."""
+    had, beside = statements.seen.get(key), station_token(station)
+    is_beside = whose.body.has(beside) and beside not in statements.held
+    return is_beside and had is not None and had.node == whose.lost
 
 
 def _lowest_fixed(site: Site, absent: int) -> int:

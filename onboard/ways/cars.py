@@ -4,8 +4,8 @@ Whose word about one counts is told in ``onboard.ways.car_words``.
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 from onboard.contract.codes import Reason, TokenKind
@@ -38,6 +38,8 @@ class CarMirror(Mirror):
     taken_over: dict[Reference, CarAt] = field(default_factory=dict)
     #: Who wants to know that a car which left long ago is remembered no longer.
     on_forgotten: list[Callable[[Reference], object]] = field(default_factory=list)
+    #: The journal's line for where a car in my custody stands, where there is one.
+    note: Callable[[CarAt], Effect] | None = None
     words: CarWords | None = None
     _recalled: dict[Reference, CarAt] = field(default_factory=dict)
     _left: list[Reference] = field(default_factory=list)
@@ -147,9 +149,16 @@ class CarMirror(Mirror):
             if record.custodian == node and record.station != OUTSIDE
         }
 
-    def takes_over(self, keys: Collection[TokenKey]) -> None:
+    def takes_over(self, versions: Mapping[TokenKey, int], *, counts: bool) -> list[Effect]:
         """These cars are in my custody: where they stand by who remembers it, for my behaviour to take up."""
-        self.taken_over.update({car: one for car, one in self._recalled.items() if car_token(*car) in keys})
+        taken = {car: one for car, one in self._recalled.items() if car_token(*car) in versions}
+        self.taken_over.update(taken if counts else {})
+        words = [replace(one, sender=self.node_id, version=versions[car_token(*car)]) for car, one in taken.items()]
+        return [self.note(word) for word in words] if self.note else []
+
+    def remembers(self, word: CarAt) -> None:
+        """My journal knew where a car stands that is mine once the list counts which I have read back."""
+        self._recalled[word.car] = word
 
 
 @dataclass

@@ -68,7 +68,7 @@ def test_rights_are_made_anew_in_the_middle_of_work(name: str, at_s: int, site: 
     assert (street.parked, street.served, street.queueing, street.asking) == (4, 3, 0, 0)
 
 
-@pytest.mark.parametrize(("at_s", "body", "car"), some([(88, "p(1;5)", 1), (171, "p(1;5)", 2), (255, "p(1;6)", 3)], 1))
+@pytest.mark.parametrize(("at_s", "body", "car"), some([(88, "p(1;5)", 1), (171, "p(1;4)", 2), (255, "p(1;6)", 3)], 1))
 def test_a_car_that_was_left_before_its_word_was_lost_stands_where_it_is(at_s: int, body: str, car: int) -> None:
     """Its robot was believed to have it aboard for ever, and gave the place to the next: two cars in one place."""
     name = "MR2" if car == 2 else "MR1"
@@ -79,6 +79,36 @@ def test_a_car_that_was_left_before_its_word_was_lost_stands_where_it_is(at_s: i
     assert said[-1] == OUTSIDE, "its driver has it"
     street = scene.simulation.plant.street.summary()
     assert (street.queueing, street.asking) == (0, 0)
+
+
+#: Its shuttle reaches for a car in the bay, brings one in, has one aboard, lets one go, comes home empty.
+IN_HAND = [(60, "p(1;5)"), (102, "p(1;5)"), (116, "p(1;5)"), (130, "p(1;4)"), (193, "p(1;6)")]
+
+
+#: How its journal is lost, and whether it is started once more right after its rights were made anew.
+HARMS = [("lost", False), ("rolled_back,entries=8", True), ("lost", True), ("rolled_back,entries=8", False)]
+
+
+@pytest.mark.parametrize(
+    ("at_s", "body", "harm", "again"), some([(*one, *harm) for harm in HARMS for one in IN_HAND], 5)
+)
+def test_a_robot_that_lost_its_journal_brings_away_what_it_has_in_hand(
+    at_s: int, body: str, harm: str, again: bool
+) -> None:
+    """Rule G8."""
+    came_s, site = at_s + 40, at_arrival(SITE)
+    faults = [f"crash:target=MR1,at_s={at_s},restart_s=5,journal={harm}"]
+    faults += [f"crash:target=MR1,at_s={came_s + 5.2},restart_s=5"] if again else []
+    scene = played(*faults, f"operate:do=regenerate,at_s={came_s},target=MR1,body={body}", site=site)
+    assert scene.simulation.plant.oracle.finish() == []
+    assert scene.verdict().counts.keys() <= {"something-happens"}, (
+        "a task that its robot forgot is never said to be over"
+    )
+    street = scene.simulation.plant.street.summary()
+    assert (street.queueing, street.asking) == (0, 0)
+    done = [t / 1e6 for t, one in scene.all(TaskReport) if one.phase is TaskPhase.DONE]
+    assert min(t for t in done if t > came_s) < came_s + 300
+    assert not [line for _, who, line in scene.simulation.log.lines if who == "MR1" and "held for a person" in line]
 
 
 def test_a_dead_robot_is_towed_regenerated_and_its_slot_is_nobodys() -> None:

@@ -62,15 +62,18 @@ def others_in(mirror: WayMirror, station: Station, car: Reference | None = None)
 def replay(fleet: WayFleet, statements: Iterable[CarAt]) -> None:
     """Take up what the journal tells of cars in my custody, and of those whose new custodian was not heard yet.
 
-    What was said under an older version is no knowledge of the place: the car has been elsewhere since.
+    What was said under an older version is no knowledge of the place: the car has been elsewhere since. From now on
+    what others remember of a car that comes with rights made anew is journalled as well.
     """
-    tokens = fleet.tokens
+    tokens, fleet.mirror.note = fleet.tokens, car_record
     for one in statements:
         key = car_token(*one.car)
         leaving = tokens.leaving.get(key)
         given = leaving is not None and leaving.version == one.version + 1
         if given or tokens.held.get(key) == one.version:
             fleet.mirror.on_car(one)
+        elif one.version > tokens.seen.get(key, 0):
+            fleet.mirror.remembers(one)
 
 
 def statements(fleet: WayFleet) -> list[Effect]:
@@ -135,14 +138,15 @@ def give_back(fleet: WayFleet, needed: Container[TokenKey], now_us: int) -> list
     return effects
 
 
-def take_over_aboard(fleet: WayFleet) -> list[Effect]:
-    """Cars that came to a robot as its rights were made anew: they were aboard it by the last that anybody heard.
+def take_over(fleet: WayFleet) -> list[Effect]:
+    """Cars that came to a robot as its rights were made anew: where they were by the last that anybody heard.
 
     Journalled and said under the version of now, so that another life knows of them as well.
     """
     taken, effects = fleet.mirror.taken_over, list[Effect]()
-    for car in [car for car, word in taken.items() if word.station == ANY_STATION]:
-        effects += state(fleet, car, ANY_STATION, taken.pop(car).wheelbase_mm)
+    for car in [car for car in taken if fleet.tokens.holds(car_token(*car))]:
+        word = taken.pop(car)
+        effects += state(fleet, car, word.station, word.wheelbase_mm)
     return effects
 
 
@@ -152,10 +156,15 @@ def said_aboard(fleet: WayFleet) -> list[Reference]:
     return [car for car in mine if is_mine(fleet, car)]
 
 
+def held_beside(fleet: WayFleet, at: Segment) -> list[Station]:
+    """Stations beside a slot whose right is mine."""
+    held = (Station.from_number(key.number) for key in fleet.tokens.mine() if key.kind is TokenKind.STATION)
+    return [station for station in held if station.segment == at]
+
+
 def may_stand_in(fleet: WayFleet, at: Segment) -> list[Station]:
     """Stations beside a slot where a car may be that is said to be aboard and is not: those whose right is mine."""
-    held = (Station.from_number(key.number) for key in fleet.tokens.mine() if key.kind is TokenKind.STATION)
-    return [station for station in held if station.segment == at and not others_in(fleet.mirror, station)]
+    return [station for station in held_beside(fleet, at) if not others_in(fleet.mirror, station)]
 
 
 def is_mine(fleet: WayFleet, car: Reference) -> bool:

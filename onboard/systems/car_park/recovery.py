@@ -8,12 +8,12 @@ say that the carrier stands (design, section 5).
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import CallResult, Criterion, KindCode, LegAction, ShuttleMode
+from onboard.contract.codes import CallResult, Criterion, KindCode, LegAction, ShuttleMode, TokenKind
 from onboard.contract.constants import TASK_VERSION_BITS
 from onboard.contract.messages import Award, CallForProposals, CarAt, Reference, ShuttleState
 from onboard.core.effects import Record
 from onboard.core.journal_records import Entry, JournalRecord, records_in
-from onboard.core.records import BootRecord
+from onboard.core.records import AssignedRecord, BootRecord, EpochRecord, ReadBackRecord
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.bay_memory import cars_at
@@ -84,6 +84,9 @@ _READ = (
     HandledRecord,
     RidingRecord,
     FloorRecord,
+    AssignedRecord,
+    ReadBackRecord,
+    EpochRecord,
 )
 
 
@@ -97,6 +100,10 @@ class JournalRecovery:
     floor: int | None = None
     #: Lift track, board and leave index of a ride that was begun and not ended.
     riding: tuple[int, int, int] | None = None
+    #: The track of a slot that a list of rights gave to this node, with the list's epoch; and who was lost for which.
+    _told: tuple[int, int] = (0, 0)
+    _lost: tuple[int, int] = (0, 0)
+    node_id: int = 0
     is_restart: bool = False
     #: The last task whose car was left, and the number of its station: who asks for it is told so. Nobody may have
     #: heard of it yet where the shuttle has done nothing since.
@@ -110,7 +117,7 @@ class JournalRecovery:
     @classmethod
     def read(cls, node_id: int, entries: Sequence[Entry]) -> "JournalRecovery":
         """From the journal of node ``node_id``; entries of other kinds are passed over."""
-        found = cls(cars=cars_at(node_id, entries))
+        found = cls(node_id=node_id, cars=cars_at(node_id, entries))
         for record in records_in(entries, *_READ):
             found._take(record)
         return found
@@ -141,10 +148,22 @@ class JournalRecovery:
                 if record.handling is CarHandling.LEAVE:
                     self.versions.pop(record.task, None)
                     self.last_done, self.is_news = (record.task, record.station), True
+            case _:
+                self._take_place(record)
+
+    def _take_place(self, record: JournalRecord) -> None:
+        """Where the carrier is: its own word of a ride or of a track; after lost rights, whose list tells it."""
+        match record:
             case RidingRecord():
                 self.riding = (record.lift, record.board, record.leave)
             case FloorRecord():
                 self.floor, self.riding = record.track, None
+            case AssignedRecord() if (record.kind, record.holder) == (TokenKind.SEGMENT, self.node_id):
+                self._told = record.epoch, record.number >> 8
+            case ReadBackRecord():
+                self._lost = record.epoch, record.lost
+            case EpochRecord() if self._lost == (record.epoch, self.node_id) and self._told[0] == record.epoch:
+                self.floor, self.riding = self._told[1], None
 
     @property
     def ride(self) -> CarStep | None:

@@ -16,7 +16,7 @@ from onboard.contract.messages import Reference, ShuttleState, Stamp
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Segment
-from onboard.systems.car_park import custody
+from onboard.systems.car_park import custody, salvage
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.program import CarStep, ends_at, standing_itinerary
@@ -119,7 +119,7 @@ class Starting:
         In the mouth of a spur, turned towards it, it turns back first: no plan begins or ends there.
         """
         carriage, told = self.body.carriage, self.fleet.slots_told
-        effects = custody.take_over_aboard(self.fleet)
+        effects = custody.take_over(self.fleet)
         if told:
             # A journal that is lost knew the floor: who made the rights anew has seen where the carrier stands.
             self.fleet.slots_told, carriage.track, self.recovery.is_restart = (), told[0].track, True
@@ -183,8 +183,20 @@ class Starting:
         shuttle = self.body.shuttle.sensed
         if shuttle is None or shuttle.mode not in AT_REST:
             return effects
+        assert self.place is not None
+        effects += self._salvage(self.place, shuttle, now_us)
         why = self._contradiction(self.place, shuttle)
         return effects + (self._hold(why) if why else self._take_part(now_us))
+
+    def _salvage(self, place: Segment, shuttle: ShuttleState, now_us: int) -> list[Effect]:
+        """Where the journal was lost: what sensors and rights say that is in hand."""
+        if self.recovery.works or (shuttle.mode is ShuttleMode.HOME and not shuttle.load_kg):
+            return []
+        found = salvage.find(self.fleet, self.generation, place, shuttle, now_us)
+        if found is None:
+            return []
+        self.recovery.works, self.recovery.phase = [found.work], found.phase
+        return salvage.noted(found)
 
     def _hold(self, why: str) -> list[Effect]:
         self._enter(StartEvent.CONTRADICTION)
