@@ -107,6 +107,8 @@ class BusRun(Generic[PlantT]):
     before_start: list[Callable[[Controller], None]] = field(default_factory=list)
     #: Told every machine whose controller lost its power.
     after_crash: list[Callable[[Machine], None]] = field(default_factory=list)
+    #: Told when a person has had a machine's rights made anew.
+    after_repair: list[Callable[[], None]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.codecs = codecs_for(self.site)
@@ -163,6 +165,10 @@ class BusRun(Generic[PlantT]):
         self.journals[machine.node_id] = self.journals[machine.node_id].after_power_cut()
         for tell in self.after_crash:
             tell(machine)
+
+    def body_slots(self, machine: Machine) -> tuple[str, ...]:
+        """Where a person sees a machine's body, in the words of ``onboard operate``; nothing for one that is fixed."""
+        return ()
 
     def fleet_node(self, name: str) -> SimulatedBus | None:
         """A running controller's node on the fleet bus, by its machine's name; None while it is off."""

@@ -97,6 +97,13 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--sample", type=int, metavar="N", help="with --exhaustive or --cold-start: only so many, spread over all"
     )
+    parser.add_argument(
+        "--person",
+        type=float,
+        metavar="S",
+        help="with --exhaustive journal: so many seconds after a machine holds for its journal somebody has its rights "
+        "made anew, and all must be served within 5 minutes (default: nobody comes)",
+    )
     add_where_options(parser)
     parser.add_argument("--cars", type=int, metavar="N", help="cars in each run of a car park (default: a few)")
     parser.add_argument(
@@ -223,6 +230,7 @@ def _ledger(args: argparse.Namespace, plan: CampaignSettings) -> Ledger[RunVerdi
         str(plan.demand),
         f"{plan.faults_an_hour}",
         f"{plan.limit_s}",
+        *([f"a person after {plan.person_s:g} s"] if plan.person_s else []),
     ]
     return Ledger.read(args.add_to, "; ".join(what), RunVerdict, FAILURES)
 
@@ -241,7 +249,8 @@ def _trials(
     counts = count(site, reference(plan.site, plan.limit_s, plan.scene))
     plan = replace(plan, usual_wait_s=counts.longest_wait_s)
     every = [
-        FaultPoint(number, one) for number, one in enumerate(points(site, Single(args.exhaustive), counts), start=1)
+        FaultPoint(number, one)
+        for number, one in enumerate(points(site, Single(args.exhaustive), counts, plan.person_s), start=1)
     ]
     chosen = every if args.sample is None else random.Random(0).sample(every, min(args.sample, len(every)))
     several = f"{args.exhaustive}es" if args.exhaustive.endswith("sh") else f"{args.exhaustive}s"
@@ -260,7 +269,10 @@ def _plan(args: argparse.Namespace, site: Site) -> CampaignSettings:
         scene = SceneOccasion(args.scene)
         demand = system.on(Occasion(scene), site)
         limit_s = args.limit or system.patience_s(site, demand, 1)
-        return CampaignSettings(args.site, args.exhaustive, limit_s, demand, out=args.out, scene=scene)
+        person_s = args.person or 0.0
+        return CampaignSettings(
+            args.site, args.exhaustive, limit_s, demand, out=args.out, scene=scene, person_s=person_s
+        )
     if args.faults != "none" and not kinds_for(args.faults, site):
         raise DemandError(f"--faults {args.faults}: {site.name} is a {site.system}, which has none of these")
     demand = system.usual(site, {"cars": args.cars, "orders": args.orders, "apart": args.apart})
@@ -288,6 +300,9 @@ def _check(args: argparse.Namespace) -> None:
     _check_seconds("limit", args.limit)
     if args.faults_an_hour is not None and not 0 < args.faults_an_hour <= MOST_AN_HOUR:
         raise DemandError(f"--faults-an-hour {args.faults_an_hour:g}: must be above 0, and at most {MOST_AN_HOUR}")
+    _check_seconds("person", args.person)
+    if args.person is not None and args.exhaustive != str(Single.JOURNAL):
+        raise DemandError(f"--person {args.person:g}: goes with --exhaustive journal; add it, or leave this out")
     if args.scene != str(SceneOccasion.ALONE) and args.exhaustive is None:
         raise DemandError(f"--scene {args.scene}: goes with --exhaustive; add it, or leave this out")
     if args.sample is not None and (args.sample < 1 or (args.exhaustive is None and not args.cold_start)):

@@ -33,12 +33,16 @@ OF_JOURNALS = frozenset({Reason.JOURNAL_LOST, Reason.JOURNAL_SHORT, Reason.JOURN
 HELD_US = 120_000_000
 
 
-def journal_faults(written: Mapping[str, int]) -> list[AnyFault]:
-    """Every point; ``written`` is how many records each machine writes in the scene, by name."""
+def journal_faults(written: Mapping[str, int], person_s: float = 0.0) -> list[AnyFault]:
+    """Every point; ``written`` is how many records each machine writes in the scene, by name.
+
+    With ``person_s`` somebody comes so long after a machine holds, and has its rights made anew.
+    """
     found: list[AnyFault] = []
     for name, writes in written.items():
         for write in range(1, writes + 1):
             base: dict[str, str | int | float] = {"target": name, "at_s": 0.0, "restart_s": OFF_S, "write": write}
+            base |= {"person_s": person_s} if person_s else {}
             found.append(Injection("crash", {**base, "durable": "no", "journal": "torn"}))
             found += [
                 Injection("crash", {**base, "durable": "yes", "journal": how, "entries": entries})

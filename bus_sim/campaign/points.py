@@ -91,8 +91,10 @@ async def _count(site: Site, scenario: FaultScenario, loop: VirtualTimeLoop) -> 
     return found
 
 
-def points(site: Site, single: Single, counts: SceneCounts) -> list[AnyFault]:
-    """Every point of a kind, in an order that is always the same."""
+def points(site: Site, single: Single, counts: SceneCounts, person_s: float = 0.0) -> list[AnyFault]:
+    """Every point of a kind, in an order that is always the same; ``person_s`` as in ``journal_faults``."""
+    if single is Single.JOURNAL:
+        return journal_faults(counts.written, person_s)
     return _POINTS[single](site, counts)
 
 
@@ -125,5 +127,4 @@ _POINTS: dict[Single, Callable[[Site, SceneCounts], list[AnyFault]]] = {
     Single.OMISSION: partial(_frames, FaultKind.OMISSION, 0),
     Single.DUPLICATE: partial(_frames, FaultKind.DUPLICATE, AGAIN_US),
     Single.CRASH: _crashes,
-    Single.JOURNAL: lambda _, counts: journal_faults(counts.written),
 }

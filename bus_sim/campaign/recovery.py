@@ -68,6 +68,11 @@ def is_of_clock(fault: AnyFault) -> bool:
     return isinstance(fault, Injection) and KINDS[fault.kind].group is Group.CLOCK
 
 
+def has_person(fault: AnyFault) -> bool:
+    """Whether somebody comes and has the rights of the machine that it strikes made anew."""
+    return isinstance(fault, Injection) and fault.kind == "crash" and fault.number("person_s") > 0
+
+
 class RecoveryMeasure:
     """Measures one run; to be made before ``BusRun.start``. ``longest_us`` and ``counts`` are by measure."""
 
@@ -96,6 +101,7 @@ class RecoveryMeasure:
         self._served_since_us = 0
         simulation.before_start.append(self._on_start)
         simulation.after_crash.append(self._on_crash)
+        simulation.after_repair.append(self._on_repair)
         if faults:
             simulation.observers.append(self._on_message)
         if self._ends or self._watched:
@@ -137,6 +143,9 @@ class RecoveryMeasure:
             self._is_healing = True
             self._at(now_us, self._look_at_digests)
             self._at(now_us + LOOK_US, partial(self._look_at_answers, controller, now_us))
+
+    def _on_repair(self) -> None:
+        self.healed_us = max(self.healed_us, self._now_us())
 
     def _look_at_answers(self, controller: Controller, since_us: int) -> None:
         if controller is not self._simulation.controllers.get(controller.holon.node_id):

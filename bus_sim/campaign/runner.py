@@ -42,6 +42,8 @@ class CampaignSettings:
     has_baseline: bool = True
     #: Of single faults, in which scene.
     scene: SceneOccasion = SceneOccasion.ALONE
+    #: Of journals: how long after a machine holds a person has its rights made anew, s; 0: nobody comes.
+    person_s: float = 0.0
 
 
 #: Verdicts with which a run breaks off; it is played again only until so long after that, s: what follows changes no

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from bus_sim.faults.attendant import Attendant
 from bus_sim.faults.holon import FROZEN_PPM, FaultyHolon
 from bus_sim.faults.injection import Injection
 from bus_sim.faults.journals import hurt
@@ -34,6 +35,9 @@ def lose_power(simulation: BusRun[Any], injection: Injection) -> None:
         return
     simulation.crash(machine)
     hurt(simulation.journals[machine.node_id], injection.text("journal"), injection.count("entries"))
+    person_us = round(injection.number("person_s") * 1e6)
+    if person_us:
+        Attendant(simulation, machine, person_us, partial(restart_later, simulation, machine))
     if injection.text("restart") == "yes":
         restart_later(simulation, machine, simulation.loop.now_us() + round(injection.number("restart_s") * 1e6))
 

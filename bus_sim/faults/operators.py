@@ -1,5 +1,7 @@
 """What a person does at an operator's station: a node of its own on the fleet bus, above all machines."""
 
+import asyncio
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -33,14 +35,25 @@ def emergency_stop(simulation: BusRun[Any], _: Injection) -> None:
 
 def operate(simulation: BusRun[Any], injection: Injection) -> None:
     """A person gives a command of ``onboard operate`` and answers yes; what it says is in the run's telemetry."""
-    task = simulation.loop.create_task(_operate(simulation, injection))
-    # An exception in it is a mistake of this program: it ends the run.
-    task.add_done_callback(lambda done: None if done.cancelled() else done.result())
+    give(simulation, wish_of(injection))
 
 
-async def _operate(simulation: BusRun[Any], injection: Injection) -> None:
+def give(
+    simulation: BusRun[Any], asked: CommandRequest, ended: Callable[[int | None], None] = lambda status: None
+) -> None:
+    """The same of a command in its own words; ``ended`` is told its exit status, None where it could not be given."""
+
+    def over(done: "asyncio.Task[int | None]") -> None:
+        # An exception in it is a mistake of this program: it ends the run.
+        if not done.cancelled():
+            ended(done.result())
+
+    simulation.loop.create_task(_operate(simulation, asked)).add_done_callback(over)
+
+
+async def _operate(simulation: BusRun[Any], asked: CommandRequest) -> int | None:
     loop, site = simulation.loop, simulation.site
-    who = f"operator {injection.text('do')} {loop.now_us()}"
+    who = f"operator {asked.command} {loop.now_us()}"
     seals = simulation.seals.are_used
     bus = simulation.tool_bus(who, STATION) if seals else simulation.fleet.attach(who, None)
 
@@ -49,10 +62,11 @@ async def _operate(simulation: BusRun[Any], injection: Injection) -> None:
 
     station = OperatorStation(site, simulation.codecs.fleet, bus, tell)
     try:
-        make = maker_of(site, wish_of(injection), seed=loop.now_us() // 1_000_000)
-        await station.operate(make, STATION if seals else None, _agrees)
+        make = maker_of(site, asked, seed=loop.now_us() // 1_000_000)
+        return await station.operate(make, STATION if seals else None, _agrees)
     except OperateError as error:
         tell(str(error))
+        return None
     finally:
         await bus.close()
 

@@ -161,7 +161,8 @@ KINDS: Final[Mapping[str, Kind]] = {
     ),
     "crash": Kind(
         Group.CONTROLLER,
-        "a controller loses power, at a time or (from then on) at its n-th frame or journal write, and starts again",
+        "a controller loses power, at a time or (from then on) at its n-th frame or journal write, and starts again; "
+        "person_s after it holds for its journal somebody has its rights made anew (0: nobody)",
         _one(
             restart_s=_seconds(5.0),
             restart=_one_of("yes", "no"),
@@ -170,6 +171,7 @@ KINDS: Final[Mapping[str, Kind]] = {
             durable=_one_of("no", "yes"),
             journal=_one_of(*HARMS),
             entries=_count("how many entries are cut off or rolled back, or which from the end is flipped", 10, 1),
+            person_s=_seconds(0.0),
         ),
     ),
     "pause": Kind(

@@ -8,6 +8,7 @@ import pytest
 
 from bus_sim.campaign.journal_points import HELD_US, Held
 from bus_sim.campaign.points import SceneCounts, SceneOccasion, Single, count, points, reference
+from bus_sim.campaign.recovery import Measure
 from bus_sim.campaign.report import RunVerdict
 from bus_sim.campaign.runner import CampaignSettings, FaultPoint, run_point
 from bus_sim.can.faults import InjectedFault
@@ -103,6 +104,17 @@ def test_a_machine_that_cannot_rely_on_its_journal_holds_and_is_told_of(harm: st
     report = run_point(CampaignSettings(SITE, "journal", 3_600.0), FaultPoint(1, fault)).report
     assert report.verdict is RunVerdict.HELD, report.why()
     assert report.halted == (), "it lives, and comes back by a person's word"
+
+
+@pytest.mark.parametrize(
+    ("target", "write", "harm"),
+    [("MR1", 46, "unsealed"), ("MR1", 46, "foreign"), ("MR1", 40, "lost"), ("IOC1", 20, "lost")],
+)
+def test_a_person_who_comes_has_all_served_again_within_five_minutes(target: str, write: int, harm: str) -> None:
+    text = f"crash:target={target},at_s=0,restart_s=5,write={write},durable=yes,journal={harm},person_s=40"
+    report = run_point(CampaignSettings(SITE, "journal", 3_600.0), FaultPoint(1, parse_injection(text))).report
+    assert report.verdict in (RunVerdict.SERVED, RunVerdict.DELAYED), report.why()
+    assert dict(report.recovery)[Measure.HEAL_SERVED] < 300e6
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ from bus_sim.options import RunOptions
 from bus_sim.run import BusRun, buses_of, links_of
 from bus_sim.systems.car_park.plant.plant import Plant
 from bus_sim.virtual_time import VirtualTimeLoop
-from onboard.core.site import Site
+from onboard.contract.codes import KindCode
+from onboard.core.site import Machine, Site
 from onboard.trace.view import SiteView
 from onboard.ways.site import way_site
 
@@ -23,6 +24,14 @@ class Simulation(BusRun[Plant]):
         super().__post_init__()
         self.view = SiteView(self.site)
         self.observers.append(self.view.feed)
+
+    def body_slots(self, machine: Machine) -> tuple[str, ...]:
+        """A carrier's slots, all that it is in; a lift by its name, whose platform it is on."""
+        if machine.node_id not in self.plant.world.robots:
+            return ()
+        lifts = {one.home.track: one.name for one in self.site.machines.values() if one.kind is KindCode.LIFT}
+        slots = self.plant.world.slots_of(machine.node_id)
+        return tuple(dict.fromkeys(lifts.get(slot.track, str(slot)) for slot in slots))
 
 
 def build(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> Simulation:

@@ -16,6 +16,7 @@ from bus_sim.systems.car_park.plant.rules import PlantRule
 from bus_sim.systems.car_park.plant.shaft import PlatformBody, Sill, sills_of
 from onboard.contract.codes import DoorName, DoorPosition, KindCode, Side
 from onboard.core.site import Segment, Station
+from onboard.systems.car_park.axis import TrackAxis
 from onboard.ways.lifts import is_same_stop, nearest_stop, stop_mm
 from onboard.ways.site import WaySite
 
@@ -156,6 +157,12 @@ class CarParkWorld:
         if position is None or not 1 <= position.index <= self.site.tracks[position.track].length:
             return None
         return position
+
+    def slots_of(self, node_id: int) -> list[Segment]:
+        """Slots that a robot's body is in, platforms among them."""
+        axis, half_mm = TrackAxis(self.site, self.axis_of(node_id)), self.site.carrier_length_mm // 2 - 1
+        centre_mm = round(self._at(node_id))
+        return axis.overlapped(centre_mm - half_mm, centre_mm + half_mm)
 
     # --- mouths ------------------------------------------------------------------------------------------------
 
