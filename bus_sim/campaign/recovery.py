@@ -42,6 +42,8 @@ class Measure(StrEnum):
     HEAL_DIGESTS = "heal to equal digests"
     #: The last fault is over: until everybody is served who waited then.
     HEAL_SERVED = "heal to all served"
+    #: A person has had rights made anew: until the first is served of those who waited then.
+    REPAIR_SERVES = "repair to first served"
 
 
 def healed_us(faults: Iterable[AnyFault]) -> int:
@@ -99,6 +101,8 @@ class RecoveryMeasure:
         self._is_healing = bool(faults)
         #: The healing after which nobody waits any more; 0 for none.
         self._served_since_us = 0
+        #: When rights were made anew and nobody was served since, 0 for never; who waited then, below 0: not known.
+        self._repaired = 0, -1
         simulation.before_start.append(self._on_start)
         simulation.after_crash.append(self._on_crash)
         simulation.after_repair.append(self._on_repair)
@@ -110,7 +114,13 @@ class RecoveryMeasure:
             self._at(self.healed_us, self._look_at_digests)
 
     def look_at_waits(self, waits_since: Callable[[int], int]) -> None:
-        """Everybody who waited when the last fault was over, is served or has gone."""
+        """Everybody who waited when the last fault was over, is served or has gone; or the first of them."""
+        repaired_us, waited = self._repaired
+        if repaired_us and waited < 0:
+            self._repaired = repaired_us, waits_since(repaired_us)
+        elif repaired_us and waits_since(repaired_us) < max(waited, 1):
+            self._repaired = 0, -1
+            self._note(Measure.REPAIR_SERVES, self._now_us() - repaired_us)
         if self._served_since_us != self.healed_us and not waits_since(self.healed_us):
             self._served_since_us = self.healed_us
             self._note(Measure.HEAL_SERVED, self._now_us() - self.healed_us)
@@ -146,6 +156,7 @@ class RecoveryMeasure:
 
     def _on_repair(self) -> None:
         self.healed_us = max(self.healed_us, self._now_us())
+        self._repaired = self._now_us(), -1
 
     def _look_at_answers(self, controller: Controller, since_us: int) -> None:
         if controller is not self._simulation.controllers.get(controller.holon.node_id):

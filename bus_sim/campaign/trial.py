@@ -7,7 +7,7 @@ from typing import Any, Protocol
 from bus_sim.campaign.journal_points import Held
 from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.limits import WallLimitError, event_limit, wall_limit, wall_limit_s
-from bus_sim.campaign.recovery import Measure, RecoveryMeasure, clocks_right_us, has_person, is_of_clock
+from bus_sim.campaign.recovery import Measure, RecoveryMeasure, clocks_right_us, is_of_clock
 from bus_sim.campaign.report import CONVERGED_US, SERVED_AGAIN_US, RunVerdict, TrialReport
 from bus_sim.faults.arm import arm, check_faults
 from bus_sim.faults.scenario import FaultScenario
@@ -197,10 +197,13 @@ def _judge(
 
 
 def _heals_late(scenario: FaultScenario, recovery: RecoveryMeasure) -> bool:
-    """Whether clocks were all that was wrong, or a person has made rights anew, and who waited then waited too long."""
-    took_us = recovery.longest_us.get(Measure.HEAL_SERVED, 0)
-    is_judged = all(is_of_clock(fault) for fault in scenario.faults) or any(map(has_person, scenario.faults))
-    return took_us > SERVED_AGAIN_US and is_judged
+    """Whether clocks were all that was wrong, and who waited when they were right again was served too late.
+
+    Or a person has had rights made anew, and the first of them was.
+    """
+    is_clocks, took_us = all(is_of_clock(fault) for fault in scenario.faults), recovery.longest_us
+    late = is_clocks and took_us.get(Measure.HEAL_SERVED, 0) > SERVED_AGAIN_US
+    return late or took_us.get(Measure.REPAIR_SERVES, 0) > SERVED_AGAIN_US
 
 
 def _struck(run: BusRun[Any]) -> tuple[tuple[str, int], ...]:

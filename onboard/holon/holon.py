@@ -456,16 +456,16 @@ class Holon:
             return []
         self.fleet.has_no_rights = True
         held = self.holds.apply(self.holding.for_person(doubt.reason, doubt.cause), now_us)
-        return [*(self._forget(now_us) if self._has_past else []), Report(doubt.text), *held]
+        return [*self._forget(now_us), Report(doubt.text), *held]
 
     def _forget(self, now_us: int) -> list[Effect]:
-        """What the behaviour took up from an old journal may be long over: it begins anew, and so does the journal."""
+        """What the behaviour took up, from an old journal or as in a first life, is wrong: both begin anew."""
         self.fleet.entries = still_counting(OLD, self.fleet.entries)
         self.negotiation.estimator = estimator = self._factory.estimator(self.site, self.machine, self.mirror)
         self.behaviour = behaviour = self._factory.behaviour(self.fleet, estimator)
         self.schedule.begins_anew(behaviour)
         self.fixed.ask_devices(now_us, behaviour.state)
-        return [*self._first_entries(OLD), *self.behaviour.start(now_us)]
+        return [*(self._first_entries(OLD) if self._has_past else []), *self.behaviour.start(now_us)]
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
         effects: list[Effect] = []

@@ -81,10 +81,12 @@ def _lost_of(site: Site, asked: CommandRequest) -> Lost:
     if asked.absent == asked.machine:
         return Lost(lost.node_id, lost.node_id, blocked=_body_of(site, lost, asked.body, "--body"))
     body = _body_of(site, lost, asked.body, "--body")
-    if lost.kind in MOBILE_KINDS and {slot.track for slot in body.slots} not in [
-        {one} for one in ways.tracks if one not in ways.lifts
-    ]:
-        raise OperateError(f"--body: {lost.name} must stand on one track, off the lifts; push it there first")
+    tracks = {slot.track for slot in body.slots}
+    alleys = tracks.difference(ways.lifts)
+    if lost.kind in MOBILE_KINDS and (len(alleys) > 1 or len(tracks - alleys) > 1 or not tracks):
+        raise OperateError(
+            f"--body: {lost.name} must stand on one track, in one lift, or between the two; push it there first"
+        )
     if not asked.absent:
         return Lost(lost.node_id, body=body)
     absent = machine_of(site, asked.absent)

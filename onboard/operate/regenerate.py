@@ -32,6 +32,7 @@ from onboard.operate.assignment import NO_BODY, BodySlots, RightsAssignment, Sta
 from onboard.operate.order import AGAIN_US, MISTAKE, NOT_CONFIRMED, OperatorCommand
 from onboard.operate.park import Park
 from onboard.operate.words import state_words
+from onboard.ways.lifts import GATE_INDEX, platform
 from onboard.ways.site import TrackKind, way_site
 
 #: How long all may stand frozen while the person reads and decides, us: a site that waits longer is forgotten.
@@ -245,7 +246,8 @@ class Regenerate(OperatorCommand):
             return ""
         mine = {one.token for one in self._assignment.given if (one.token_kind, one.holder) == (_SLOT, lost)}
         for slot in sorted(self._who.body.slots):
-            if slot.number in mine:
+            if slot.number in mine or (slot.index == GATE_INDEX and platform(slot.track).number in mine):
+                # The gate of who is aboard may be its lift's.
                 continue
             holder = self._said.holder_of(TokenKey(_SLOT, slot.number))
             known = [str(one) for one in self._said.slots_given_to(lost)]

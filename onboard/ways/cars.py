@@ -156,6 +156,12 @@ class CarMirror(Mirror):
         words = [replace(one, sender=self.node_id, version=versions[car_token(*car)]) for car, one in taken.items()]
         return [self.note(word) for word in words] if self.note else []
 
+    def disown(self) -> None:
+        """What I have said of cars came from a journal that is old: whoever knows better says so, or nobody does."""
+        for car in [car for car, record in self.cars.items() if record.custodian == self.node_id]:
+            del self.cars[car]
+        self._digest = None
+
     def remembers(self, word: CarAt) -> None:
         """My journal knew where a car stands that is mine once the list counts which I have read back."""
         self._recalled[word.car] = word

@@ -114,7 +114,32 @@ def test_a_person_who_comes_has_all_served_again_within_five_minutes(target: str
     text = f"crash:target={target},at_s=0,restart_s=5,write={write},durable=yes,journal={harm},person_s=40"
     report = run_point(CampaignSettings(SITE, "journal", 3_600.0), FaultPoint(1, parse_injection(text))).report
     assert report.verdict in (RunVerdict.SERVED, RunVerdict.DELAYED), report.why()
-    assert dict(report.recovery)[Measure.HEAL_SERVED] < 300e6
+    assert dict(report.recovery)[Measure.REPAIR_SERVES] < 300e6
+
+
+@pytest.mark.parametrize(
+    ("site", "text"),
+    [
+        pytest.param("small", "target=MR1,write=86,journal=lost", id="a robot aboard a lift"),
+        pytest.param("level1", "target=MR1,write=1,journal=lost", id="a robot that had begun as in a first life"),
+        pytest.param(
+            "level1", "target=IOC1,write=43,journal=unsealed", id="a robot has the right to the car in the bay"
+        ),
+        pytest.param(
+            "level1", "target=IOC1,write=94,journal=rolled_back,entries=50", id="a robot has the right to the bay"
+        ),
+        pytest.param(
+            "level1", "target=IOC1,write=93,journal=rolled_back,entries=50", id="a car left since an old journal"
+        ),
+        pytest.param("level1", "target=IOC1,write=83,journal=rolled_back,entries=10", id="and is not said to be back"),
+    ],
+)
+def test_rights_that_are_made_anew_leave_nobody_waiting(site: str, text: str) -> None:
+    """Harms 22745 of `small`, 7869, 1277, 4263, 4204 and 3613 of `level1`, of three cars that overlap, and a person."""
+    settings = CampaignSettings(site, "journal", 3_600.0, scene=SceneOccasion.OVERLAP)
+    crash = parse_injection(f"crash:at_s=0,restart_s=5,durable=yes,person_s=40,{text}")
+    report = run_point(settings, FaultPoint(1, crash)).report
+    assert report.verdict in (RunVerdict.SERVED, RunVerdict.DELAYED), report.why()
 
 
 @pytest.mark.parametrize(

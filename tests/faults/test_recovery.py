@@ -80,7 +80,7 @@ def test_who_is_served_too_late_after_clocks_are_right_is_a_finding(
         monkeypatch.setattr(f"bus_sim.campaign.{module}.SERVED_AGAIN_US", 5_000_000)
     late = play(find_site("level1"), scenario)
     assert late.verdict is RunVerdict.LATE
-    assert late.why() == f"all are served {took_s:.0f} s after all was right again, not within 5 s"
+    assert late.why() == f"all are served {took_s:.0f} s after the clocks were right, not within 5 s"
     file = tmp_path / "late.toml"
     file.write_text(scenario.to_toml(), encoding="utf-8")
     assert main(["run", "--scenario", str(file)]) == 1

@@ -412,7 +412,8 @@ MISTAKES = [
     (CommandRequest("regenerate", machine="MR1", absent="MR1"), "MR1: where does it stand"),
     (CommandRequest("regenerate", machine="MR1"), "MR1: where does it stand"),
     (CommandRequest("regenerate", machine="MR1", body=("gone",)), "must stand on one track"),
-    (CommandRequest("regenerate", machine="MR1", body=("ER1",)), "must stand on one track"),
+    (CommandRequest("regenerate", machine="MR1", body=("ER1", "ER2")), "must stand on one track"),
+    (CommandRequest("regenerate", machine="MR1", body=("p(1,3)", "p(2,3)")), "must stand on one track"),
     (CommandRequest("regenerate", machine="MR1", body=("p(1,3)",), absent="MR2"), "MR2: where does it stand"),
     (CommandRequest("regenerate", machine="MR1", absent="MR1", body=("p(7,3)",)), "no segment"),
 ]

@@ -24,6 +24,7 @@ LOOK = {
     "onboard/trace/check/*.py": "a judge",
     "onboard/systems/*/checks.py": "a judge",
     "onboard/systems/*/checks/*.py": "a judge",
+    "bus_sim/faults/attendant.py": "what strikes at a moment that was heard",
     "bus_sim/campaign/*.py": "a judge of a trial, or what strikes at a moment that was heard",
     # What it is about decides when a word may go, and which one makes another needless.
     "onboard/controller/outgoing.py": "the words of its own machine on their way out",

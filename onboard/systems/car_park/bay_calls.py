@@ -113,6 +113,8 @@ class BayCalls:
         if task is not None and report.phase is TaskPhase.FORFEITED:
             return self._on_forfeit(task, report.sender, now_us)
         is_robot = machine is not None and machine.kind is KindCode.ROBOT
+        if is_robot and self.job is None and self.stewardship.claims_bay(report, self.memory):
+            return []
         if is_starting and task is None:
             return self.stewardship.claimed(report, self.memory) if is_robot else []
         if not is_robot:
@@ -279,7 +281,10 @@ class BayCalls:
         if not is_mine and (is_parked or (holder == job.winner and holder != NOBODY)):
             return None, []
         job.was_granted = False
-        is_nobodys = not job.winner and job.retry_at_us is None and not self._is_open(job)
+        if job.winner:
+            # It may have put the car back after it lost its journal: it says at once whether it still has the task.
+            return BayPhase.AWAITING, [Send(job.award(self.fleet.node_id))]
+        is_nobodys = job.retry_at_us is None and not self._is_open(job)
         return BayPhase.AWAITING, self.settle(job, now_us) if is_nobodys else []
 
     def has_another(self, robot: int) -> bool:

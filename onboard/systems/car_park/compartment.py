@@ -269,6 +269,8 @@ class Compartment:
     def _when_starting(self, now_us: int) -> list[Effect]:
         if self.memory.job is not None:
             return self._take_up_job(now_us) + self.pipeline.void()
+        if self.stewardship.left is not None and self.memory.was_granted:
+            return self._park_again(self.stewardship.left, now_us)
         effects = self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
         if not self._is(DoorName.OUTPUT, DoorPosition.LOCKED):
             return effects
@@ -277,10 +279,8 @@ class Compartment:
     def _park_again(self, left: CarAt, now_us: int) -> list[Effect]:
         """My journal is lost and my rights are new: whatever was meant with the car in my bay, it is parked."""
         self.stewardship.left, self.memory.car_class = None, bay_task.class_in(self.bay, self._park)
-        task, number = self.memory.next_reference(self.fleet)
-        self.memory.job = (task, Operation.PARK, left.car, left.wheelbase_mm)
-        noted = job_record(*self.memory.job, self.memory.car_class)
-        return [number, noted, *self._take_up_job(now_us), self.outputs.light_up(LightColour.RED)]
+        noted = self.stewardship.parks_again(left, self.memory, self.bay)
+        return [*noted, *self._take_up_job(now_us), self.outputs.light_up(LightColour.RED)]
 
     def _take_up_job(self, now_us: int) -> list[Effect]:
         """After a restart in the middle of a task: journal, tokens and sensors tell how far it has come."""

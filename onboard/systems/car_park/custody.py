@@ -66,6 +66,7 @@ def replay(fleet: WayFleet, statements: Iterable[CarAt]) -> None:
     what others remember of a car that comes with rights made anew is journalled as well.
     """
     tokens, fleet.mirror.note = fleet.tokens, car_record
+    fleet.mirror.disown()
     for one in statements:
         key = car_token(*one.car)
         leaving = tokens.leaving.get(key)

@@ -100,8 +100,10 @@ class JournalRecovery:
     floor: int | None = None
     #: Lift track, board and leave index of a ride that was begun and not ended.
     riding: tuple[int, int, int] | None = None
-    #: The track of a slot that a list of rights gave to this node, with the list's epoch; and who was lost for which.
-    _told: tuple[int, int] = (0, 0)
+    #: Slots that this node got as its rights were made anew, and of which it has not found its place yet.
+    told: tuple[Segment, ...] = ()
+    #: Slots that lists of rights gave to this node, by epoch; and the epoch of the last list with who was lost.
+    _given: dict[int, list[Segment]] = field(default_factory=dict)
     _lost: tuple[int, int] = (0, 0)
     node_id: int = 0
     is_restart: bool = False
@@ -157,13 +159,13 @@ class JournalRecovery:
             case RidingRecord():
                 self.riding = (record.lift, record.board, record.leave)
             case FloorRecord():
-                self.floor, self.riding = record.track, None
+                self.floor, self.riding, self.told = record.track, None, ()
             case AssignedRecord() if (record.kind, record.holder) == (TokenKind.SEGMENT, self.node_id):
-                self._told = record.epoch, record.number >> 8
+                self._given.setdefault(record.epoch, []).append(Segment(record.number >> 8, record.number & 0xFF))
             case ReadBackRecord():
                 self._lost = record.epoch, record.lost
-            case EpochRecord() if self._lost == (record.epoch, self.node_id) and self._told[0] == record.epoch:
-                self.floor, self.riding = self._told[1], None
+            case EpochRecord() if self._lost == (record.epoch, self.node_id):
+                self.riding, self.told = None, tuple(self._given.get(record.epoch, ()))
 
     @property
     def ride(self) -> CarStep | None:

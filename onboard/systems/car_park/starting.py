@@ -16,6 +16,7 @@ from onboard.contract.messages import Reference, ShuttleState, Stamp
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Segment
+from onboard.core.token_keys import segment_token
 from onboard.systems.car_park import custody, salvage
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
@@ -24,6 +25,7 @@ from onboard.systems.car_park.recovery import JournalRecovery, floor_record
 from onboard.systems.car_park.riding import Riding
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.lift_uses import ride_us
+from onboard.ways.lifts import gate, sill
 from onboard.ways.mirror import WayFleet
 
 #: From the first known position after a restart until plans are made: whom it is in the way of says meanwhile what it
@@ -89,14 +91,17 @@ class Starting:
     place: Segment | None = field(default=None, init=False)
     _due_us: int | None = None
 
+    def __post_init__(self) -> None:
+        self.fleet.slots_told = self.fleet.slots_told or self.recovery.told
+
     @property
     def is_over(self) -> bool:
         """Whether the robot takes part."""
         return self.stage is StartStage.OVER
 
     def next_wake(self) -> int | None:
-        """When the others have had their time; what else is waited for is told by sensors."""
-        return self._due_us
+        """When the others have had their time, or a lift is to be asked; what else is waited for is told by sensors."""
+        return self._due_us if self._due_us is not None else self.body.riding.sill.next_wake()
 
     def advance(self, now_us: int) -> list[Effect]:
         """One step of the table, where what leads to it was found."""
@@ -118,12 +123,12 @@ class Starting:
 
         In the mouth of a spur, turned towards it, it turns back first: no plan begins or ends there.
         """
-        carriage, told = self.body.carriage, self.fleet.slots_told
+        carriage = self.body.carriage
         effects = custody.take_over(self.fleet)
-        if told:
-            # A journal that is lost knew the floor: who made the rights anew has seen where the carrier stands.
-            self.fleet.slots_told, carriage.track, self.recovery.is_restart = (), told[0].track, True
-            effects.append(floor_record(told[0].track))
+        if self.fleet.slots_told:
+            effects += self._is_told(self.fleet.slots_told, now_us)
+            if self.fleet.slots_told:
+                return effects
         here = carriage.standing_at
         assert carriage.sensed is not None
         if here is not None and here == carriage.nearest:
@@ -140,6 +145,24 @@ class Starting:
                 # It asks first for what it is in: it may have been pushed there while it was off.
                 carriage.go(out or carriage.nearest)
         return effects + (carriage.advance(now_us) if carriage.goal is not None else [])
+
+    def _is_told(self, told: tuple[Segment, ...], now_us: int) -> list[Effect]:
+        """A journal that is lost knew the floor: who made the rights anew has seen where the carrier stands.
+
+        Aboard a lift the floor is where that stands by its word under the gate, which is asked for where it has it.
+        """
+        site, sill_proof = self.fleet.site, self.body.riding.sill
+        floor = next((slot.track for slot in told if slot.track not in site.lifts), None)
+        if floor is None:
+            lift, key = told[0].track, segment_token(gate(told[0].track))
+            if not self.fleet.tokens.holds(key):
+                return self.fleet.tokens.want(key, now_us)
+            stop = sill_proof.stands_at(lift)
+            if stop is None:
+                return sill_proof.ask([lift], now_us)
+            floor = sill(site, lift, stop).track
+        self.fleet.slots_told, self.body.carriage.track, self.recovery.is_restart = (), floor, True
+        return [floor_record(floor)]
 
     def _is_placed(self, here: Segment, now_us: int) -> list[Effect]:
         """Stand here and tell everybody; after a restart go on a little later."""

@@ -11,6 +11,7 @@ from onboard.contract.codes import CallResult, Operation, Reason, TaskPhase, Tok
 from onboard.contract.constants import NOBODY, OUTSIDE, TASK_VERSION_BITS
 from onboard.contract.messages import (
     Award,
+    BayState,
     CallForProposals,
     CarAt,
     Itinerary,
@@ -26,7 +27,7 @@ from onboard.core.negotiation.winners import patience_us
 from onboard.core.serial import is_newer, successor
 from onboard.core.site import Station
 from onboard.systems.car_park import custody
-from onboard.systems.car_park.bay_memory import BayMemory, winner_record
+from onboard.systems.car_park.bay_memory import BayMemory, job_record, winner_record
 from onboard.ways.mirror import WayFleet
 from onboard.ways.tokens import car_token
 
@@ -52,6 +53,8 @@ class Stewardship:
     _cars_of_calls: dict[tuple[int, int], Reference] = field(default_factory=dict)
     #: A car in my own bay, compartment, that I know nothing of but by others since my rights were made anew.
     left: CarAt | None = None
+    #: The robot that has a task for it, by the robot's own word.
+    _claimant: int = NOBODY
     _say_at_us: dict[Reference, int] = field(default_factory=dict)
     #: Since when the winner of each car has said nothing that shows that it knows of its award.
     _unheard_us: dict[Reference, int] = field(default_factory=dict)
@@ -146,6 +149,35 @@ class Stewardship:
         if car is None or record is None or record.station != car.station:
             return []
         return custody.state(self.fleet, car.car, OUTSIDE, car.wheelbase_mm)
+
+    def claims_bay(self, report: TaskReport, memory: BayMemory) -> bool:
+        """Whether a robot has the right to my bay, or to the car in it, for a task that the journal has lost.
+
+        Of such a task only the robot knows; one to park has its car's name.
+        """
+        bay = self.fleet.machine.station
+        is_begun = report.phase in (TaskPhase.AWARDED, TaskPhase.STARTED) and memory.job is None
+        if bay is None or not is_begun or report.task.origin != self.fleet.node_id:
+            return False
+        holder_of, stands = self.fleet.tokens.holder_of, self.fleet.mirror.car_station(report.task) == bay
+        has_bay = stands and holder_of(station_token(bay)) == report.sender
+        if not has_bay and holder_of(car_token(*report.task)) != report.sender:
+            return False
+        self.left = self.left or CarAt(report.sender, report.task, bay.number, 0, 0)
+        memory.was_granted, self._claimant = has_bay, report.sender
+        return self.left.car == report.task
+
+    def parks_again(self, left: CarAt, memory: BayMemory, bay: BayState | None) -> list[Effect]:
+        """A task for the car that stands in my bay, for the journal; where a robot claims it, that one's own."""
+        wheelbase_mm = left.wheelbase_mm or (0 if bay is None else bay.wheelbase_mm)
+        claimant, self._claimant = self._claimant, NOBODY
+        if claimant != NOBODY:
+            task, noted = left.car, self.won(left.car, claimant, left.car, 1)
+        else:
+            task, number = memory.next_reference(self.fleet)
+            noted = [number]
+        memory.job = (task, Operation.PARK, left.car, wheelbase_mm)
+        return [*noted, job_record(*memory.job, memory.car_class)]
 
     def review(self, now_us: int) -> list[Effect]:
         """Take the right to fetch a car from winners that are lost, and say so until it is awarded anew."""
