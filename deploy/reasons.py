@@ -70,7 +70,11 @@ ADVICE: dict[Reason, Advice] = {
         "a drive, shuttle or door does not do what it was ordered, or the machine is stopped",
         "look at the machine, clear the fault, then start its controller again",
     ),
-    Reason.SENSOR_FAULT: _KEPT,
+    Reason.SENSOR_FAULT: Advice(
+        "a machine's sensors deny what its journal or its work say: load or shuttle are not where they must be; it "
+        "stands",
+        "its own log says which; put it right by hand, and it goes on by itself",
+    ),
     Reason.INVARIANT_BROKEN: Advice(
         "a belief of the controller was wrong; it was stopped and is started again",
         "keep its recording and what its console says, and report them; the third time in a row it waits for a person",

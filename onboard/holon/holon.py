@@ -96,10 +96,11 @@ class Holon:
         #: Whether the bus has taken my frames of late; the shell knows.
         self.is_acknowledged = True
         own = OwnNumber(machine.node_id, self.tokens, self.mirror)
-        self.holds = Holds(self.holding, self.presence, own, self.drops, self._heartbeat, self._new_life)
+        self.holds = Holds(
+            self.holding, self.presence, own, self.drops, self._heartbeat, self._new_life, lambda: self.behaviour
+        )
         self._factory, estimator = factory, factory.estimator(site, machine, self.mirror)
-        is_obstacle = self.mirror.aside.__contains__
-        self.negotiation = negotiation_of(site, machine, estimator, boot, is_obstacle)
+        self.negotiation = negotiation_of(site, machine, estimator, boot, self.mirror.aside.__contains__)
         self.fleet = factory.fleet_type(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
         self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
@@ -477,8 +478,7 @@ class Holon:
         return effects
 
     def _all_drops(self) -> Counter[Reason]:
-        counts = [one for one in (self.drops, *self.wire_drops) if one]
-        return sum(counts, Counter()) if counts else Counter()
+        return sum((one for one in (self.drops, *self.wire_drops) if one), Counter())
 
     def _heartbeat(self) -> Heartbeat:
         return Heartbeat(

@@ -22,14 +22,7 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet, OverheardWord
 from onboard.core.effects import Effect, Halt, Report, Send
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import (
-    Awarded,
-    AwardedAgain,
-    Estimator,
-    NegotiationEvent,
-    PreAssigned,
-    Released,
-)
+from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.alternatives import Solution, weighed
@@ -125,11 +118,17 @@ class ParkingRobot:
         return self.generation.program
 
     @property
+    def why_stopped(self) -> Reason:
+        """ACTUATOR_FAULT where drive or shuttle fail; SENSOR_FAULT: they sense what journal and program deny."""
+        is_astray = self.starting.is_over and self.shuttle.is_astray
+        if self._fault is Reason.NONE and (self.starting.stage is StartStage.HELD or is_astray):
+            return Reason.SENSOR_FAULT
+        return Reason.ACTUATOR_FAULT if self.going_around.is_stuck else self._fault
+
+    @property
     def state(self) -> MachineState:
         """For heartbeats: STOPPED by a fault, OBSTACLE in a person's hand, STARTING until placed."""
-        is_astray = self.starting.is_over and self.shuttle.is_astray
-        is_held_back = self.starting.stage is StartStage.HELD or self.going_around.is_stuck or is_astray
-        if self._fault is not Reason.NONE or is_held_back:
+        if self.why_stopped is not Reason.NONE:
             return MachineState.STOPPED
         if self.holding.is_at_rest:
             return MachineState.OBSTACLE
