@@ -88,7 +88,7 @@ class ParkingRobot:
     starting: Starting = field(init=False)
     resting: Resting = field(init=False)
     #: The last tasks that were done: a late word about one of them is no news.
-    _done: deque[Reference] = field(default_factory=lambda: deque(maxlen=16))
+    _done: deque[tuple[Reference, int]] = field(default_factory=lambda: deque(maxlen=16))
     _begun: bool = False
     _fault: Reason = Reason.NONE
 
@@ -279,9 +279,10 @@ class ParkingRobot:
     def _tell_again(self, task: Reference) -> Effect:
         """What became of a task whose award is said again."""
         handlings = [work.handling for work in self._works() if work.call.task == task]
-        if handlings or task in self._done:
+        done = dict(self._done)
+        if handlings or task in done:
             phase = TaskPhase.AWARDED if CarHandling.TAKE in handlings else TaskPhase.LOADED
-            return self._report(task, phase if handlings else TaskPhase.DONE, 0)
+            return self._report(task, *((phase, 0) if handlings else (TaskPhase.DONE, done[task])))
         why = Reason.JOURNAL_LOST if self.recovery.is_restart else Reason.CANCELLED
         return Send(TaskReport(self.fleet.node_id, task, TaskPhase.FORFEITED, 0, why))
 
@@ -367,7 +368,7 @@ class ParkingRobot:
         mine = self._taken_on(self.recovery.works)
         if self.recovery.last_done is not None:
             task, station = self.recovery.last_done
-            self._done.append(task)
+            self._done.append((task, station))
             if self.recovery.is_news:
                 # The power may have failed before this was said, or heard.
                 mine = [self._report(task, TaskPhase.DONE, station), *mine]
@@ -460,7 +461,7 @@ class ParkingRobot:
             phase = TaskPhase.LOADED if taken else TaskPhase.DONE
             effects.append(handled_record(step.work))
             if not taken:
-                self._done.append(step.work.call.task)
+                self._done.append((step.work.call.task, step.work.station.number))
                 self.recovery.versions.pop(step.work.call.task, None)
             effects.append(self._report(step.work.call.task, phase, step.work.station.number))
         if step.action is LegAction.RIDE:
