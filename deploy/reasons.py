@@ -63,8 +63,10 @@ ADVICE: dict[Reason, Advice] = {
         "wait for its sensors; if it stays so, bring it to a mark by hand and look at its device bus",
     ),
     Reason.JOURNAL_LOST: Advice(
-        "a machine that was started again gives back a task that it knows nothing of any more",
-        "nothing: it is called again; if it comes without a restart, look at the medium of its journal",
+        "a machine that was started again gives back a task that it knows nothing of any more; or its journal cannot "
+        "be written",
+        "nothing: the task is called again, the machine started again; if it goes on, look at the medium of its "
+        "journal: is it full?",
     ),
     Reason.ACTUATOR_FAULT: Advice(
         "a drive, shuttle or door does not do what it was ordered, or the machine is stopped",

@@ -41,7 +41,7 @@ from onboard.core.records import BootRecord
 from onboard.core.site import Machine, Site
 from onboard.holon.admission import Admission
 from onboard.holon.fixed_times import FixedTimes
-from onboard.holon.holding import HoldState, MachineHolds
+from onboard.holon.holding import MachineHolds
 from onboard.holon.holds import Holds, without_rights
 from onboard.holon.own_number import OwnNumber
 from onboard.holon.presence import Presence
@@ -414,11 +414,9 @@ class Holon:
         self.witness.has_past = True
         return self.boot, self.witness.begin(now_us)
 
-    def last_word(self, reason: Reason) -> Halted:
-        """What is said before the process ends: ``reason`` where none was given before."""
-        if self.holding.hold is not HoldState.HALTED:
-            self.holding.halt(reason)
-        return self.holding.word(self.boot)
+    def last_word(self, reason: Reason, *, needs_person: bool) -> Halted:
+        """What is said before the process ends: ``reason`` where none was given before, and who brings it back."""
+        return self.holding.last_word(self.boot, reason, needs_person=needs_person)
 
     # --- inner works -------------------------------------------------------------------------------------------
 
