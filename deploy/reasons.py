@@ -63,14 +63,20 @@ ADVICE: dict[Reason, Advice] = {
         "wait for its sensors; if it stays so, bring it to a mark by hand and look at its device bus",
     ),
     Reason.JOURNAL_LOST: Advice(
-        "a machine that was started again gives back a task that it knows nothing of any more",
-        "nothing: it is called again; if it comes without a restart, look at the medium of its journal",
+        "a machine that was started again gives back a task that it knows nothing of any more; or its journal cannot "
+        "be written",
+        "nothing: the task is called again, the machine started again; if it goes on, look at the medium of its "
+        "journal: is it full?",
     ),
     Reason.ACTUATOR_FAULT: Advice(
         "a drive, shuttle or door does not do what it was ordered, or the machine is stopped",
         "look at the machine, clear the fault, then start its controller again",
     ),
-    Reason.SENSOR_FAULT: _KEPT,
+    Reason.SENSOR_FAULT: Advice(
+        "a machine's sensors deny what its journal or its work say: load or shuttle are not where they must be; it "
+        "stands",
+        "its own log says which; put it right by hand, and it goes on by itself",
+    ),
     Reason.INVARIANT_BROKEN: Advice(
         "a belief of the controller was wrong; it was stopped and is started again",
         "keep its recording and what its console says, and report them; the third time in a row it waits for a person",

@@ -294,6 +294,7 @@ async def run(
             fleet_bus = await sealed_bus(buses[0], config.site, keys, journal_directory, reading)
         ports = Ports(fleet_bus, buses[1], journal, telemetry, life.watchdog, compaction_for(config.site))
         controller = Controller(holon, ports, codec.fleet, codec.device)
+        controller.needs_person = life.needs_person
         controller.start()
         life.follow(controller)
         await life.over()

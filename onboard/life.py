@@ -9,12 +9,13 @@ from typing import Any
 
 from onboard.contract.codes import Reason
 from onboard.controller.shell import Controller
-from onboard.io.endings import OWN_FAULTS, ExitStatus, ending_of
+from onboard.io.endings import ExitStatus, ending_of
 from onboard.io.lasting_bus import LastingBus
 from onboard.io.lives import LifeBook
 from onboard.io.open_bus import BusSettings, OpenBus, open_bus
 from onboard.io.signals import ended_by
 from onboard.io.watchdog import SystemdWatchdog
+from onboard.ports.ending import OWN_FAULTS
 
 #: The supervisor hears so often, s, that somebody who waits for an interface is alive; its period is ten.
 ALIVE_S = 1.0
@@ -116,12 +117,20 @@ class ControllerLife:
     def end(self) -> ExitStatus:
         """Write down and tell how it has ended; the exit status."""
         end = self._ended.result()
-        lived_us = round((self._loop.time() - self._begin_s) * 1_000_000)
-        ending = self._lives.end(end.ending, lived_us, own_fault=end.own_fault)
+        ending = self._lives.end(end.ending, self._lived_us, own_fault=end.own_fault)
         if end.why:
             after = "it waits for a person" if ending is ExitStatus.WAITS_FOR_PERSON else "it is to be started again"
             print(f"onboard: {self._name}: {end.why}; {after}", file=sys.stderr, flush=True)
         return ending
+
+    @property
+    def _lived_us(self) -> int:
+        return round((self._loop.time() - self._begin_s) * 1_000_000)
+
+    def needs_person(self, reason: Reason | None) -> bool:
+        """Whether this life, if it halts now, is one of too many, or for a reason that only a person can know."""
+        after = self._lives.foreseen(ending_of(reason), self._lived_us, own_fault=reason in OWN_FAULTS)
+        return after is ExitStatus.WAITS_FOR_PERSON
 
     def _end(self, end: LifeEnd) -> None:
         if not self._ended.done():
@@ -132,6 +141,4 @@ class ControllerLife:
 
     def _halted(self, controller: Controller, why: str) -> None:
         reason = controller.halted_for
-        # Without a reason of its own it is the journal, whose medium may have room again.
-        ending = ExitStatus.COMES_BACK if reason is None else ending_of(reason)
-        self._end(LifeEnd(ending, f"halted: {why}", own_fault=reason in OWN_FAULTS))
+        self._end(LifeEnd(ending_of(reason), f"halted: {why}", own_fault=reason in OWN_FAULTS))

@@ -2,19 +2,22 @@
 
 import argparse
 import asyncio
+import contextlib
+import signal
 import sys
 from datetime import datetime
 from pathlib import Path
 
 from hil.commission.listener import CommissionListener
 from hil.commission.person import ConsolePerson
-from hil.commission.protocol import Protocol
+from hil.commission.protocol import Protocol, StepVerdict
 from hil.commission.setting import CommissionSetting
 from hil.commission.walk import walk
 from onboard.config.arguments import Parser
 from onboard.config.machine import MachineConfig, load_machine
 from onboard.config.problems import ConfigError
 from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
+from onboard.io.signals import ended_by
 from onboard.systems.contract import codecs_for
 
 HELP = """\
@@ -23,7 +26,7 @@ place. It is asked at the terminal; answers may come from a pipe, one a line.
 
 exit status:
   0  every step was done and none failed
-  1  a step failed or was not done; the protocol says which
+  1  a step failed or was not done, also because the program was ended; the protocol says which
   2  a mistake in the command line, the machine file or the site file, or a bus that cannot be opened
 
 examples:
@@ -68,8 +71,28 @@ def main(words: list[str]) -> int:
     except OSError as error:
         print(f"hil commission: --protocol {file}: {error.strerror}; name a file that can be written", file=sys.stderr)
         return 2
-    print(f"\n{protocol.text()}\nThe protocol is in {file}.")
+    # Nobody reads of a terminal that is closed.
+    with contextlib.suppress(OSError):
+        print(f"\n{protocol.text()}\nThe protocol is in {file}.", flush=True)
     return 0 if protocol.is_passed else 1
+
+
+async def _walked(setting: CommissionSetting) -> None:
+    """The walk to its end; who ends the program keeps what was measured until then, and the drives hear no order."""
+    walking, loop = asyncio.ensure_future(walk(setting)), asyncio.get_running_loop()
+    signals: list[signal.Signals] = []
+
+    def end(number: signal.Signals) -> None:
+        signals.append(number)
+        walking.cancel()
+
+    with ended_by(loop, end):
+        await asyncio.wait({walking})
+    if walking.cancelled():
+        # Not told to the person as well: the terminal may be closed.
+        setting.protocol.note("all further steps", StepVerdict.NOT_DONE, f"ended from outside ({signals[0].name})")
+        return
+    walking.result()
 
 
 async def _commission(config: MachineConfig, settings: BusSettings) -> Protocol:
@@ -92,7 +115,7 @@ async def _commission(config: MachineConfig, settings: BusSettings) -> Protocol:
             ConsolePerson(),
             protocol,
         )
-        await walk(setting)
+        await _walked(setting)
         return protocol
     finally:
         await fleet.close()

@@ -18,6 +18,7 @@ from onboard.core.effects import Actuate, Effect, Halt, Record, Renew, Report, S
 from onboard.core.frame import Frame
 from onboard.holon.holon import Holon
 from onboard.ports.bus import Bus
+from onboard.ports.ending import NeedsPerson, needs_person
 from onboard.ports.journal import Compaction, Journal
 from onboard.ports.telemetry import Telemetry
 from onboard.ports.watchdog import Watchdog
@@ -59,6 +60,8 @@ class Controller:
         self.taken_us: Callable[[], int] | None = None
         #: Why it has halted; None while it has not, or where the journal could not be written.
         self.halted_for: Reason | None = None
+        #: Who brings it back then; the life of a process knows of the lives before.
+        self.needs_person: NeedsPerson = needs_person
         self._codecs = (fleet, device)
         holon.listen(fleet.speakers)
         self._decoders = (Decoder(fleet), Decoder(device))
@@ -299,7 +302,8 @@ class Controller:
         self.holon.halted = self.holon.halted or why
         self._inbox.clear()
         self._keep_quiet()
-        for frame in self._codecs[0].encode(self.holon.last_word(reason or Reason.JOURNAL_LOST)):
+        word = self.holon.last_word(reason or Reason.JOURNAL_LOST, needs_person=self.needs_person(reason))
+        for frame in self._codecs[0].encode(word):
             self.ports.fleet_bus.send(frame)
         self.ports.telemetry.event(self._now_us(), self.holon.machine.name, f"halted: {why}")
         self.ports.watchdog.status(f"halted: {why}")

@@ -7,7 +7,7 @@ somebody made or moved a right under its number a person decides.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import NamedTuple
 
@@ -122,6 +122,13 @@ class MachineHolds:
     def word(self, boot: int) -> Halted:
         """What is said of it; ``boot`` is the boot counter."""
         return Halted(self.node_id, self.node_id, self.why.reason, self.why.cause, self.why.needs_person, boot)
+
+    def last_word(self, boot: int, reason: Reason, *, needs_person: bool) -> Halted:
+        """What is said before the process ends; a hold for a person outlives it, whatever starts the process again."""
+        if self.hold is not HoldState.HALTED:
+            self.halt(reason)
+        word = self.word(boot)
+        return word if word.reason is not reason else replace(word, needs_person=needs_person)
 
     # --- events ------------------------------------------------------------------------------------------------
 

@@ -3,8 +3,10 @@
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
-from onboard.contract.codes import Reason, TaskPhase
+from onboard.contract.codes import MachineState, Reason, TaskPhase
+from onboard.contract.constants import NOBODY
 from onboard.contract.messages import (
     Award,
     Bid,
@@ -24,6 +26,7 @@ from onboard.contract.messages import (
     TokenRequest,
 )
 from onboard.contract.runs import singles
+from onboard.core.behaviour import Behaviour
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.records import BootRecord
@@ -39,9 +42,21 @@ _OF_RIGHTS = (
 )
 
 
+@runtime_checkable
+class SelfStopping(Protocol):
+    """A behaviour that stops its own machine for more than one reason; of any other an actuator is broken."""
+
+    @property
+    def why_stopped(self) -> Reason:
+        """Why it says STOPPED; NONE where it does not."""
+
+
 @dataclass
 class Holds:
-    """One machine's. ``heartbeat`` makes its sign of life, ``new_life`` begins another: its number, what to ask."""
+    """One machine's. ``heartbeat`` makes its sign of life, ``new_life`` begins another: its number, what to ask.
+
+    ``behaviour`` gives what this machine does: it may have stopped itself.
+    """
 
     holding: MachineHolds
     presence: Presence
@@ -49,6 +64,7 @@ class Holds:
     drops: Counter[Reason]
     heartbeat: Callable[[], Heartbeat]
     new_life: Callable[[int], tuple[int, list[Effect]]]
+    behaviour: Callable[[], Behaviour]
 
     def on_own_number(self, message: Message, now_us: int) -> list[Effect]:
         """Somebody sends under my number: I hold, and take nothing in, until I know that nobody believed it."""
@@ -92,8 +108,16 @@ class Holds:
     def words(self) -> list[Effect]:
         """My sign of life, and why I do not act where I do not."""
         beat = self.heartbeat()
-        held: list[Effect] = [Send(self.holding.word(beat.boot))] if self.holding.is_held else []
-        return [Send(beat), *held]
+        if self.holding.is_held:
+            return [Send(beat), Send(self.holding.word(beat.boot))]
+        return [Send(beat), self._stopped(beat)] if beat.state is MachineState.STOPPED else [Send(beat)]
+
+    def _stopped(self, beat: Heartbeat) -> Effect:
+        """Nothing from outside holds it, and nobody else can let it go on: a person has to help."""
+        behaviour, me = self.behaviour(), self.holding.node_id
+        # Of who says no more all believe that an actuator is broken (``Presence``).
+        why = behaviour.why_stopped if isinstance(behaviour, SelfStopping) else Reason.ACTUATOR_FAULT
+        return Send(Halted(me, me, why, NOBODY, True, beat.boot))
 
     def _come_back(self, now_us: int) -> list[Effect]:
         """As after a restart: under a new boot counter, and all are asked what they know before any right is used."""

@@ -41,7 +41,7 @@ from onboard.core.records import BootRecord
 from onboard.core.site import Machine, Site
 from onboard.holon.admission import Admission
 from onboard.holon.fixed_times import FixedTimes
-from onboard.holon.holding import HoldState, MachineHolds
+from onboard.holon.holding import MachineHolds
 from onboard.holon.holds import Holds, without_rights
 from onboard.holon.own_number import OwnNumber
 from onboard.holon.presence import Presence
@@ -96,10 +96,11 @@ class Holon:
         #: Whether the bus has taken my frames of late; the shell knows.
         self.is_acknowledged = True
         own = OwnNumber(machine.node_id, self.tokens, self.mirror)
-        self.holds = Holds(self.holding, self.presence, own, self.drops, self._heartbeat, self._new_life)
+        self.holds = Holds(
+            self.holding, self.presence, own, self.drops, self._heartbeat, self._new_life, lambda: self.behaviour
+        )
         self._factory, estimator = factory, factory.estimator(site, machine, self.mirror)
-        is_obstacle = self.mirror.aside.__contains__
-        self.negotiation = negotiation_of(site, machine, estimator, boot, is_obstacle)
+        self.negotiation = negotiation_of(site, machine, estimator, boot, self.mirror.aside.__contains__)
         self.fleet = factory.fleet_type(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
         self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
@@ -413,11 +414,9 @@ class Holon:
         self.witness.has_past = True
         return self.boot, self.witness.begin(now_us)
 
-    def last_word(self, reason: Reason) -> Halted:
-        """What is said before the process ends: ``reason`` where none was given before."""
-        if self.holding.hold is not HoldState.HALTED:
-            self.holding.halt(reason)
-        return self.holding.word(self.boot)
+    def last_word(self, reason: Reason, *, needs_person: bool) -> Halted:
+        """What is said before the process ends: ``reason`` where none was given before, and who brings it back."""
+        return self.holding.last_word(self.boot, reason, needs_person=needs_person)
 
     # --- inner works -------------------------------------------------------------------------------------------
 
@@ -477,8 +476,7 @@ class Holon:
         return effects
 
     def _all_drops(self) -> Counter[Reason]:
-        counts = [one for one in (self.drops, *self.wire_drops) if one]
-        return sum(counts, Counter()) if counts else Counter()
+        return sum((one for one in (self.drops, *self.wire_drops) if one), Counter())
 
     def _heartbeat(self) -> Heartbeat:
         return Heartbeat(

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.contract.codes import Reason
+from onboard.contract.codes import MachineState, Reason
 from onboard.contract.constants import NOBODY, SEEN_VERSION_BITS
 from onboard.contract.messages import (
     Halted,
@@ -248,8 +248,13 @@ class Witness:
         return live - self.answered
 
     def _live(self, now_us: int) -> set[int]:
-        """Who can answer: not who has said that it is halted or held apart."""
-        return (self.mirror.alive(now_us) & self._others) - set(self.halts)
+        """Who can answer: not who has said that it is halted or held apart; who has stopped itself answers."""
+        live = self.mirror.alive(now_us) & self._others
+        return {node for node in live if node not in self.halts or self._has_stopped(node)}
+
+    def _has_stopped(self, node: int) -> bool:
+        """Whether a machine stands of its own accord, and takes in and tells as ever: who is held says OBSTACLE."""
+        return self.mirror.peers[node].state is MachineState.STOPPED
 
     def wake(self, now_us: int) -> list[Effect]:
         """Ask again who has not answered, and answer those who asked meanwhile."""

@@ -3,6 +3,7 @@
 from enum import IntEnum
 
 from onboard.contract.codes import Reason
+from onboard.ports.ending import needs_person
 
 
 class ExitStatus(IntEnum):
@@ -17,12 +18,6 @@ class ExitStatus(IntEnum):
     WAITS_FOR_PERSON = 3
 
 
-#: The belief was wrong, not the world: it is built anew from journal and sensors. Not for ever, see ``lives.LIMIT``.
-OWN_FAULTS = frozenset({Reason.INVARIANT_BROKEN, Reason.RUNAWAY})
-#: What a halt means for the process; every other reason waits for a person.
-_COMES_BACK = OWN_FAULTS | {Reason.WATCHDOG, Reason.BUS_LOST}
-
-
-def ending_of(reason: Reason) -> ExitStatus:
-    """What becomes of a controller that has halted for this reason."""
-    return ExitStatus.COMES_BACK if reason in _COMES_BACK else ExitStatus.WAITS_FOR_PERSON
+def ending_of(reason: Reason | None) -> ExitStatus:
+    """What becomes of a controller that has halted for this reason; None: its journal could not be written."""
+    return ExitStatus.WAITS_FOR_PERSON if needs_person(reason) else ExitStatus.COMES_BACK

@@ -67,12 +67,19 @@ class LifeBook:
 
     def end(self, ending: ExitStatus, lived_us: int, *, own_fault: bool = False) -> ExitStatus:
         """Write down how this life ends. One ended by a fault of its own too often waits for a person."""
-        self._short = self._short + 1 if own_fault and lived_us < HEALTHY_US else 0
-        if self._short >= LIMIT:
-            self._short = 0
-            ending = ExitStatus.WAITS_FOR_PERSON
-        self._write(ending.name)
-        return ending
+        after = self.foreseen(ending, lived_us, own_fault=own_fault)
+        self._short = 0 if after is not ending else self._counted(lived_us, own_fault=own_fault)
+        self._write(after.name)
+        return after
+
+    def foreseen(self, ending: ExitStatus, lived_us: int, *, own_fault: bool = False) -> ExitStatus:
+        """The same, and nothing is written: it goes on."""
+        is_too_often = self._counted(lived_us, own_fault=own_fault) >= LIMIT
+        return ExitStatus.WAITS_FOR_PERSON if is_too_often else ending
+
+    def _counted(self, lived_us: int, *, own_fault: bool) -> int:
+        """So many short lives in a row with this one, us."""
+        return self._short + 1 if own_fault and lived_us < HEALTHY_US else 0
 
     def _result(self) -> str:
         try:

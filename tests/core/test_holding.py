@@ -109,3 +109,12 @@ def test_a_halted_machine_says_why_and_nothing_changes_that() -> None:
     for outcome in (held.own_frame(1, is_right=True), held.stop(OTHER, 1), held.go(ME), held.wake(2)):
         assert outcome is HoldResponse.NOTHING
     assert held.why == (Reason.INVARIANT_BROKEN, NOBODY, True)
+
+
+def test_the_last_word_says_who_brings_it_back_and_a_hold_for_a_person_stays_one() -> None:
+    assert not holding().last_word(1, Reason.JOURNAL_LOST, needs_person=False).needs_person
+    assert holding().last_word(1, Reason.NOT_AUTHORISED, needs_person=True).needs_person
+    held = holding()
+    held.for_person(Reason.OPERATOR, OTHER)
+    word = held.last_word(1, Reason.JOURNAL_LOST, needs_person=False)
+    assert (word.reason, word.cause, word.needs_person) == (Reason.OPERATOR, OTHER, True)

@@ -1,5 +1,7 @@
 """A machine that was started again asks before it uses a right; who knows better than its journal says so."""
 
+from dataclasses import replace
+
 import pytest
 
 from onboard.contract.codes import Grade, KindCode, MachineState, Reason
@@ -101,6 +103,19 @@ def test_a_machine_that_says_that_it_is_held_apart_is_not_waited_for() -> None:
     alice.knows(STEWARD, BOB)
     alice.hear(done(STEWARD))
     alice.wake(START_US + BEAT_US)
+    assert alice.tokens.holds(KEY)
+
+
+def test_a_machine_that_has_stopped_itself_answers_and_is_waited_for() -> None:
+    alice = Machine(ALICE, line("token_held", 3, ALICE))
+    alice.witness.halts = {BOB: Halted(BOB, BOB, Reason.ACTUATOR_FAULT, 0, True, 2)}
+    alice.start()
+    alice.knows(STEWARD, BOB)
+    alice.mirror.peers[BOB] = replace(alice.mirror.peers[BOB], state=MachineState.STOPPED)
+    alice.hear(done(STEWARD))
+    alice.wake(START_US + BEAT_US)
+    assert not alice.tokens.holds(KEY)
+    alice.hear(done(BOB, ALICE), START_US + BEAT_US + 1)
     assert alice.tokens.holds(KEY)
 
 

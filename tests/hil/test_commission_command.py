@@ -2,8 +2,10 @@
 
 import asyncio
 import os
+import signal
 import sys
 from asyncio.subprocess import PIPE, STDOUT
+from collections.abc import Coroutine
 from pathlib import Path
 
 import pytest
@@ -25,8 +27,13 @@ ROOT = Path(__file__).parents[2]
 ANSWERS = "A. Person\n60,1\ny\ny\ny\nn\nn\nn\n\n"
 
 
-async def play(directory: Path) -> tuple[int | None, str]:
-    """Exit status and output of a walk; the controller is switched on when the walk asks for it."""
+async def play(
+    directory: Path, answers: str = ANSWERS, *, end_by: signal.Signals | None = None, end_at: str = ""
+) -> tuple[int | None, str]:
+    """Exit status and output of a walk; the controller is switched on when the walk asks for it.
+
+    With ``end_by`` the answers do not end, and the walk is ended once it has said ``end_at``.
+    """
     loop = asyncio.get_running_loop()
     assert isinstance(loop, VirtualTimeLoop)
     text = (BENCHES / "bench.toml").read_text()
@@ -47,8 +54,8 @@ async def play(directory: Path) -> tuple[int | None, str]:
         stderr=STDOUT,
     )
     assert walk.stdin is not None and walk.stdout is not None
-    walk.stdin.write(ANSWERS.encode())
-    shown, told = "", False
+    walk.stdin.write(answers.encode())
+    shown, told, ended = "", False, False
     async with asyncio.timeout(DEADLINE_S):
         while piece := await walk.stdout.read(4096):
             shown += piece.decode()
@@ -59,20 +66,46 @@ async def play(directory: Path) -> tuple[int | None, str]:
                 simulation.plant.shuttles[11].start()
             if "Switch the controller of MR1 on" in shown and 11 not in simulation.controllers:
                 simulation.start_controller(simulation.site.machines[11])
+            if end_by is not None and end_at in shown and not ended:
+                ended = True
+                walk.send_signal(end_by)
         status = await walk.wait()
     await server.close()
     await stop_fleet(simulation)
     return status, shown
 
 
-def test_the_walk_on_a_live_bus_prints_and_keeps_its_protocol(tmp_path: Path) -> None:
+def on_a_live_bus(walk: Coroutine[None, None, tuple[int | None, str]]) -> tuple[int | None, str]:
     loop = VirtualTimeLoop(pace=1.0)
     try:
         asyncio.set_event_loop(loop)
-        status, shown = loop.run_until_complete(play(tmp_path))
+        return loop.run_until_complete(walk)
     finally:
         asyncio.set_event_loop(None)
         loop.close()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+@pytest.mark.parametrize(
+    ("answers", "end_at"),
+    [("A. Person\n60,1\n", "passed: termination"), ("A. Person\n60,1\ny\ny\n", "passed: drive's position")],
+    ids=["before the fleet is on", "at the devices"],
+)
+def test_who_ends_the_walk_keeps_what_was_measured(
+    answers: str, end_at: str, number: signal.Signals, tmp_path: Path
+) -> None:
+    """The input goes on: a person thinks, and nobody answers any more."""
+    status, shown = on_a_live_bus(play(tmp_path, answers, end_by=number, end_at=end_at))
+    assert status == 1, shown
+    protocol = (tmp_path / "MR1-protocol.txt").read_text()
+    assert protocol in shown
+    assert "person      A. Person" in protocol and "60.1 ohms, wanted 54 to 66" in protocol
+    assert f"not done  all further steps: ended from outside ({number.name})" in protocol
+    assert "The machine is NOT in order: 0 failed, 1 not done." in protocol
+
+
+def test_the_walk_on_a_live_bus_prints_and_keeps_its_protocol(tmp_path: Path) -> None:
+    status, shown = on_a_live_bus(play(tmp_path))
     assert status == 1, shown
     protocol = (tmp_path / "MR1-protocol.txt").read_text()
     assert protocol in shown

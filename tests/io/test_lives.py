@@ -64,4 +64,21 @@ def test_files_that_are_not_ours_stop_nobody(tmp_path: Path) -> None:
 
 def test_what_only_a_person_can_know_waits_for_one() -> None:
     by_itself = {reason for reason in Reason if ending_of(reason) is ExitStatus.COMES_BACK}
+    assert ending_of(None) is ExitStatus.COMES_BACK, "a journal that cannot be written: its medium may have room again"
     assert by_itself == {Reason.INVARIANT_BROKEN, Reason.RUNAWAY, Reason.WATCHDOG, Reason.BUS_LOST}
+
+
+def test_what_becomes_of_a_life_is_known_before_it_ends(tmp_path: Path) -> None:
+    """The last word on the bus says whether a person is needed; what is asked changes nothing."""
+    for _ in range(LIMIT - 1):
+        lives = LifeBook(tmp_path / "journal")
+        lives.begin()
+        assert lives.foreseen(ExitStatus.COMES_BACK, 1, own_fault=True) is ExitStatus.COMES_BACK
+        lives.end(ExitStatus.COMES_BACK, 1, own_fault=True)
+    last = LifeBook(tmp_path / "journal")
+    last.begin()
+    assert last.foreseen(ExitStatus.COMES_BACK, 1) is ExitStatus.COMES_BACK, "a full disk"
+    assert last.foreseen(ExitStatus.COMES_BACK, HEALTHY_US, own_fault=True) is ExitStatus.COMES_BACK
+    for _ in range(2):
+        assert last.foreseen(ExitStatus.COMES_BACK, 1, own_fault=True) is ExitStatus.WAITS_FOR_PERSON
+    assert last.end(ExitStatus.COMES_BACK, 1, own_fault=True) is ExitStatus.WAITS_FOR_PERSON

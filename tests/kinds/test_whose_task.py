@@ -20,7 +20,8 @@ from onboard.systems.car_park import custody
 from onboard.systems.car_park.bay_memory import winner_record
 from onboard.systems.car_park.bay_task import REMINDERS, BayPhase
 from onboard.systems.car_park.compartment import Compartment
-from onboard.systems.car_park.recovery import award_record
+from onboard.systems.car_park.program import CarHandling, StationWork
+from onboard.systems.car_park.recovery import award_record, handled_record
 from tests.models.at_work import AtWork, Deed, Entry
 from tests.models.award import BAY, CAR, CHEAP, DEAR, KEY, PLACE, TASK, WHEELBASE_MM, AwardPart
 from tests.models.custody import CALL, HERE
@@ -127,6 +128,17 @@ def test_a_robot_that_has_the_task_says_so() -> None:
     robot = started(CHEAP, award_record(CALL, PLACE, HERE, 1).entry)
     said = [word.phase for word in robot.hears(AGAIN) if isinstance(word, TaskReport)]
     assert said == [TaskPhase.AWARDED]
+
+
+def test_a_robot_that_is_done_says_where_it_left_the_car() -> None:
+    """Without the station a compartment took it for left somewhere on the way, and called for it in its own bay."""
+    works = (
+        StationWork(CarHandling.TAKE, PLACE, CAR, WHEELBASE_MM, CALL),
+        StationWork(CarHandling.LEAVE, HERE, CAR, WHEELBASE_MM, CALL),
+    )
+    robot = started(CHEAP, award_record(CALL, PLACE, HERE, 1).entry, *(handled_record(one).entry for one in works))
+    said = [word for word in robot.hears(AGAIN) if isinstance(word, TaskReport)]
+    assert said == [TaskReport(CHEAP, TASK, TaskPhase.DONE, HERE.number, Reason.NONE)]
 
 
 def elsewhere() -> AtWork:

@@ -1,5 +1,6 @@
 """A person's answer, from whatever stands in a person's place."""
 
+from pathlib import Path
 from typing import cast
 
 import pytest
@@ -29,4 +30,6 @@ async def test_an_answer_that_does_not_end_is_cut_and_is_no_yes(monkeypatch: pyt
     monkeypatch.setattr("sys.stdin", Endless())
     asker = Asker(cast("OperatorStation", None), print)
     assert not await asker.agrees(OperatorCommand(cast("Park", None), 251))
-    assert len(await ConsolePerson().ask("go on?")) == 1_000
+    with Path("/dev/zero").open(encoding="utf-8") as device:
+        monkeypatch.setattr("sys.stdin", device)
+        assert len(await ConsolePerson().ask("go on?")) == 1_000

@@ -119,6 +119,28 @@ def test_done_is_told_again_only_after_a_restart(restarted: bool, broken: dict[s
     assert tape.say(52, report(MR1, TaskPhase.DONE, PLACE)).broken(54) == broken
 
 
+@pytest.mark.parametrize(
+    ("asked", "answers", "broken"),
+    [
+        ([award(MR1)], [(52.1, MR1), (52.1, MR1)], {}),
+        ([award(MR1, number=0)], [(52.1, MR1)], {}),
+        ([award(MR1)], [(52.1, MR1), (60, MR1)], {"one-owner": 1}),
+        ([award(MR1)], [(52.1, MR2)], {"one-owner": 1}),
+        ([award(MR2)], [(52.1, MR1)], {"calls-closed": 1, "one-owner": 2}),
+        ([], [(52.1, MR1)], {"one-owner": 1}),
+    ],
+    ids=["at once", "of a call forgotten", "later again", "another", "awarded to another", "unasked"],
+)
+def test_done_may_be_told_again_to_who_says_the_award_again_and_by_nobody_else(
+    asked: list[Message], answers: list[tuple[float, int]], broken: dict[str, int]
+) -> None:
+    """A compartment without sensors does not see that its robot is done (small, all faults, 30150)."""
+    tape = tell(STORY).say(52, *asked)
+    for at_s, node in answers:
+        tape.say(at_s, report(node, TaskPhase.DONE, PLACE))
+    assert tape.broken(62) == broken
+
+
 def test_who_was_off_together_with_all_others_may_say_again_that_a_car_was_put_down() -> None:
     """The log begins anew with the bus time: what was said before is not known."""
     tape = tell([(1, [call(1, 2)]), (1.5, [bid(MR1, 50_000)]), (2, [award(MR1)])])

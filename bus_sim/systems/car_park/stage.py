@@ -12,7 +12,7 @@ from bus_sim.systems.car_park.by_hand import ByHand
 from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.plant.bodies import random_car
 from bus_sim.systems.car_park.plant.customer import Customer, CustomerEvent, CustomerState, VisitOutcome
-from bus_sim.systems.car_park.plant.plant import Plant, looks_for_ticket
+from bus_sim.systems.car_park.plant.plant import Plant, is_told_off, looks_for_ticket
 from bus_sim.systems.car_park.show import ConsoleShow, DayClock
 from bus_sim.systems.car_park.simulation import Simulation
 from bus_sim.systems.car_park.summary import BurstFigures, RunSummary, bus_figures, unserved
@@ -97,14 +97,16 @@ class CarParkStage(SystemStage[Plant]):
         return tuple(map(_wait_s, self.customers))
 
     def tally(self) -> Tally:
-        """Whoever has lost the ticket does not count as waiting: no machine can help there."""
+        """Whoever has lost the ticket does not count as waiting: no machine can help there; nor who was told why."""
         customers, summary = self.customers, self._street.summary()
         outcomes = Counter(customer.visit.outcome for customer in customers)
         still = (CustomerState.COMING, CustomerState.PARKED, CustomerState.GONE)
+        told_off = sum(map(is_told_off, customers))
+        waiting = sum(one.state not in still and not looks_for_ticket(one) for one in customers)
         return Tally(
             outcomes[VisitOutcome.SERVED] + outcomes[VisitOutcome.CANCELLED],
-            sum(outcomes[one] for one in _TOLD_WHY),
-            sum(one.state not in still and not looks_for_ticket(one) for one in customers),
+            sum(outcomes[one] for one in _TOLD_WHY) + told_off,
+            waiting - told_off,
             max((*summary.in_wait_us, *summary.out_wait_us), default=0) / 1e6,
             outcomes[VisitOutcome.FULL],
         )

@@ -273,9 +273,10 @@ class BayCalls:
         assert job is not None
         is_mine = custody.is_mine(self.fleet, job.car)
         is_parked = job.operation is Operation.PARK
-        # A car that was fetched may be out already: its driver took it while this machine was off.
-        is_fetched = is_loaded or (is_mine and custody.place_of(self.fleet, job.car) is None)
-        if not is_loaded if is_parked else is_fetched:
+        is_placed = is_mine and custody.place_of(self.fleet, job.car) is not None
+        # A car in my own custody at a place has left, whatever a sensor that is silent now has said last; one that was
+        # fetched may be out already: its driver took it while this machine was off.
+        if (is_placed or not is_loaded) if is_parked else (is_loaded or (is_mine and not is_placed)):
             return BayPhase.CLOSING, []
         holder = self.fleet.tokens.holder_of(car_token(*job.car))
         if not is_mine and (is_parked or (holder == job.winner and holder != NOBODY)):

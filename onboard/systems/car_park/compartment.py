@@ -231,7 +231,8 @@ class Compartment:
         effects = self.calls.review(now_us) + self.desks.review(now_us)
         if self.doors is None or self.bay is None:
             return effects
-        return effects + self._table[self.phase](now_us) + self.pipeline.look_ahead(self.phase, now_us)
+        effects += self._table[self.phase](now_us) + self.pipeline.look_ahead(self.phase, now_us)
+        return effects + self.pipeline.outage.review(self.phase, now_us)
 
     def next_wake(self) -> int | None:
         """When a refused call is made again, or a winner counts as lost."""

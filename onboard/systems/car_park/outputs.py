@@ -71,6 +71,11 @@ class BayOutputs:
         self._print = []
         return self._order_desk(self._next(), text, car, compartment)
 
+    @property
+    def shown(self) -> tuple[DeskText, Reference] | None:
+        """What the desk was ordered to show last, and about which car; None before the first order."""
+        return None if self._desk is None else (self._desk.text, self._desk.car)
+
     def prepare_ticket(self, car: Reference) -> list[Effect]:
         """The code goes before all else, so that it is there when what the ticket stands for is on the disk."""
         self._print = self.codes.halves(self.node_id, self._next(), car)

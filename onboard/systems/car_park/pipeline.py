@@ -7,7 +7,7 @@ into his own; drivers, who cannot be seen outside, are invited after ``MOST_OUT`
 """
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from onboard.contract.codes import DeskText, Operation, Reason
 from onboard.contract.constants import ANY_STATION, NOBODY
@@ -18,6 +18,7 @@ from onboard.systems.car_park.bay_calls import BayCalls
 from onboard.systems.car_park.bay_generation import DRIVER_US
 from onboard.systems.car_park.bay_memory import BayMemory, ahead_record
 from onboard.systems.car_park.bay_task import BayPhase, BayTask
+from onboard.systems.car_park.outage import Outage
 from onboard.systems.car_park.outputs import BayOutputs
 from onboard.systems.car_park.site import ANY_CLASS, CallAt, CarPark
 from onboard.ways.mirror import WayFleet
@@ -57,6 +58,10 @@ class Pipeline:
     _looked_us: int = 0
     #: Who asked for the bay though nothing is known of a task for it.
     _wanted_by: int = NOBODY
+    outage: Outage = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.outage = Outage(self.fleet, self.calls, self.outputs, self.tickets)
 
     @property
     def is_on(self) -> bool:
@@ -64,11 +69,13 @@ class Pipeline:
         return self.park.call_at is CallAt.ARRIVAL
 
     def next_wake(self, phase: BayPhase) -> int | None:
-        """When whoever comes in has not pressed the key, or a driver who was invited has not come."""
+        """When whoever comes in has not pressed the key, a driver who was invited has not come, or no robot does."""
         if phase is BayPhase.ENTERING:
             return self.entering_until_us
+        if phase is not BayPhase.FREE:
+            return self.outage.next_wake(phase)
         waits = self._is_drivers_turn and bool(self.tickets or self.calls.ahead)
-        if phase is not BayPhase.FREE or self.free_from_us is None or not waits:
+        if self.free_from_us is None or not waits:
             return None
         due_us = self.free_from_us + QUEUED_US
         # Somebody in the bay, or a door that does not stay open: whatever ends that is told.

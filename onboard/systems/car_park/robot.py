@@ -22,14 +22,7 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet, OverheardWord
 from onboard.core.effects import Effect, Halt, Report, Send
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import (
-    Awarded,
-    AwardedAgain,
-    Estimator,
-    NegotiationEvent,
-    PreAssigned,
-    Released,
-)
+from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.alternatives import Solution, weighed
@@ -95,7 +88,7 @@ class ParkingRobot:
     starting: Starting = field(init=False)
     resting: Resting = field(init=False)
     #: The last tasks that were done: a late word about one of them is no news.
-    _done: deque[Reference] = field(default_factory=lambda: deque(maxlen=16))
+    _done: deque[tuple[Reference, int]] = field(default_factory=lambda: deque(maxlen=16))
     _begun: bool = False
     _fault: Reason = Reason.NONE
 
@@ -125,11 +118,17 @@ class ParkingRobot:
         return self.generation.program
 
     @property
+    def why_stopped(self) -> Reason:
+        """ACTUATOR_FAULT where drive or shuttle fail; SENSOR_FAULT: they sense what journal and program deny."""
+        is_astray = self.starting.is_over and self.shuttle.is_astray
+        if self._fault is Reason.NONE and (self.starting.stage is StartStage.HELD or is_astray):
+            return Reason.SENSOR_FAULT
+        return Reason.ACTUATOR_FAULT if self.going_around.is_stuck else self._fault
+
+    @property
     def state(self) -> MachineState:
         """For heartbeats: STOPPED by a fault, OBSTACLE in a person's hand, STARTING until placed."""
-        is_astray = self.starting.is_over and self.shuttle.is_astray
-        is_held_back = self.starting.stage is StartStage.HELD or self.going_around.is_stuck or is_astray
-        if self._fault is not Reason.NONE or is_held_back:
+        if self.why_stopped is not Reason.NONE:
             return MachineState.STOPPED
         if self.holding.is_at_rest:
             return MachineState.OBSTACLE
@@ -280,9 +279,10 @@ class ParkingRobot:
     def _tell_again(self, task: Reference) -> Effect:
         """What became of a task whose award is said again."""
         handlings = [work.handling for work in self._works() if work.call.task == task]
-        if handlings or task in self._done:
+        done = dict(self._done)
+        if handlings or task in done:
             phase = TaskPhase.AWARDED if CarHandling.TAKE in handlings else TaskPhase.LOADED
-            return self._report(task, phase if handlings else TaskPhase.DONE, 0)
+            return self._report(task, *((phase, 0) if handlings else (TaskPhase.DONE, done[task])))
         why = Reason.JOURNAL_LOST if self.recovery.is_restart else Reason.CANCELLED
         return Send(TaskReport(self.fleet.node_id, task, TaskPhase.FORFEITED, 0, why))
 
@@ -368,7 +368,7 @@ class ParkingRobot:
         mine = self._taken_on(self.recovery.works)
         if self.recovery.last_done is not None:
             task, station = self.recovery.last_done
-            self._done.append(task)
+            self._done.append((task, station))
             if self.recovery.is_news:
                 # The power may have failed before this was said, or heard.
                 mine = [self._report(task, TaskPhase.DONE, station), *mine]
@@ -461,7 +461,7 @@ class ParkingRobot:
             phase = TaskPhase.LOADED if taken else TaskPhase.DONE
             effects.append(handled_record(step.work))
             if not taken:
-                self._done.append(step.work.call.task)
+                self._done.append((step.work.call.task, step.work.station.number))
                 self.recovery.versions.pop(step.work.call.task, None)
             effects.append(self._report(step.work.call.task, phase, step.work.station.number))
         if step.action is LegAction.RIDE:

@@ -14,6 +14,8 @@ from onboard.trace.check.rule import Handlers, Rule
 TASKS = (Operation.PARK, Operation.RETRIEVE)
 #: Phases that only the owner of the task tells.
 OWNERS_PHASES = (TaskPhase.STARTED, TaskPhase.LOADED, TaskPhase.DONE)
+#: Who hears its award again answers at once, us: what a full bus and a busy controller take.
+ANSWER_US = 1_000_000
 #: Tasks remembered; older ones are long over.
 MOST_TASKS = 4_096
 
@@ -22,13 +24,15 @@ MOST_TASKS = 4_096
 class TaskSeen:
     """A task by its awards: its owner (0: nobody), under which version, and who won some part of it.
 
-    ``done_in`` holds the boot counters of the lives in which its owner told that it is done.
+    ``done_in`` holds the boot counters of the lives in which its owner told that it is done; ``asked_us`` is when the
+    award to its owner was said again last, us of the log, None for never.
     """
 
     owner: int = 0
     version: int = -1
     done_in: set[int | None] = field(default_factory=set)
     winners: set[int] = field(default_factory=set)
+    asked_us: int | None = None
 
 
 class OneOwner(Rule):
@@ -75,6 +79,9 @@ class OneOwner(Rule):
         if award.result is not CallResult.AWARDED:
             return
         task.winners.add(award.winner)
+        if award.winner == task.owner:
+            # It is to say how the task stands, whatever it has said of it before.
+            task.asked_us = event.time_us
         if not self._calls.get((award.sender, award.call)):
             return
         if task.owner not in (0, award.winner) and award.task_version == task.version:
@@ -97,7 +104,8 @@ class OneOwner(Rule):
         if report.phase is TaskPhase.DONE and report.sender == task.owner:
             # Whoever was killed right after it says so once more after its restart: nobody may have heard it.
             life = self.picture.boots.get(report.sender)
-            if life in task.done_in:
+            is_answer = task.asked_us is not None and event.time_us - task.asked_us <= ANSWER_US
+            if life in task.done_in and not is_answer:
                 self.find(event, (report.sender,), f"tells DONE of task {_name(report.task)} again")
             task.done_in.add(life)
         elif report.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED) and report.sender == task.owner:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from onboard.contract.codes import KindCode, MachineState, ManualMode
+from onboard.contract.codes import KindCode, MachineState, ManualMode, Reason
 from onboard.contract.constants import STILL
 from onboard.contract.messages import (
     BusTime,
@@ -32,6 +32,8 @@ SILENT_US = 7_000_000
 JUMP_US = 100_000
 #: A clock that is far off is set anew by the second word, and that comes within two periods of 5 s, us.
 SETTLING_US = 11_000_000
+#: What a machine says that has stopped itself: others may have to wait for it, and it for a person.
+_STOPPED = (Reason.ACTUATOR_FAULT, Reason.SENSOR_FAULT)
 
 
 class BusPicture:
@@ -59,8 +61,10 @@ class BusPicture:
         self.unjudged = 0
         #: Until then machines were broken on purpose, us of the log: no rule of liveness counts time before it.
         self.excused_us = 0
-        #: Machines that a person holds: while there are any, and until they go on, no such time counts either.
+        #: Machines that a person holds, or that have stopped and call for one: while there are any, and until they go
+        #: on, no such time counts either.
         self.held: set[int] = set()
+        self._stopped: set[int] = set()
         #: Bus time has jumped: until then (us of the log) machines wait for a second word, and decide no call.
         self.clock_settles_us = 0
         self._site = site
@@ -95,7 +99,7 @@ class BusPicture:
 
         Nothing is due while somebody is held, for others may have to wait for it.
         """
-        if self.held:
+        if self.held or self._stopped:
             return 0
         return now_us - max(since_us, self.excused_us)
 
@@ -137,6 +141,9 @@ class BusPicture:
         if not self.boots:
             # The first sign of life of a whole site in its first life: all tokens are where the site file says.
             self.tokens.from_start = beat.boot == 1 and beat.state is MachineState.STARTING
+        if beat.state not in STILL and beat.sender in self._stopped:
+            self._stopped.discard(beat.sender)
+            self.excused_us = max(self.excused_us, time_us)
         self.boots[beat.sender] = beat.boot
         self.heard_us[beat.sender] = time_us
         if beat.state is MachineState.STARTING:
@@ -163,6 +170,8 @@ class BusPicture:
         self._sensed_mm[state.sender] = state.position_mm
 
     def _on_halted(self, word: Halted, _time_us: int) -> None:
+        if word.sender == word.machine and word.needs_person and word.reason in _STOPPED:
+            self._stopped.add(word.sender)
         if word.sender == word.machine and word.reason in RIGHTS_LOST:
             self.announcing.add(word.sender)
 

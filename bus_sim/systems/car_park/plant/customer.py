@@ -158,6 +158,8 @@ class Customer:
         self.dawdle_us = 0
         #: Has read to which compartment the car comes; until then one stands beside a desk and in no bay's way.
         self.is_sent = False
+        #: Has read at the desk that nobody comes for now; until something else is read there.
+        self.is_told_off = False
         #: Has nothing to put into the desk; set by faults.
         self.has_lost_ticket = False
         self._world = world
@@ -200,6 +202,7 @@ class Customer:
 
     def reads(self, event: CustomerEvent, where: CompartmentPlant | None) -> None:
         """A desk's text about this customer's car: one goes where it says, and where the car is ready."""
+        self.is_told_off = event is CustomerEvent.FULL
         if self.state is CustomerState.AT_DESK and event in _GOES_THERE and where is not None:
             self.compartment, self.is_sent = where, True
         self.on(event)

@@ -10,7 +10,7 @@ from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.shuttle import Shuttle
 from bus_sim.systems.car_park.plant.street import Street
 from bus_sim.systems.car_park.plant.world import CarParkWorld
-from onboard.contract.codes import KindCode
+from onboard.contract.codes import DeskText, KindCode
 from onboard.ways.site import WaySite
 
 
@@ -57,6 +57,13 @@ class Plant:
             or looks_for_ticket(customer)
             for customer in self.street.customers
         )
+
+
+def is_told_off(customer: Customer) -> bool:
+    """Whether somebody waits and reads why: for the car at a desk, or before a bay whose desk is out of order."""
+    if customer.state is CustomerState.QUEUEING:
+        return customer.compartment is not None and customer.compartment.text is DeskText.OUT_OF_ORDER
+    return customer.state is CustomerState.AT_DESK and customer.is_told_off
 
 
 def looks_for_ticket(customer: Customer) -> bool:
