@@ -1,7 +1,8 @@
 """A person's answer, from whatever stands in a person's place."""
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import cast
+from typing import TextIO, cast
 
 import pytest
 
@@ -26,10 +27,15 @@ class Endless:
         return "y" * size
 
 
-async def test_an_answer_that_does_not_end_is_cut_and_is_no_yes(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(name="zeros")
+def _zeros() -> Iterator[TextIO]:
+    with Path("/dev/zero").open(encoding="utf-8") as device:
+        yield device
+
+
+async def test_an_answer_that_does_not_end_is_cut_and_is_no_yes(monkeypatch: pytest.MonkeyPatch, zeros: TextIO) -> None:
     monkeypatch.setattr("sys.stdin", Endless())
     asker = Asker(cast("OperatorStation", None), print)
     assert not await asker.agrees(OperatorCommand(cast("Park", None), 251))
-    with Path("/dev/zero").open(encoding="utf-8") as device:
-        monkeypatch.setattr("sys.stdin", device)
-        assert len(await ConsolePerson().ask("go on?")) == 1_000
+    monkeypatch.setattr("sys.stdin", zeros)
+    assert len(await ConsolePerson().ask("go on?")) == 1_000
