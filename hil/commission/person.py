@@ -51,7 +51,7 @@ class ConsolePerson:
     async def _line(self) -> str:
         """One line with its end, or what there is of it; empty at the end of the input."""
         while b"\n" not in self._pending and len(self._pending) < _MOST_BYTES:
-            more = await _more(sys.stdin.fileno())
+            more = await _more(sys.stdin.fileno(), _MOST_BYTES - len(self._pending))
             if not more:
                 break
             self._pending += more
@@ -60,8 +60,8 @@ class ConsolePerson:
         return line.decode("utf-8", "replace")
 
 
-async def _more(source: int) -> bytes:
-    """What comes next; no thread waits for it, for nothing could end that."""
+async def _more(source: int, most: int) -> bytes:
+    """What comes next, so many bytes at most; no thread waits for it, for nothing could end that."""
     loop = asyncio.get_running_loop()
     ready: asyncio.Future[None] = loop.create_future()
 
@@ -73,13 +73,13 @@ async def _more(source: int) -> bytes:
         loop.add_reader(source, is_ready)
     except OSError:
         # A file never lets one wait.
-        return os.read(source, _MOST_BYTES)
+        return os.read(source, most)
     try:
         await ready
     finally:
         loop.remove_reader(source)
     try:
-        return os.read(source, _MOST_BYTES)
+        return os.read(source, most)
     except OSError:
         # The terminal is closed.
         return b""

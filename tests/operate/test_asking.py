@@ -1,5 +1,8 @@
 """A person's answer, from whatever stands in a person's place."""
 
+import asyncio
+import os
+import select
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO, cast
@@ -39,3 +42,16 @@ async def test_an_answer_that_does_not_end_is_cut_and_is_no_yes(monkeypatch: pyt
     assert not await asker.agrees(OperatorCommand(cast("Park", None), 251))
     monkeypatch.setattr("sys.stdin", zeros)
     assert len(await ConsolePerson().ask("go on?")) == 1_000
+
+
+async def test_of_an_answer_that_comes_in_pieces_no_more_is_taken_than_of_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two reads of up to a thousand bytes made an answer of nearly twice as many."""
+    out, into = os.pipe()
+    with open(out, encoding="utf-8") as source, open(into, "wb", buffering=0) as person:  # noqa: ASYNC230, PTH123  # pipes
+        monkeypatch.setattr("sys.stdin", source)
+        asked = asyncio.ensure_future(ConsolePerson().ask("go on?"))
+        person.write(b"y" * 999)
+        while select.select([source], [], [], 0)[0]:  # noqa: ASYNC110  # a pipe tells nobody that it was read
+            await asyncio.sleep(0)
+        person.write(b"y" * 999)
+        assert len(await asked) == 1_000
