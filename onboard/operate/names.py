@@ -55,8 +55,7 @@ def slot_of(site: Site, text: str) -> Segment:
     lifts = {machine.name: machine for machine in site.machines.values() if machine.home.track in way_site(site).lifts}
     if text not in lifts:
         return segment_of(site, text)
-    floor = way_site(site).tracks[lifts[text].home.track].joins[0]
-    return Segment(floor.track, 0 if floor.index == 1 else way_site(site).tracks[floor.track].length + 1)
+    return way_site(site).beyond(way_site(site).tracks[lifts[text].home.track].joins[0])
 
 
 def node_of(site: Site, text: str) -> int:

@@ -7,7 +7,7 @@ from onboard.contract.constants import MAX_NODE_ID, NOBODY
 from onboard.contract.messages import Blocked, Halted, Heartbeat, Message
 from onboard.core.site import Machine, Segment, Site
 from onboard.gateway.edge import edge_of
-from onboard.gateway.positions import Tracker
+from onboard.gateway.positions import Tracker, TrackTracker
 from onboard.history.history import History
 
 #: A ``Halted`` that is not said again for this many heartbeat periods is over: it is said once in each.
@@ -115,7 +115,10 @@ class Park:
         return self.history.halts.last(node, now_us, round(HALTED_BEATS * self.site.timing.heartbeat_us))
 
     def where(self, node: int) -> str:
-        """Where a machine that moves is by its own word, or empty."""
+        """Where a machine that moves is by its own word, or empty: who stands says it seldom."""
+        place = self.history.places.by_node.get(node)
+        if isinstance(self._tracker, TrackTracker) and (place is None or place.told_us is None):
+            return ""
         try:
             return self._tracker.where(node).node
         except KeyError:

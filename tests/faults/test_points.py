@@ -11,11 +11,14 @@ from bus_sim.campaign.points import SceneCounts, SceneOccasion, Single, count, p
 from bus_sim.campaign.recovery import Measure
 from bus_sim.campaign.report import RunVerdict
 from bus_sim.campaign.runner import CampaignSettings, FaultPoint, run_point
+from bus_sim.campaign.trial import play
 from bus_sim.can.faults import InjectedFault
 from bus_sim.cli import main
 from bus_sim.faults.injection import AnyFault, Injection, parse_injection
 from bus_sim.faults.journals import HARMS
+from bus_sim.faults.scenario import FaultScenario
 from bus_sim.sites import find_site
+from bus_sim.systems.registry import simulated_of
 from onboard.contract.codes import KindCode, MachineState, Reason
 from onboard.contract.messages import Halted, Heartbeat
 from tests.thinned import is_long
@@ -132,10 +135,13 @@ def test_a_person_who_comes_has_all_served_again_within_five_minutes(target: str
             "level1", "target=IOC1,write=93,journal=rolled_back,entries=50", id="a car left since an old journal"
         ),
         pytest.param("level1", "target=IOC1,write=83,journal=rolled_back,entries=10", id="and is not said to be back"),
+        pytest.param(
+            "small", "target=IOC1,write=82,journal=cut,entries=43", id="a robot brings another car than is called"
+        ),
     ],
 )
 def test_rights_that_are_made_anew_leave_nobody_waiting(site: str, text: str) -> None:
-    """Harms 22745 of `small`, 7869, 1277, 4263, 4204 and 3613 of `level1`, of three cars that overlap, and a person."""
+    """Harms 22745 and 3540 of `small`, 7869, 1277, 4263, 4204 and 3613 of `level1`, of three cars that overlap."""
     settings = CampaignSettings(site, "journal", 3_600.0, scene=SceneOccasion.OVERLAP)
     crash = parse_injection(f"crash:at_s=0,restart_s=5,durable=yes,person_s=40,{text}")
     report = run_point(settings, FaultPoint(1, crash)).report
@@ -156,6 +162,15 @@ def test_what_a_medium_loses_while_somebody_drives_in_leaves_nobody_waiting(site
     """Harms 19878 and 6865 of `small`, 730 of `level1`, of three cars that overlap."""
     settings = CampaignSettings(site, "journal", 3_600.0, scene=SceneOccasion.OVERLAP)
     report = run_point(settings, FaultPoint(1, parse_injection(text))).report
+    assert report.verdict is RunVerdict.SERVED, report.why()
+
+
+def test_a_lift_that_forgot_a_ride_lets_out_who_is_where_it_was_to_go() -> None:
+    """The robot aboard planned to come back: that ride was begun, and the gate went back and forth for eight minutes."""
+    crash = parse_injection("crash:target=ER1,at_s=59.13,restart_s=5,journal=foreign,person_s=40")
+    site = find_site("small")
+    demand = simulated_of(site).usual(site, {"cars": 6, "orders": None, "apart": 30.0})
+    report = play(site, FaultScenario("small", 3, 3_600.0, demand, (crash,)))
     assert report.verdict is RunVerdict.SERVED, report.why()
 
 

@@ -123,10 +123,12 @@ def meant_at_start(words: Words) -> LiftFinding:
         return LiftFinding.NOTHING if words.is_aboard or words.is_crossing else LiftFinding.CLEAR
     if words.in_journal:
         return LiftFinding.RIDE_AT_END if words.index == LEAVE else LiftFinding.RIDE_BEGUN
+    is_carried = words.is_aboard and not words.is_crossing and not words.is_gate_out and words.plan is not None
+    if is_carried and words.plan is not None and words.plan[1] == words.index:
+        return LiftFinding.RIDE_AT_END
     plans_from_here = words.plan is not None and words.plan[0] == words.index
     if plans_from_here:
         return LiftFinding.RIDE_PLANNED
-    is_carried = words.is_aboard and not words.is_crossing and not words.is_gate_out and words.plan is not None
     return LiftFinding.RIDE_BEGUN if is_carried else LiftFinding.NOTHING
 
 

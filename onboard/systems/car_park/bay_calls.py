@@ -294,7 +294,7 @@ class BayCalls:
         record = None if job is None else self.fleet.mirror.cars.get(job.car)
         if job is None or job.operation is Operation.PARK or record is None:
             return False
-        return record.custodian not in (robot, self.fleet.node_id)
+        return record.custodian not in (robot, self.fleet.node_id) or custody.place_of(self.fleet, job.car) is not None
 
     def settle(self, task: BayTask, now_us: int) -> list[Effect]:
         """Taken up from the journal without a winner: whoever has it says so first.

@@ -1,14 +1,16 @@
 """A robot that stands loaded before a bay in which another car is: it must not stand in the way of whoever takes that.
 
 A bay is promised to the next car while it still works, and what was planned may not come true: a driver takes his time,
-or the robot for the car in the bay is lost, and who stands outside is the only one left. Then it leaves its car at a
-free place, and the compartment calls for that anew.
+or the robot for the car in the bay is lost, and who stands outside is the only one left; or a compartment that lost its
+journal has called for another car since. Then it leaves its car at a free place, and the compartment calls for that
+anew.
 """
 
 from dataclasses import dataclass
 
 from onboard.contract.codes import LegAction
 from onboard.contract.messages import Itinerary
+from onboard.core.authority import station_token
 from onboard.core.site import Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.handling import ShuttleWork
@@ -18,6 +20,8 @@ from onboard.ways.mirror import WayFleet
 #: So long it stands where another robot is to take the car away, us, and so long where a driver is to go with it.
 ROBOT_PATIENCE_US = 10_000_000
 DRIVER_PATIENCE_US = 60_000_000
+#: And so long before an empty bay whose right it does not get, us: its doors take 10 s, and a driver who walks out 8 s.
+REFUSED_PATIENCE_US = 45_000_000
 
 
 @dataclass
@@ -30,9 +34,12 @@ class KeptOut:
     _due_us: int | None = None
 
     def _is_kept_out(self, work: StationWork) -> bool:
-        """Whether it cannot be done for now: another car stands in the bay where one is to be left."""
+        """Whether it cannot be done for now: another car stands in the bay where one is to be left, or has the bay."""
         if work.handling is not CarHandling.LEAVE or work.station not in self.fleet.site.compartments.values():
             return False
+        return self._has_another(work) or not self.fleet.tokens.holds(station_token(work.station))
+
+    def _has_another(self, work: StationWork) -> bool:
         return bool(custody.others_in(self.fleet.mirror, work.station, work.car))
 
     def next_wake(self) -> int | None:
@@ -48,7 +55,9 @@ class KeptOut:
             self._since_us = self._due_us = None
             return None
         self._since_us = now_us if self._since_us is None else self._since_us
-        patience_us = ROBOT_PATIENCE_US if self._is_wanted(work.station) else DRIVER_PATIENCE_US
+        patience_us = REFUSED_PATIENCE_US
+        if self._has_another(work):
+            patience_us = ROBOT_PATIENCE_US if self._is_wanted(work.station) else DRIVER_PATIENCE_US
         self._due_us = self._since_us + patience_us
         if now_us < self._due_us:
             return None

@@ -357,11 +357,15 @@ class Lift:
         planned = self._rides(robot, itinerary, now_us)
         here = next((one for one in planned if self._stands_at(one.board)), None)
         is_inside = self.platform.carrier_aboard and not self.platform.crossing and self._holds_gate()
-        if here is None and itinerary is not None and planned and is_inside:
+        if itinerary is not None and planned and is_inside:
             # The journal was lost on the way: whoever is aboard tells where it is carried, and has nowhere else to go.
             leg = leg_in_hand(itinerary, self.fleet.mirror.progress.get(robot))
             is_carried = leg is not None and (leg.action, leg.track) == (LegAction.RIDE, self.track)
-            return (LiftFinding.RIDE_BEGUN, planned[0]) if is_carried else (LiftFinding.NOTHING, None)
+            if is_carried and self._stands_at(planned[0].leave):
+                # It may plan to come back and ride from here: that is another ride.
+                return LiftFinding.RIDE_AT_END, planned[0]
+            if is_carried and here is None:
+                return LiftFinding.RIDE_BEGUN, planned[0]
         if here is None:
             return LiftFinding.NOTHING, None
         self._gate_was_out = self.platform.carrier_aboard or not self._holds_gate()
