@@ -158,6 +158,17 @@ def test_an_operator_that_is_gone_leaves_a_site_that_goes_on() -> None:
     assert {beat.epoch for _, beat in scene.all(Heartbeat)} == {0}
 
 
+def test_who_presses_the_key_of_a_compartment_that_lost_its_journal_reads_so() -> None:
+    """It waited for an answer until a person had come, and then for ever: nothing was remembered of it."""
+    faults = ["crash:target=IOC1,at_s=4,restart_s=3,journal=lost", "operate:do=regenerate,at_s=100,target=IOC1"]
+    scene = played(*faults, site=at_arrival(SITE))
+    scene.assert_sound()
+    read = [one.text for t, one in scene.all(DeskOrder, "IOC1") if t < 100e6]
+    assert set(read) == {DeskText.OUT_OF_ORDER}
+    street = scene.simulation.plant.street.summary()
+    assert (street.queueing, street.asking, street.served) == (0, 0, 1), "the first two drive out, the third is served"
+
+
 def test_a_desk_that_forgot_its_tickets_asks_for_them_though_it_is_steward_of_nothing() -> None:
     """IOC2 of `standard` has no slots of its own; its rights were made anew all the same."""
     site = find_site("standard")

@@ -155,11 +155,9 @@ class Compartment:
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """Doors and bay are noted, and orders said again; a new desk event is taken up once."""
-        if isinstance(message, DoorState):
-            self.doors = message
-            return self.outputs.again(message, now_us)
-        if isinstance(message, BayState):
-            self.bay = message
+        if isinstance(message, DoorState | BayState):
+            self.doors = message if isinstance(message, DoorState) else self.doors
+            self.bay = message if isinstance(message, BayState) else self.bay
             return self.outputs.again(message, now_us)
         if isinstance(message, DeskEvent | TicketRead):
             return self.slot.take(message, now_us, partial(self._at_desk, now_us=now_us))
@@ -255,6 +253,9 @@ class Compartment:
     # --- the desk ----------------------------------------------------------------------------------------------
 
     def _at_desk(self, event: DeskInput, car: Reference, now_us: int, *, urgent: bool = False) -> list[Effect]:
+        if self.fleet.has_no_rights:
+            # Its journal is lost: until a person has made its rights anew it can do nothing for anybody.
+            return [self.outputs.show(DeskText.OUT_OF_ORDER, car)]
         if event in bay_task.KEYS:
             self._key = event
             return []
