@@ -47,7 +47,11 @@ async def test_an_answer_that_does_not_end_is_cut_and_is_no_yes(monkeypatch: pyt
 async def test_of_an_answer_that_comes_in_pieces_no_more_is_taken_than_of_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two reads of up to a thousand bytes made an answer of nearly twice as many."""
     out, into = os.pipe()
-    with open(out, encoding="utf-8") as source, open(into, "wb", buffering=0) as person:  # noqa: ASYNC230, PTH123  # pipes
+    # Both ends are open already: neither waits.
+    with (
+        open(out, encoding="utf-8") as source,  # noqa: ASYNC230, PTH123  # a pipe has no path, and is open
+        open(into, "wb", buffering=0) as person,  # noqa: ASYNC230, PTH123  # the same
+    ):
         monkeypatch.setattr("sys.stdin", source)
         asked = asyncio.ensure_future(ConsolePerson().ask("go on?"))
         person.write(b"y" * 999)

@@ -5,7 +5,7 @@ its robot is on its way, or there, when the bay is empty; what it is and who won
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from onboard.contract.codes import KindCode, LegAction, Operation, Reason, TaskPhase
 from onboard.contract.constants import ANY_STATION, NOBODY, TASK_VERSION_BITS
@@ -28,6 +28,7 @@ from onboard.systems.car_park.bay_memory import BayMemory, ahead_over_record, ah
 from onboard.systems.car_park.bay_task import REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask
 from onboard.systems.car_park.site import open_end
 from onboard.systems.car_park.stewardship import Stewardship
+from onboard.systems.car_park.unsaid import UnsaidParkings
 from onboard.ways.mirror import WayFleet
 from onboard.ways.retreats import has_work
 from onboard.ways.tokens import car_token
@@ -54,6 +55,10 @@ class BayCalls:
     ahead: BayTask | None = None
     #: Whether rights were made anew and customers are to hear that no ticket is known any more; None: they never were.
     forgot: bool | None = None
+    unsaid: UnsaidParkings = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.unsaid = UnsaidParkings(self.fleet)
 
     def in_hand(self) -> list[BayTask]:
         """Both, as far as there are any."""
@@ -106,6 +111,7 @@ class BayCalls:
 
         ``is_starting``: doors and bay are not known yet, and of the task in hand only the journal tells.
         """
+        self.unsaid.hear(report)
         task, machine = self.named(report.task), self.fleet.site.machines.get(report.sender)
         tokens, name = self.fleet.tokens, report.task
         if not (tokens.is_synced or self.fleet.has_no_rights) and self.memory.never_gave(name, self.fleet.node_id):
@@ -221,6 +227,7 @@ class BayCalls:
         """As custodian: winners that are lost; for my own tasks I call anew at once."""
         effects = self.stewardship.review(now_us)
         taken_back = bool(effects)
+        effects += self.unsaid.review(now_us)
         if self.fleet.slots_told is not None and self.forgot is None:
             self.forgot = True
         for task in self.in_hand():
@@ -276,6 +283,8 @@ class BayCalls:
         is_placed = is_mine and custody.place_of(self.fleet, job.car) is not None
         # A car in my own custody at a place has left, whatever a sensor that is silent now has said last; one that was
         # fetched may be out already: its driver took it while this machine was off.
+        if is_parked and not is_mine:
+            self.unsaid.begins(job.task, job.car)
         if (is_placed or not is_loaded) if is_parked else (is_loaded or (is_mine and not is_placed)):
             return BayPhase.CLOSING, []
         holder = self.fleet.tokens.holder_of(car_token(*job.car))
@@ -347,7 +356,8 @@ class BayCalls:
         tasks = [self.ahead, self.job if is_job_asked else None]
         times = [task.retry_at_us for task in tasks if task is not None]
         times += [task.ask_at_us for task in self.in_hand()]
-        return min([one for one in (*times, self.stewardship.next_wake()) if one is not None], default=None)
+        times += [self.stewardship.next_wake(), self.unsaid.next_wake()]
+        return min([one for one in times if one is not None], default=None)
 
     def taken_at_us(self, now_us: int) -> int | None:
         """When the winner of the job will have been at the bay, by its plan, bus us; None where it has told of none."""

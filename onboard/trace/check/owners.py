@@ -95,7 +95,9 @@ class OneOwner(Rule):
         if task is None:
             self.picture.unjudged += 1
             return
-        if report.phase in OWNERS_PHASES and report.sender != task.owner:
+        # Whoever called for it says DONE of a winner that has forgotten the task.
+        is_callers = report.phase is TaskPhase.DONE and report.sender == report.task.origin
+        if report.phase in OWNERS_PHASES and report.sender != task.owner and not is_callers:
             owner = f"which {task.owner} owns" if task.owner else "which nobody was awarded"
             what = f"tells {report.phase.name} of task {_name(report.task)}, {owner}"
             self.find(event, (report.sender, task.owner), what)
