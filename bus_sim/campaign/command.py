@@ -102,7 +102,7 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
         type=float,
         metavar="S",
         help="with --exhaustive journal: so many seconds after a machine holds for its journal somebody has its rights "
-        "made anew, and all must be served within 5 minutes (default: nobody comes)",
+        "made anew, and the first who waits must be served within 5 minutes (default: nobody comes)",
     )
     add_where_options(parser)
     parser.add_argument("--cars", type=int, metavar="N", help="cars in each run of a car park (default: a few)")

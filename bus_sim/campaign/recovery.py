@@ -70,11 +70,6 @@ def is_of_clock(fault: AnyFault) -> bool:
     return isinstance(fault, Injection) and KINDS[fault.kind].group is Group.CLOCK
 
 
-def has_person(fault: AnyFault) -> bool:
-    """Whether somebody comes and has the rights of the machine that it strikes made anew."""
-    return isinstance(fault, Injection) and fault.kind == "crash" and fault.number("person_s") > 0
-
-
 class RecoveryMeasure:
     """Measures one run; to be made before ``BusRun.start``. ``longest_us`` and ``counts`` are by measure."""
 

@@ -83,9 +83,10 @@ def _lost_of(site: Site, asked: CommandRequest) -> Lost:
     body = _body_of(site, lost, asked.body, "--body")
     tracks = {slot.track for slot in body.slots}
     alleys = tracks.difference(ways.lifts)
-    if lost.kind in MOBILE_KINDS and (len(alleys) > 1 or len(tracks - alleys) > 1 or not tracks):
+    is_one_place = len(alleys) <= 1 or (len(alleys) == 2 and ways.turned_into(body.slots) is not None)
+    if lost.kind in MOBILE_KINDS and (not is_one_place or len(tracks - alleys) > 1 or not tracks):
         raise OperateError(
-            f"--body: {lost.name} must stand on one track, in one lift, or between the two; push it there first"
+            f"--body: {lost.name} must stand on one track, in one lift, or between two that meet; push it there first"
         )
     if not asked.absent:
         return Lost(lost.node_id, body=body)

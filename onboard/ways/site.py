@@ -7,7 +7,7 @@ segment of another track at a right angle, its *mouth*, where a carrier turns. S
 to rings; which tracks are at one mouth never matters to who has its token.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from functools import cached_property, singledispatch
@@ -158,6 +158,11 @@ class WaySite(Site):
         heights_mm = track.heights_mm or range(track.length)
         height_mm = heights_mm[lift_index - 1]
         return [sill for sill, other_mm in zip(track.joins, heights_mm, strict=True) if other_mm == height_mm]
+
+    def turned_into(self, slots: Collection[Segment]) -> int | None:
+        """The track into which a body in these slots is turned, or turning, as its mouth is one of them; else None."""
+        tracks = (self.tracks[slot.track] for slot in slots)
+        return next((track.number for track in tracks if any(mouth in slots for _, mouth in track.ends)), None)
 
     @cached_property
     def spurs(self) -> dict[Segment, int]:

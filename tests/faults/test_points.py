@@ -165,12 +165,19 @@ def test_what_a_medium_loses_while_somebody_drives_in_leaves_nobody_waiting(site
     assert report.verdict is RunVerdict.SERVED, report.why()
 
 
-def test_a_lift_that_forgot_a_ride_lets_out_who_is_where_it_was_to_go() -> None:
-    """The robot aboard planned to come back: that ride was begun, and the gate went back and forth for minutes."""
-    crash = parse_injection("crash:target=ER1,at_s=59.13,restart_s=5,journal=foreign,person_s=40")
-    site = find_site("small")
+@pytest.mark.parametrize(
+    ("name", "seed", "text"),
+    [
+        # The robot aboard planned to come back: that ride was begun, and the gate went back and forth for minutes.
+        pytest.param("small", 3, "target=ER1,at_s=59.13,journal=foreign", id="a lift that forgot a ride"),
+        pytest.param("twin", 24, "target=MR1,at_s=85.48,journal=lost", id="a robot in the mouth between two alleys"),
+    ],
+)
+def test_whatever_a_machine_was_in_the_midst_of_it_goes_on_from_there(name: str, seed: int, text: str) -> None:
+    site = find_site(name)
     demand = simulated_of(site).usual(site, {"cars": 6, "orders": None, "apart": 30.0})
-    report = play(site, FaultScenario("small", 3, 3_600.0, demand, (crash,)))
+    crash = parse_injection(f"crash:restart_s=5,person_s=40,{text}")
+    report = play(site, FaultScenario(name, seed, 3_600.0, demand, (crash,)))
     assert report.verdict is RunVerdict.SERVED, report.why()
 
 

@@ -152,7 +152,8 @@ class Starting:
         Aboard a lift the floor is where that stands by its word under the gate, which is asked for where it has it.
         """
         site, sill_proof = self.fleet.site, self.body.riding.sill
-        floor = next((slot.track for slot in told if slot.track not in site.lifts), None)
+        # In a mouth it is turned, or turning: its drive speaks of the track inside.
+        floor = site.turned_into(told) or next((slot.track for slot in told if slot.track not in site.lifts), None)
         if floor is None:
             lift, key = told[0].track, segment_token(gate(told[0].track))
             if not self.fleet.tokens.holds(key):

@@ -163,9 +163,11 @@ class Stewardship:
         has_bay = stands and holder_of(station_token(bay)) == report.sender
         if not has_bay and holder_of(car_token(*report.task)) != report.sender:
             return False
+        if self.left is not None and self.left.car != report.task:
+            return False
         self.left = self.left or CarAt(report.sender, report.task, bay.number, 0, 0)
         memory.was_granted, self._claimant = has_bay, report.sender
-        return self.left.car == report.task
+        return True
 
     def parks_again(self, left: CarAt, memory: BayMemory, bay: BayState | None) -> list[Effect]:
         """A task for the car that stands in my bay, for the journal; where a robot claims it, that one's own."""
