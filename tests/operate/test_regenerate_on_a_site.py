@@ -60,12 +60,17 @@ def test_a_lost_journal_is_a_matter_of_minutes(name: str, at_s: int, body: str) 
     ],
 )
 def test_rights_are_made_anew_in_the_middle_of_work(name: str, at_s: int, site: Site) -> None:
-    """By an empty journal a car that a robot has is the compartment's own, no number was given, and nobody rides."""
+    """By an empty journal a car that a robot has is the compartment's own, no number was given, and nobody rides.
+
+    Who presses the key meanwhile reads OUT_OF_ORDER, and drives out again.
+    """
     lost = f"crash:target={name},at_s={at_s},restart_s=5,journal=lost"
     scene = played(lost, f"operate:do=regenerate,at_s={at_s + 20},target={name}", site=site)
     scene.assert_sound()
-    street = scene.simulation.plant.street.summary()
-    assert (street.parked, street.served, street.queueing, street.asking) == (4, 3, 0, 0)
+    street, told = scene.simulation.plant.street.summary(), [one.text for _, one in scene.all(DeskOrder, "IOC1")]
+    refused = int(DeskText.OUT_OF_ORDER in told)
+    assert (street.refused_full, street.queueing, street.asking) == (refused, 0, 0)
+    assert (street.parked, street.served) == (4 - refused, 3 - refused)
 
 
 @pytest.mark.parametrize(("at_s", "body", "car"), some([(88, "p(1;5)", 1), (171, "p(1;4)", 2), (255, "p(1;6)", 3)], 1))
