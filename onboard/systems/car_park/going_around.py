@@ -36,8 +36,6 @@ RETRY_US = 3_000_000
 LOOK_US = 500_000
 #: Tasks are kept so long without a way, us: a machine that is only restarted is back by then.
 KEEP_US = 12_000_000
-#: Other places that are tried for a car at one moment: each is a search.
-MOST_PLACES = 4
 #: FORFEITED is said again so often and so many times, until the task is called or awarded anew: a lost word would leave
 #: a customer waiting.
 SAY_AGAIN_US, SAY_AGAIN = 1_000_000, 20
@@ -311,7 +309,7 @@ class GoingAround:
         in_hand = self.program.step is not None and self.program.step.work == work
         kept, origin, start_us = self.turning([work.call.task] if in_hand else (), now_us)
         works = self._ahead(self.program.works(), kept)
-        for place in self.places.instead(work, now_us)[:MOST_PLACES] if work in works else ():
+        for place in self.places.instead(work, now_us) if work in works else ():
             moved = [one._replace(station=place) if one == work else one for one in works]
             steps = self.generation.reroute(origin, start_us, moved, now_us)
             if steps is None:

@@ -5,11 +5,12 @@ one that two bids have named at the same time. Who has the station's right keeps
 lower stamp; the other leaves its car elsewhere. A place in which a car stands is nobody's.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from onboard.core.authority import station_token
 from onboard.core.serial import ranks_before
-from onboard.core.site import Station
+from onboard.core.site import Segment, Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
@@ -17,6 +18,14 @@ from onboard.systems.car_park.kept_out import works_at
 from onboard.systems.car_park.program import CarHandling, HandlingPhase, StationWork
 from onboard.systems.car_park.site import ANY_CLASS, class_of_end
 from onboard.ways.mirror import WayFleet
+
+#: Other places that are tried for a car at one moment: each is a search.
+MOST_PLACES = 4
+
+
+def nearest(places: Iterable[Station], here: Segment) -> list[Station]:
+    """The few that are tried, the nearest to ``here`` first: on the same track, then by segments."""
+    return sorted(places, key=lambda one: (one.track != here.track, abs(one.index - here.index)))[:MOST_PLACES]
 
 
 @dataclass
@@ -40,9 +49,8 @@ class PlaceChoice:
 
     def instead(self, work: StationWork, now_us: int) -> list[Station]:
         """Free places that nobody has promised, the nearest to where the car was to be left first."""
-        here = work.station
         free = self.generation.free_places(now_us, class_of_end(work.call.to_station) or ANY_CLASS)
-        return sorted(free, key=lambda one: (one.track != here.track, abs(one.index - here.index)))
+        return nearest(free, work.station.segment)
 
     def _is_begun(self, work: StationWork) -> bool:
         return self.shuttle.work == work and self.shuttle.phase not in (HandlingPhase.ACQUIRE, HandlingPhase.DONE)

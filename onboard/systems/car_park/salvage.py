@@ -16,14 +16,12 @@ from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
+from onboard.systems.car_park.places import nearest
 from onboard.systems.car_park.program import CarHandling, HandlingPhase, StationWork
 from onboard.systems.car_park.records import StepRecord
 from onboard.systems.car_park.recovery import award_record, handled_record
 from onboard.systems.car_park.site import ANY_CLASS
 from onboard.ways.mirror import WayFleet
-
-#: So many free places are tried for a way, the nearest first: each is a search.
-MOST_PLACES = 4
 
 
 class Salvage(NamedTuple):
@@ -88,8 +86,7 @@ def _free_place(
     fleet: WayFleet, generation: CarParkGeneration, here: Segment, car: Reference, now_us: int
 ) -> Station | None:
     """The nearest free place that takes whatever car and that there is a way to now; else the nearest."""
-    free = generation.free_places(now_us, ANY_CLASS)
-    near = sorted(free, key=lambda one: (one.track != here.track, abs(one.index - here.index)))[:MOST_PLACES]
+    near = nearest(generation.free_places(now_us, ANY_CLASS), here)
     ways = (
         one for one in near if generation.reroute(here, now_us, [_leaving(fleet, car, one, now_us)], now_us) is not None
     )
