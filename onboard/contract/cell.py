@@ -42,6 +42,14 @@ class GripMode(IntEnum):
     NOTHING_THERE = 3
 
 
+class RefusedFor(IntEnum):
+    """Why a goal was refused: nobody can carry it out, or it would take a chain of more than eight robots."""
+
+    NOTHING = 0
+    NOBODY = 1
+    TOO_DEEP = 2
+
+
 @message(frozen=True, slots=True)
 class GoalStart(Message):
     """Where the part of a goal is, or will be handed over.
@@ -80,8 +88,11 @@ class GoalTerms(Message):
     goal: int
     #: Bus time until which the part must be at the end; 0 for no limit. 0 to 4294967295 ms.
     time_limit_ms: int
-    #: 0 for a goal of the goal manager, one more for each sub-goal; as many nodes are in GoalPath. 0 to 5.
+    #: 0 for a goal of the goal manager, one more for each sub-goal; as many nodes are in GoalPath, but of seven the
+    #: last: that is the sender. 0 to 7.
     level: int
+    #: Level of the deepest sub-goal that may be called for. 0 to 7.
+    deepest: int
 
 
 @message(frozen=True, slots=True)
@@ -101,6 +112,8 @@ class GoalPath(Message):
     node4: int
     #: Node-ID 5 of the robots, the main contractor first, 0 for none. 0 to 255.
     node5: int
+    #: Node-ID 6 of the robots, 0 for none. 0 to 255.
+    node6: int
 
 
 @message(frozen=True, slots=True)
@@ -151,6 +164,38 @@ class OfferNodes(Message):
     node4: int
     #: Node-ID 5 of the robots involved, the bidder first, 0 for none. 0 to 255.
     node5: int
+
+
+@message(frozen=True, slots=True)
+class OfferNodesMore(Message):
+    """Who else is involved in an offer that names five robots or more.
+
+    Sent right after its OfferNodes.
+    """
+
+    #: Node-ID of whoever made the goal. 1 to 255.
+    manager: int
+    #: Serial number of the goal at its manager; with the manager's node-ID it is the task of the calls for it. 0 to
+    #: 65535.
+    goal: int
+    #: Node-ID 6 of the robots involved, 0 for none. 0 to 255.
+    node6: int
+    #: Node-ID 7 of the robots involved, 0 for none. 0 to 255.
+    node7: int
+    #: Node-ID 8 of the robots involved, 0 for none. 0 to 255.
+    node8: int
+
+
+@message(frozen=True, slots=True)
+class GoalTooDeep(Message):
+    """A robot could bring this part on.
+
+    But its goal would need a sub-goal that is deeper than its manager lets robots call for. Sent in place of a bid.
+    """
+
+    #: ``origin``: Node-ID of the goal manager that named the part. 0 to 255.
+    #: ``number``: Serial number of the part at its origin. 0 to 65535.
+    part: Reference
 
 
 @message(frozen=True, slots=True)

@@ -4,7 +4,7 @@ Written by ``make docs`` from ``dbc/cell.dbc``: change that file, never this one
 """
 
 from onboard.contract.base import Message, Reference, message
-from onboard.contract.cell import ArmMode, GripAction, GripMode
+from onboard.contract.cell import ArmMode, GripAction, GripMode, RefusedFor
 from onboard.contract.codes import OrderResult
 
 
@@ -50,6 +50,8 @@ class OrderAnswer(Message):
     order_result: OrderResult
     #: Cost of the accepted offer in thousandths, 0 before. 0 to 4294967295 mm.
     cost_mm: int
+    #: Why it was refused.
+    refused_for: RefusedFor
 
 
 @message(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from onboard.contract.cell import ArmPhase, ArmProgress, GoalPath, GoalStart, Go
 from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, OrderResult, TaskPhase
 from onboard.contract.messages import Award, Bid, CallForProposals, Reference, TaskReport
 from onboard.holon.holon import Holon
-from onboard.systems.cell.fields import nodes_of
+from onboard.systems.cell.fields import offered_by, path_of
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.memory import undertakings
 from tests.cell.playing import Scene, cell
@@ -91,7 +91,7 @@ def test_c11_levels_are_on_the_bus_and_the_deepest_is_decided_first(scene: Scene
 
 
 def test_c12_c13_predecessors_and_robots_elsewhere_pass_goals_over(scene: Scene) -> None:
-    paths = {Reference(one.sender, one.goal): nodes_of(one) for _, one in scene.said(GoalPath)}
+    paths = {Reference(one.sender, one.goal): path_of(one, 3) for _, one in scene.said(GoalPath)}
     by_call = {(one.sender, one.call): one for _, one in _calls(scene)}
     for _, bid in scene.said(Bid):
         path = paths[by_call[bid.initiator, bid.call].task]
@@ -107,7 +107,7 @@ def test_c12_c13_predecessors_and_robots_elsewhere_pass_goals_over(scene: Scene)
 
 
 def test_c14_a_contract_names_places_cost_robots_and_time_limit(scene: Scene) -> None:
-    offers = [nodes_of(one) for _, one in scene.said(OfferNodes) if one.manager == DESK]
+    offers = [offered_by(one, None) for _, one in scene.said(OfferNodes) if one.manager == DESK]
     assert offers == [(1, 2, 3)]
     journal = scene.played.run.journals[1].replay()
     (mine,) = undertakings(journal).values()

@@ -9,7 +9,7 @@ from math import hypot
 
 from bus_sim.devices.link import BusDeviceLink, DeviceBusLink
 from bus_sim.devices.timers import Timer, Timers
-from onboard.contract.cell import ArmMode, GripAction, GripMode
+from onboard.contract.cell import ArmMode, GripAction, GripMode, RefusedFor
 from onboard.contract.cell_device import ArmOrder, ArmState, GripOrder, GripState, OrderAnswer, OrderFrom, OrderTo
 from onboard.contract.codes import OrderResult
 from onboard.contract.messages import Message, Reference
@@ -189,6 +189,7 @@ class GoalEntry:
     begun_us: int
     result: OrderResult | None = None
     cost_mm: int = 0
+    refused_for: RefusedFor = RefusedFor.NOTHING
     ended_us: int | None = None
 
 
@@ -226,6 +227,7 @@ class GoalCounter:
             return
         entry.result = message.order_result
         entry.cost_mm = message.cost_mm or entry.cost_mm
+        entry.refused_for = message.refused_for
         if message.order_result in (OrderResult.DONE, OrderResult.REFUSED):
             entry.ended_us = self._plant.timers.now_us()
             self._plant.check_end(Reference(self.node_id, entry.number), entry)

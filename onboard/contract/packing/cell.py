@@ -13,6 +13,7 @@ from onboard.contract.cell import (
     GoalPath,
     GoalStart,
     GoalTerms,
+    GoalTooDeep,
     MoveCostHigh,
     MoveCostLow,
     MoveFrom,
@@ -20,21 +21,27 @@ from onboard.contract.cell import (
     OfferHigh,
     OfferLow,
     OfferNodes,
+    OfferNodesMore,
     PartAt,
 )
 
 _new = tuple.__new__
 _ARM_PHASE = tuple(ArmPhase)
+_FROM_0_TO_7_AT_4 = {value: value << 4 for value in range(8)}
 _PACK_BHBBBBB = struct.Struct("<BHBBBBB").pack
+_PACK_BHBBBXX = struct.Struct("<BHBBBxx").pack
 _PACK_BHBSI = struct.Struct("<BHBi").pack
 _PACK_BHIX = struct.Struct("<BHIx").pack
+_PACK_BHXXXXX = struct.Struct("<BHxxxxx").pack
 _PACK_BSIBH = struct.Struct("<BiBH").pack
-_PACK_HBBBBBX = struct.Struct("<HBBBBBx").pack
+_PACK_HBBBBBB = struct.Struct("<HBBBBBB").pack
 _PACK_HBSHBSH = struct.Struct("<HBhBh").pack
 _PACK_HIH = struct.Struct("<HIH").pack
 _UNPACK_BHBBBBB = struct.Struct("<BHBBBBB").unpack_from
+_UNPACK_BHBBBXX = struct.Struct("<BHBBBxx").unpack_from
 _UNPACK_BHIX = struct.Struct("<BHIx").unpack_from
-_UNPACK_HBBBBBX = struct.Struct("<HBBBBBx").unpack_from
+_UNPACK_BHXXXXX = struct.Struct("<BHxxxxx").unpack_from
+_UNPACK_HBBBBBB = struct.Struct("<HBBBBBB").unpack_from
 _UNPACK_HIBX = struct.Struct("<HIBx").unpack_from
 _UNPACK_Q = struct.Struct("<Q").unpack_from
 
@@ -85,27 +92,35 @@ def unpack_goal_end(sender: int, data: bytes) -> GoalEnd | None:
 
 def pack_goal_terms(message: GoalTerms) -> bytes:
     level = message.level
-    if level > 5:
-        raise OutOfRangeError("GoalTerms.level", level, 0, 5)
+    if level < 0 or level > 7:
+        raise OutOfRangeError("GoalTerms.level", level, 0, 7)
     try:
-        return _PACK_HIH(message.goal, message.time_limit_ms, level)
-    except struct.error as error:
+        return _PACK_HIH(message.goal, message.time_limit_ms, level + _FROM_0_TO_7_AT_4[message.deepest])
+    except (KeyError, struct.error) as error:
         raise refusal(
-            message, ("GoalTerms.goal", 0, 65535), ("GoalTerms.time_limit_ms", 0, 4294967295), ("GoalTerms.level", 0, 5)
+            message,
+            ("GoalTerms.goal", 0, 65535),
+            ("GoalTerms.time_limit_ms", 0, 4294967295),
+            ("GoalTerms.deepest", 0, 7),
         ) from error
 
 
 def unpack_goal_terms(sender: int, data: bytes) -> GoalTerms | None:
-    goal, time_limit_ms, level = _UNPACK_HIBX(data)
-    level = level & 0xF
-    if level > 5:
+    goal, time_limit_ms, word_6 = _UNPACK_HIBX(data)
+    level = word_6 & 0xF
+    if level > 7:
         return None
-    return GoalTerms(sender, goal, time_limit_ms, level)
+    deepest = word_6 >> 4
+    if deepest > 7:
+        return None
+    return GoalTerms(sender, goal, time_limit_ms, level, deepest)
 
 
 def pack_goal_path(message: GoalPath) -> bytes:
     try:
-        return _PACK_HBBBBBX(message.goal, message.node1, message.node2, message.node3, message.node4, message.node5)
+        return _PACK_HBBBBBB(
+            message.goal, message.node1, message.node2, message.node3, message.node4, message.node5, message.node6
+        )
     except struct.error as error:
         raise refusal(
             message,
@@ -115,12 +130,13 @@ def pack_goal_path(message: GoalPath) -> bytes:
             ("GoalPath.node3", 0, 255),
             ("GoalPath.node4", 0, 255),
             ("GoalPath.node5", 0, 255),
+            ("GoalPath.node6", 0, 255),
         ) from error
 
 
 def unpack_goal_path(sender: int, data: bytes) -> GoalPath | None:
-    goal, node1, node2, node3, node4, node5 = _UNPACK_HBBBBBX(data)
-    return GoalPath(sender, goal, node1, node2, node3, node4, node5)
+    goal, node1, node2, node3, node4, node5, node6 = _UNPACK_HBBBBBB(data)
+    return GoalPath(sender, goal, node1, node2, node3, node4, node5, node6)
 
 
 def pack_offer_high(message: OfferHigh) -> bytes:
@@ -187,6 +203,43 @@ def unpack_offer_nodes(sender: int, data: bytes) -> OfferNodes | None:
     if manager < 1:
         return None
     return OfferNodes(sender, manager, goal, node1, node2, node3, node4, node5)
+
+
+def pack_offer_nodes_more(message: OfferNodesMore) -> bytes:
+    manager = message.manager
+    if manager < 1:
+        raise OutOfRangeError("OfferNodesMore.manager", manager, 1, 255)
+    try:
+        return _PACK_BHBBBXX(manager, message.goal, message.node6, message.node7, message.node8)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("OfferNodesMore.manager", 1, 255),
+            ("OfferNodesMore.goal", 0, 65535),
+            ("OfferNodesMore.node6", 0, 255),
+            ("OfferNodesMore.node7", 0, 255),
+            ("OfferNodesMore.node8", 0, 255),
+        ) from error
+
+
+def unpack_offer_nodes_more(sender: int, data: bytes) -> OfferNodesMore | None:
+    manager, goal, node6, node7, node8 = _UNPACK_BHBBBXX(data)
+    if manager < 1:
+        return None
+    return OfferNodesMore(sender, manager, goal, node6, node7, node8)
+
+
+def pack_goal_too_deep(message: GoalTooDeep) -> bytes:
+    part = message.part
+    try:
+        return _PACK_BHXXXXX(part[0], part[1])
+    except struct.error as error:
+        raise refusal(message, ("GoalTooDeep.part.origin", 0, 255), ("GoalTooDeep.part.number", 0, 65535)) from error
+
+
+def unpack_goal_too_deep(sender: int, data: bytes) -> GoalTooDeep | None:
+    part_origin, part_number = _UNPACK_BHXXXXX(data)
+    return GoalTooDeep(sender, _new(Reference, (part_origin, part_number)))
 
 
 def pack_move_from(message: MoveFrom) -> bytes:
@@ -361,6 +414,28 @@ FRAMES = (
     FrameCode(
         "OfferNodes", 0x08A60000, 8, pack_offer_nodes, unpack_offer_nodes, OfferNodes, OfferNodes, ("Arm",), False
     ),
+    FrameCode(
+        "OfferNodesMore",
+        0x08A70000,
+        8,
+        pack_offer_nodes_more,
+        unpack_offer_nodes_more,
+        OfferNodesMore,
+        OfferNodesMore,
+        ("Arm",),
+        False,
+    ),
+    FrameCode(
+        "GoalTooDeep",
+        0x08A80000,
+        8,
+        pack_goal_too_deep,
+        unpack_goal_too_deep,
+        GoalTooDeep,
+        GoalTooDeep,
+        ("Arm",),
+        False,
+    ),
     FrameCode("MoveFrom", 0x0EA80000, 8, pack_move_from, unpack_move_from, MoveFrom, MoveFrom, ("Arm",), False),
     FrameCode("MoveTo", 0x0EA90000, 8, pack_move_to, unpack_move_to, MoveTo, MoveTo, ("Arm",), False),
     FrameCode(
@@ -391,4 +466,4 @@ FRAMES = (
     FrameCode("PartAt", 0x0EAD0000, 8, pack_part_at, unpack_part_at, PartAt, PartAt, ("Arm", "Desk"), False),
 )
 #: CRC-32 over this system's DBC: part of the digest of its sites (docs/site-file.md).
-WORDS = 0xF65D75DF
+WORDS = 0xBE6B7570

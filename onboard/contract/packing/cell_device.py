@@ -6,7 +6,7 @@ Written by ``make docs`` from ``dbc/cell.dbc``: change that file, never this one
 import struct
 
 from onboard.contract.base import FrameCode, OutOfRangeError, Reference, refusal
-from onboard.contract.cell import ArmMode, GripAction, GripMode
+from onboard.contract.cell import ArmMode, GripAction, GripMode, RefusedFor
 from onboard.contract.cell_device import ArmOrder, ArmState, GripOrder, GripState, OrderAnswer, OrderFrom, OrderTo
 from onboard.contract.codes import OrderResult
 
@@ -15,6 +15,7 @@ _ARM_MODE = tuple(ArmMode)
 _GRIP_ACTION = tuple(GripAction)
 _GRIP_MODE = tuple(GripMode)
 _ORDER_RESULT = tuple(OrderResult)
+_REFUSED_FOR = tuple(RefusedFor)
 _FROM_0_TO_255_AT_1 = {value: value << 1 for value in range(256)}
 _FROM_0_TO_255_AT_2 = {value: value << 2 for value in range(256)}
 _PACK_BBSIH = struct.Struct("<BBiH").pack
@@ -75,12 +76,16 @@ def unpack_grip_order(sender: int, data: bytes) -> GripOrder | None:
 
 def pack_order_answer(message: OrderAnswer) -> bytes:
     cost_mm = message.cost_mm
-    if cost_mm > 4294967295:
+    if cost_mm < 0 or cost_mm > 4294967295:
         raise OutOfRangeError("OrderAnswer.cost_mm", cost_mm, 0, 4294967295)
     try:
-        return _PACK_HBIX(message.order, message.order_result + (cost_mm & 0x1F) * 0x8, cost_mm >> 5)
+        return _PACK_HBIX(
+            message.order,
+            message.order_result + (cost_mm & 0x1F) * 0x8,
+            (cost_mm >> 5) + message.refused_for * 0x8000000,
+        )
     except struct.error as error:
-        raise refusal(message, ("OrderAnswer.order", 0, 65535), ("OrderAnswer.cost_mm", 0, 4294967295)) from error
+        raise refusal(message, ("OrderAnswer.order", 0, 65535)) from error
 
 
 def unpack_order_answer(sender: int, data: bytes) -> OrderAnswer | None:
@@ -90,7 +95,10 @@ def unpack_order_answer(sender: int, data: bytes) -> OrderAnswer | None:
     if order_result > 3:
         return None
     cost_mm = word_0 >> 19 & 0xFFFFFFFF
-    return OrderAnswer(sender, order, _ORDER_RESULT[order_result], cost_mm)
+    refused_for = word_0 >> 51 & 0x3
+    if refused_for > 2:
+        return None
+    return OrderAnswer(sender, order, _ORDER_RESULT[order_result], cost_mm, _REFUSED_FOR[refused_for])
 
 
 def pack_arm_state(message: ArmState) -> bytes:

@@ -19,7 +19,7 @@ from onboard.core.site import Timing
 Outcome = list[Effect | NegotiationEvent]
 
 #: Deepest sub-call: a call of its own has depth 0.
-MAX_DEPTH = 3
+MAX_DEPTH = 7
 #: Most sub-calls of one bid, over all rounds: the part number has 4 bits on the wire.
 MAX_PARTS = 15
 #: An option outlasts what it hangs on by this many award repeats: a lost award is said again before that.

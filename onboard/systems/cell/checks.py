@@ -5,7 +5,7 @@ from math import isfinite
 
 from onboard.contract.cell import ArmProgress, GoalPath, OfferHigh, OfferLow, PartAt
 from onboard.contract.messages import Bid, CallForProposals, Reference
-from onboard.systems.cell.fields import from_halves, nodes_of
+from onboard.systems.cell.fields import IN_PATH, from_halves, path_of
 from onboard.systems.cell.site import Area, Cell, Point
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Finding, LogEvent
@@ -91,7 +91,8 @@ class PredecessorsSilent(Rule):
 
     def _on_path(self, event: LogEvent[GoalPath]) -> None:
         word = event.message
-        self._paths[Reference(word.sender, word.goal)] = nodes_of(word)
+        # Who makes a goal works on it too; a goal manager bids for nothing.
+        self._paths[Reference(word.sender, word.goal)] = path_of(word, IN_PATH + 1)
 
     def _on_call(self, event: LogEvent[CallForProposals]) -> None:
         self._tasks[event.message.sender, event.message.call] = event.message.task

@@ -7,6 +7,7 @@ from onboard.contract.codes import TokenKind
 from onboard.contract.messages import Reference
 from onboard.core.serial import ms_after
 from onboard.core.token_keys import TokenKey
+from onboard.systems.cell.fields import FIRST_PATH
 from onboard.systems.cell.geometry import Area, Point, shortest_way, way_length_m
 from onboard.systems.cell.offers import OFFERS, OfferRule, via_points
 
@@ -52,7 +53,8 @@ class Goal:
     """Bring ``part`` from ``start`` to ``end`` (row C03). ``task`` is the goal's own name: its manager and a number.
 
     ``path`` are the robots that work on the goal already, the main contractor first: its length is the goal's level in
-    the tree of contracts (row C11). ``time_limit_ms`` is bus time, ``NO_LIMIT`` for none (row C14).
+    the tree of contracts (row C11), and none deeper than ``deepest`` is called for. ``time_limit_ms`` is bus time,
+    ``NO_LIMIT`` for none (row C14).
     """
 
     task: Reference
@@ -61,6 +63,7 @@ class Goal:
     end: Point
     path: tuple[int, ...] = ()
     time_limit_ms: int = NO_LIMIT
+    deepest: int = FIRST_PATH
 
     @property
     def level(self) -> int:
@@ -74,7 +77,8 @@ class Goal:
 
     def part_of(self, robot: int, number: int, via: Point) -> "Goal":
         """The sub-goal that ``robot`` makes of it when it puts the part down at ``via``."""
-        return Goal(Reference(robot, number), self.part, via, self.end, (*self.path, robot), self.time_limit_ms)
+        task, path = Reference(robot, number), (*self.path, robot)
+        return Goal(task, self.part, via, self.end, path, self.time_limit_ms, self.deepest)
 
 
 class Filter(Enum):

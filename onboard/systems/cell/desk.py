@@ -5,10 +5,10 @@ its goal and to nobody else, and comes back when the part lies where it was want
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-from onboard.contract.cell import ArmProgress, PartAt
+from onboard.contract.cell import ArmProgress, GoalTooDeep, PartAt, RefusedFor
 from onboard.contract.cell_device import OrderAnswer, OrderFrom, OrderTo
 from onboard.contract.codes import KindCode, OrderResult, Reason, TokenKind
 from onboard.contract.messages import CallForProposals, Message, Reference
@@ -21,12 +21,13 @@ from onboard.core.negotiation import Estimator, RequestedTerms
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Site
 from onboard.systems.cell.contracts import Goal, part_token
+from onboard.systems.cell.fields import MAX_PATH
 from onboard.systems.cell.generation import call_terms
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.goal_frames import GoalsHeard
 from onboard.systems.cell.records import GoalOrderRecord, GoalStateRecord
 from onboard.work.order_desk import OrderDesk
-from onboard.work.order_life import OrderState, WorkOrder
+from onboard.work.order_life import OrderEvent, OrderState, WorkOrder
 from onboard.work.plain import NoEstimator
 
 
@@ -36,6 +37,10 @@ class GoalOrder(WorkOrder):
 
     goal: Goal
     cost: float = field(default=0.0, kw_only=True)
+    #: Whether a robot has said that the chain of robots would be too long.
+    is_too_deep: bool = field(default=False, kw_only=True)
+    #: When it was last called for, bus us.
+    called_us: int = field(default=0, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -86,6 +91,8 @@ class GoalManager(OrderDesk[GoalOrder]):
             self.fleet.winners.works(message.sender, message.call, now_us)
         if isinstance(message, ArmProgress):
             self.fleet.winners.works(message.sender, (message.x_mm, message.y_mm, message.arm_phase), now_us)
+        if isinstance(message, GoalTooDeep):
+            self._on_too_deep(message, now_us)
         return super().hear(message, now_us)
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
@@ -105,6 +112,30 @@ class GoalManager(OrderDesk[GoalOrder]):
                 place = order.goal.end if order.state is OrderState.DONE else order.goal.start
                 effects.append(Send(PartAt(self.fleet.node_id, order.goal.part, place.x_mm, False, place.y_mm)))
         return effects + self.fleet.tokens.statements()
+
+    def _on_too_deep(self, word: GoalTooDeep, now_us: int) -> None:
+        """A shorter chain may be found yet, until the time for bids is over."""
+        order = next((one for one in self.orders.values() if one.goal.part == word.part), None)
+        machine = self.fleet.site.machines.get(word.sender)
+        if order is None or order.state is not OrderState.CALLED or machine is None or machine.kind is not self.takers:
+            return
+        if not order.is_too_deep:
+            order.is_too_deep, order.due_us = True, order.called_us + self.fleet.site.timing.call_window_us
+
+    def go_on(self, order: GoalOrder, now_us: int) -> list[Effect]:
+        """What is due while bids may come needs a longer chain: called for one level deeper, or refused."""
+        if order.state is not OrderState.CALLED:
+            order.called_us, order.is_too_deep = now_us, False
+            return super().go_on(order, now_us)
+        order.due_us = None
+        if any(one.best is not None for one in self.fleet.negotiation.initiators if one.terms.task == order.task):
+            order.is_too_deep = False
+            return []
+        withdrawn = self._withdraw(order, now_us)
+        if order.goal.deepest == MAX_PATH:
+            return withdrawn + self.put(order, OrderEvent.HOPELESS, now_us)
+        order.goal, order.calls = replace(order.goal, deepest=order.goal.deepest + 1), 0
+        return withdrawn + self.put(order, OrderEvent.NOT_WON, now_us)
 
     def _on_order(self, wanted: OrderTo, now_us: int) -> list[Effect]:
         task = Reference(self.fleet.node_id, wanted.order)
@@ -146,7 +177,7 @@ class GoalManager(OrderDesk[GoalOrder]):
 
     def state_record(self, order: GoalOrder) -> GoalStateRecord:
         """How far the goal is, with the cost in m that its contract has."""
-        return GoalStateRecord(order.task.number, order.state, order.winner, order.cost)
+        return GoalStateRecord(order.task.number, order.state, order.winner, order.cost, order.is_too_deep)
 
     def order_record(self, order: GoalOrder) -> GoalOrderRecord:
         """Where a part is wanted."""
@@ -163,10 +194,13 @@ class GoalManager(OrderDesk[GoalOrder]):
                     self.orders[task] = GoalOrder(task, Goal(task, task, start, end, (), record.limit))
                 case GoalStateRecord():
                     order = self.orders[Reference(self.fleet.node_id, record.number)]
-                    order.winner, order.cost = record.winner, record.cost
+                    order.winner, order.cost, order.is_too_deep = record.winner, record.cost, record.is_too_deep
                     self.take_up(order, record.state)
 
     def answer(self, order: GoalOrder) -> Message:
         """The end of the order for the counter, with its cost in mm."""
         number, result = order.task.number, OrderResult[order.result_name]
-        return OrderAnswer(self.fleet.node_id, number, result, round(1000 * order.cost))
+        why = RefusedFor.NOTHING
+        if result is OrderResult.REFUSED:
+            why = RefusedFor.TOO_DEEP if order.is_too_deep else RefusedFor.NOBODY
+        return OrderAnswer(self.fleet.node_id, number, result, round(1000 * order.cost), why)

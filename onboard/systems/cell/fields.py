@@ -2,10 +2,17 @@
 
 import struct
 
-from onboard.contract.cell import GoalPath, OfferNodes
+from onboard.contract.cell import GoalPath, OfferNodes, OfferNodesMore
 
-#: Robots that one frame can name: the deepest sub-goal has as many predecessors at most.
-MAX_PATH = 5
+#: Robots that work on the deepest sub-goal already: the core's calls are no deeper (``sub_calls.MAX_DEPTH``).
+MAX_PATH = 7
+#: As deep goals are called for first: where chains of four do, longer ones need not be asked for, and the calls of
+#: all that could be tried grow threefold with each level.
+FIRST_PATH = 3
+#: Robots that can carry one part, one after the other.
+MAX_CHAIN = MAX_PATH + 1
+#: Robots that ``GoalPath`` names, and ``OfferNodes``; of seven the last is who says ``GoalPath``.
+IN_PATH, IN_OFFER = 6, 5
 
 
 def halves(value: float) -> tuple[int, int]:
@@ -20,15 +27,23 @@ def from_halves(high: int, low: int) -> float:
     return float(value)
 
 
-def five(nodes: tuple[int, ...]) -> tuple[int, int, int, int, int]:
-    """Up to five node-IDs, zeros behind the last. Raises ``ValueError`` for more."""
-    if len(nodes) > MAX_PATH:
-        raise ValueError(f"{len(nodes)} robots do not fit into one frame")
-    one, two, three, four, fifth = (*nodes, *(0,) * (MAX_PATH - len(nodes)))
-    return one, two, three, four, fifth
+def padded(nodes: tuple[int, ...], count: int) -> tuple[int, ...]:
+    """``count`` node-IDs, zeros behind the last of ``nodes``. Raises ``ValueError`` for more."""
+    if len(nodes) > count:
+        raise ValueError(f"{len(nodes)} robots do not fit into {count} places")
+    return (*nodes, *(0,) * (count - len(nodes)))
 
 
-def nodes_of(message: GoalPath | OfferNodes) -> tuple[int, ...]:
-    """The node-IDs in five fields of a message, without the empty ones."""
-    every = (message.node1, message.node2, message.node3, message.node4, message.node5)
-    return tuple(node for node in every if node)
+def path_of(message: GoalPath, level: int) -> tuple[int, ...]:
+    """The robots that work on a goal of ``level``, without the empty places."""
+    one = message
+    named = tuple(node for node in (one.node1, one.node2, one.node3, one.node4, one.node5, one.node6) if node)
+    return (*named, message.sender) if level > IN_PATH else named
+
+
+def offered_by(message: OfferNodes, more: OfferNodesMore | None) -> tuple[int, ...]:
+    """All robots of an offer, without the empty places; none where some are missing."""
+    every = message.node1, message.node2, message.node3, message.node4, message.node5
+    if not message.node5:
+        return tuple(node for node in every if node)
+    return () if more is None else tuple(node for node in (*every, more.node6, more.node7, more.node8) if node)

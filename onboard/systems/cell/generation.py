@@ -10,7 +10,8 @@ from onboard.core.negotiation import CallKey, NeededAnswers, Proposal, Requested
 from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Machine
 from onboard.systems.cell.contracts import Arm, ArmMove, Contract, Goal, filtered, moves
-from onboard.systems.cell.fields import MAX_PATH
+from onboard.systems.cell.depths import Depths
+from onboard.systems.cell.fields import MAX_CHAIN
 from onboard.systems.cell.geometry import Point, distance_m, shortest_way, way_length_m
 from onboard.systems.cell.goal_frames import GoalsHeard, cost_of_bid, goal_messages, offer_messages
 from onboard.systems.cell.site import Cell
@@ -36,6 +37,7 @@ class ArmGeneration:
     promised: dict[CallKey, Contract] = field(default_factory=dict)
     #: Goals that it has in hand or has carried out: not to be bid for again.
     known: set[Reference] = field(default_factory=set)
+    depths: Depths = field(default_factory=Depths)
     #: Goals and sub-goals that this robot looked at, and those that it passed over, by why (rows C12, C13).
     looked_at: int = 0
     passed_over: dict[str, int] = field(default_factory=dict)
@@ -82,7 +84,8 @@ class ArmGeneration:
         if found[0].via == goal.end:
             own, node = self._own_cost(goal, found[0]), self.machine.node_id
             return _proposal(Contract(goal, node, found[0], own, own, (node,)))
-        if goal.level >= MAX_PATH:
+        if goal.level >= goal.deepest:
+            self.depths.reach(goal.part)
             return None
         # Only time limits ask when the part will be there; without one a sub-goal looked at again is the same.
         parts = tuple(
@@ -115,7 +118,7 @@ class ArmGeneration:
             if move is None or offer is None:
                 continue
             own = self._own_cost(goal, move)
-            nodes = (self.machine.node_id, *offer.nodes)[:MAX_PATH]
+            nodes = (self.machine.node_id, *offer.nodes)[:MAX_CHAIN]
             contract = Contract(goal, self.machine.node_id, move, own, own + offer.cost, nodes)
             if best is None or contract.cost < best[0].cost:
                 best = contract, answer.part

@@ -15,10 +15,11 @@ from onboard.contract.cell import (
     OfferHigh,
     OfferLow,
     OfferNodes,
+    OfferNodesMore,
 )
 from onboard.contract.messages import Bid, CallForProposals, Message, Reference
 from onboard.systems.cell.contracts import Contract, Goal
-from onboard.systems.cell.fields import five, from_halves, halves, nodes_of
+from onboard.systems.cell.fields import IN_OFFER, IN_PATH, MAX_CHAIN, from_halves, halves, offered_by, padded, path_of
 from onboard.systems.cell.geometry import Point
 
 #: Most goals and offers remembered of others; the oldest go first. A goal is called for right after it is told.
@@ -28,7 +29,7 @@ _Key = TypeVar("_Key")
 _Kind = TypeVar("_Kind", bound=Message)
 
 GoalMessage = GoalStart | GoalEnd | GoalTerms | GoalPath
-OfferMessage = OfferHigh | OfferLow | OfferNodes
+OfferMessage = OfferHigh | OfferLow | OfferNodes | OfferNodesMore
 
 
 def goal_messages(goal: Goal) -> tuple[Message, ...]:
@@ -37,19 +38,20 @@ def goal_messages(goal: Goal) -> tuple[Message, ...]:
     return (
         GoalStart(manager, number, *goal.start),
         GoalEnd(manager, number, *goal.end),
-        GoalTerms(manager, number, goal.time_limit_ms, goal.level),
-        GoalPath(manager, number, *five(goal.path)),
+        GoalTerms(manager, number, goal.time_limit_ms, goal.level, goal.deepest),
+        GoalPath(manager, number, *padded(goal.path[:IN_PATH], IN_PATH)),
     )
 
 
 def offer_messages(contract: Contract) -> tuple[Message, ...]:
     """What is said before each bid for a goal."""
     high, low = halves(contract.cost)
-    return (
-        OfferHigh(contract.node, *contract.goal.task, high),
-        OfferLow(contract.node, *contract.goal.task, low),
-        OfferNodes(contract.node, *contract.goal.task, *five(contract.nodes)),
-    )
+    name = (contract.node, *contract.goal.task)
+    first, rest = contract.nodes[:IN_OFFER], contract.nodes[IN_OFFER:]
+    said = OfferHigh(*name, high), OfferLow(*name, low), OfferNodes(*name, *padded(first, IN_OFFER))
+    if len(first) < IN_OFFER:
+        return said
+    return (*said, OfferNodesMore(*name, *padded(rest, MAX_CHAIN - IN_OFFER)))
 
 
 def contract_messages(contract: Contract) -> tuple[Message, ...]:
@@ -85,7 +87,7 @@ class GoalsHeard:
             case GoalStart() | GoalEnd() | GoalTerms() | GoalPath():
                 goal = Reference(message.sender, message.goal)
                 _take(self._goals, goal, message, isinstance(message, GoalStart))
-            case OfferHigh() | OfferLow() | OfferNodes():
+            case OfferHigh() | OfferLow() | OfferNodes() | OfferNodesMore():
                 offer = (message.sender, Reference(message.manager, message.goal))
                 _take(self._offers, offer, message, isinstance(message, OfferHigh))
 
@@ -100,11 +102,11 @@ class GoalsHeard:
             and isinstance(path, GoalPath)
         ):
             return None
-        nodes = nodes_of(path)
+        nodes = path_of(path, terms.level)
         if len(nodes) != terms.level:
             return None
         places = Point(start.x_mm, start.y_mm), Point(end.x_mm, end.y_mm)
-        return Goal(call.task, call.car, *places, nodes, terms.time_limit_ms)
+        return Goal(call.task, call.car, *places, nodes, terms.time_limit_ms, terms.deepest)
 
     def offer(self, bidder: int, task: Reference) -> ReceivedOffer | None:
         """A bidder's offer for a goal; None where frames of it are missing, or it names no cost of 0 or more."""
@@ -112,9 +114,11 @@ class GoalsHeard:
         high, low, nodes = (frames.get(kind) for kind in (OfferHigh, OfferLow, OfferNodes))
         if not (isinstance(high, OfferHigh) and isinstance(low, OfferLow) and isinstance(nodes, OfferNodes)):
             return None
+        more = frames.get(OfferNodesMore)
+        every = offered_by(nodes, more if isinstance(more, OfferNodesMore) else None)
         cost = from_halves(high.bits, low.bits)
         # Not a number, and infinite, are no costs either.
-        return ReceivedOffer(cost, nodes_of(nodes)) if 0 <= cost < float("inf") else None
+        return ReceivedOffer(cost, every) if every and 0 <= cost < float("inf") else None
 
     def is_sound(self, task: Reference, bid: Bid) -> bool:
         """Whether a bid is what its offer costs: one without its offer could not be a part of another's."""

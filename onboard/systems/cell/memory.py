@@ -7,6 +7,7 @@ from onboard.contract.messages import Reference
 from onboard.core.effects import Record
 from onboard.core.journal_records import Entry, records_in
 from onboard.systems.cell.contracts import ArmMove, Contract, Goal
+from onboard.systems.cell.fields import MAX_PATH
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.records import ContractLostRecord, ContractRecord, ContractStage, StageRecord
 
@@ -80,7 +81,7 @@ def undertakings(entries: Iterable[Entry]) -> dict[Reference, Undertaking]:
 
 def _undertaking(record: ContractRecord) -> Undertaking:
     (start,), (end,) = _points(record.start), _points(record.end)
-    goal = Goal(record.task, record.part, start, end, record.path, record.limit)
+    goal = Goal(record.task, record.part, start, end, record.path, record.limit, MAX_PATH)
     move = ArmMove(_points(record.approach), _points(record.carry))
     contract = Contract(goal, record.node, move, record.own, record.cost, record.nodes)
     return Undertaking(

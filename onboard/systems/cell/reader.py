@@ -11,8 +11,9 @@ from onboard.core.site import Segment
 from onboard.systems.cell.site import MAX_COORDINATE_MM, Area, Arm, Cell, GoalDemand, Point
 
 _NOWHERE = Segment(0, 0)
-#: A call for a goal holds calls within calls, each half of what is left: four levels need this long.
-CALL_WINDOW_MS = 3_000
+#: A call for a goal holds calls within calls: a chain of eight robots takes this long, each level with this share of
+#: what is left to the one above (the last has 0.5 s).
+CALL_WINDOW_MS, SUB_CALL_PERCENT = 3_000, 80
 
 
 def read(root: TomlTable, common: Common) -> Cell:
@@ -35,12 +36,13 @@ def read(root: TomlTable, common: Common) -> Cell:
     timing_table = root.table("timing")
     timing_table.values.setdefault("call_window_ms", CALL_WINDOW_MS)
     timing = read_timing(timing_table, max(1, len(arms)), len(fleet.by_node), common.bitrate)
+    percent = root.table("negotiation").integer("sub_call_percent", 20, 80, SUB_CALL_PERCENT)
     return Cell(
         name=common.name,
         digest=0,
         bitrate=common.bitrate,
         machines=dict(sorted(fleet.by_node.items())),
-        timing=replace(timing, sub_call_percent=root.table("negotiation").integer("sub_call_percent", 20, 80, 50)),
+        timing=replace(timing, sub_call_percent=percent),
         arms=arms,
         obstacles=obstacles,
         goals=goals,

@@ -77,9 +77,10 @@ class GoalOrderRecord(OrderRecord):
 
 @dataclass(frozen=True, slots=True)
 class GoalStateRecord(OrderStateRecord):
-    """With what its contract costs."""
+    """With what its contract costs, and whether the chain of robots would be too long."""
 
     cost: float
+    is_too_deep: bool = False
 
 
 RECORDS: RecordTypes = (ContractRecord, StageRecord, ContractLostRecord, GoalOrderRecord, GoalStateRecord)

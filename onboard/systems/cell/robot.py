@@ -7,7 +7,7 @@ them is ``active``, the most urgent whose part this robot may take (row C15).
 
 from dataclasses import dataclass, field
 
-from onboard.contract.cell import ArmMode, ArmPhase, ArmProgress, GripAction, GripMode, PartAt
+from onboard.contract.cell import ArmMode, ArmPhase, ArmProgress, GoalTooDeep, GripAction, GripMode, PartAt
 from onboard.contract.cell_device import ArmState, GripOrder, GripState
 from onboard.contract.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.contract.messages import Message, Reference, SyncRequest, TaskReport
@@ -140,6 +140,7 @@ class ArmRobot:
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Goals and offers; sub-contractors' reports; calls and awards for what is in hand already."""
         self.generation.goals_heard.hear(message)
+        self.generation.depths.hear(message)
         match message:
             case TaskReport():
                 return self._on_report(message, now_us)
@@ -174,7 +175,8 @@ class ArmRobot:
         """Ask for custody, choose the most urgent part, and take one step for it."""
         if self.driver.state is None or self.grip is None:
             return []
-        effects = self._want_parts(now_us) + self._manage(now_us) + self._give_back(now_us)
+        effects: list[Effect] = [Send(GoalTooDeep(self.fleet.node_id, part)) for part in self.generation.depths.take()]
+        effects += self._want_parts(now_us) + self._manage(now_us) + self._give_back(now_us)
         if self.active is None:
             effects += self._step(now_us)
         if self.active is not None:
@@ -188,6 +190,8 @@ class ArmRobot:
         """When an order, a call, a question or a word is due; nothing is before the devices have told how they are."""
         if self.driver.state is None or self.grip is None:
             return None
+        if self.generation.depths.due:
+            return 0
         times = [self.driver.link.due_us, self.gripper.due_us, self._progress_at_us]
         times += [*self._call_at_us.values(), *self._ask_at_us.values()]
         return min((time for time in times if time is not None), default=None)

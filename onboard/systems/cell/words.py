@@ -29,7 +29,7 @@ class CellWords(SiteWords):
     def __init__(self, site: Cell) -> None:
         super().__init__(site)
         self._points: OrderedDict[tuple[type[Message], int, int], str] = OrderedDict()
-        nodes = dict.fromkeys((f"node{number}" for number in range(1, 6)), self.machine)
+        nodes = dict.fromkeys((f"node{number}" for number in range(1, 9)), self.machine)
         self.signals = {**nodes, "manager": self.machine}
 
     def hear(self, message: Message) -> None:
