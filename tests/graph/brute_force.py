@@ -7,6 +7,8 @@ from collections.abc import Iterator
 
 Way = tuple[int, ...]
 Edges = frozenset[frozenset[int]]
+#: A node, and the edge that it keeps.
+Kept = frozenset[tuple[int, frozenset[int]]]
 
 
 def shortest(edges: Edges, start: Way, goal: int) -> Way | None:
@@ -27,42 +29,60 @@ def shortest(edges: Edges, start: Way, goal: int) -> Way | None:
     return None
 
 
-def can_stick(edges: Edges, starts: Way, goals: Way, *, keep: bool) -> bool:
-    """Depth-first over robots' remaining ways: (behind or -1, node, ..., goal); an empty way has arrived."""
+def can_stick(edges: Edges, starts: Way, goals: Way, *, rule: str) -> bool:
+    """Depth-first over robots' remaining ways: (behind or -1, node, ..., goal); an empty way has arrived.
+
+    ``rule``: "paper", "keep", or "keep-on-notice", for which each state also has who keeps which edge.
+    """
     first = []
     for start, goal in zip(starts, goals, strict=True):
         way = shortest(edges, (start,), goal)
         assert way is not None
         first.append((-1, *way))
     seen = set()
-    stack = [tuple(first)]
+    stack: list[tuple[tuple[Way, ...], Kept]] = [(tuple(first), frozenset())]
     while stack:
-        ways = stack.pop()
-        if ways in seen:
+        ways, kept = stack.pop()
+        if (ways, kept) in seen:
             continue
-        seen.add(ways)
-        after = list(_after(edges, ways, keep=keep))
+        seen.add((ways, kept))
+        after = list(_after(edges, ways, kept, rule=rule))
         if not after and any(ways):
             return True
         stack += after
     return False
 
 
-def _after(edges: Edges, ways: tuple[Way, ...], *, keep: bool) -> Iterator[tuple[Way, ...]]:
+def _after(edges: Edges, ways: tuple[Way, ...], kept: Kept, *, rule: str) -> Iterator[tuple[tuple[Way, ...], Kept]]:
     taken = {frozenset(way[:2]) for way in ways if way and way[0] >= 0}
 
     def grants(node: int, after: int) -> bool:
-        if frozenset((node, after)) in taken:
+        if frozenset((node, after)) in taken or (after, frozenset((node, after))) in kept:
             return False
         mine = [one for one in edges if after in one]
         left = [one for one in mine if one not in taken]
-        return not (keep and len(left) == 1 and len(mine) > 1)
+        return not (rule == "keep" and len(left) == 1 and len(mine) > 1)
 
     for number, way in enumerate(ways):
         if not way:
             continue
         for new in _steps(edges, ways, way, grants):
-            yield (*ways[:number], new, *ways[number + 1 :])
+            following = (*ways[:number], new, *ways[number + 1 :])
+            yield following, _noticed(edges, way, new, following, kept) if rule == "keep-on-notice" else kept
+
+
+def _noticed(edges: Edges, way: Way, new: Way, ways: tuple[Way, ...], kept: Kept) -> Kept:
+    """The far end of the edge that is entered counts its free ones; the far end of the one left lets its own go."""
+    now = set(kept)
+    if new:
+        node, far = new[:2]
+        now -= {(node, frozenset((node, far)))}
+        busy = {frozenset(one[:2]) for one in ways if one and one[0] >= 0} | {one for _, one in now}
+        mine = [one for one in edges if far in one]
+        left = [one for one in mine if one not in busy]
+        if len(left) == 1 < len(mine):
+            now.add((far, left[0]))
+    return frozenset(one for one in now if one[0] != way[0])
 
 
 def _steps(edges: Edges, ways: tuple[Way, ...], way: Way, grants: object) -> Iterator[Way]:

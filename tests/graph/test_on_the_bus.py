@@ -196,6 +196,26 @@ def test_g19_who_is_sent_where_is_drawn_alike_in_every_run() -> None:
     assert sent[0] == sent[1]
 
 
+def test_g19_the_draw_falls_on_either_robot_and_on_any_free_edge() -> None:
+    """Two robots meet head-on again and again: who asked first is sent elsewhere as well as who asked second."""
+    orders = [
+        (40 * n, robot, (stop,)) for n in range(10) for robot, stop in (("R1", (5, 3)[n % 2]), ("R2", (3, 5)[n % 2]))
+    ]
+    scene = Scene(made(hall(), (3, 5), orders, Rules.PAPER))
+    scene.assert_sound()
+    first: dict[int, int] = {}
+    sent: list[tuple[bool, int]] = []
+    for message in (one for _, one in scene.played.messages):
+        if isinstance(message, TurnSignal) and message.node == 4:
+            first.setdefault(4, message.sender)
+        if isinstance(message, NodeAnswer) and message.node == 4 and message.node_verdict is NodeVerdict.ANOTHER:
+            sent.append((message.robot == first[4], message.after))
+        if isinstance(message, RobotAt) and message.node in (3, 5) and message.robot_mode is RobotMode.FREE:
+            first.clear()
+    assert {is_first for is_first, _ in sent} == {True, False}
+    assert {after for _, after in sent} == {1, 7}
+
+
 def test_g20_the_node_at_the_other_end_is_told_of_a_grant(crowd: Scene) -> None:
     granted = [(one.node, one.after, one.robot) for one in crowd.said(NodeAnswer) if one.node_verdict is NodeVerdict.GO]
     notices = crowd.said(EdgeNotice)

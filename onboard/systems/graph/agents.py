@@ -67,6 +67,8 @@ class NodeAgents:
     #: Robots whose heartbeat tells another site: their map is wrong or old (row G27).
     strangers: set[int] = field(default_factory=set)
     _kept: dict[int, int | None] = field(default_factory=dict)
+    #: By an edge at a node of mine: the node from which a robot went onto it.
+    _behind: dict[Edge, int] = field(default_factory=dict)
     _events: int = 0
     _seen_taken: set[Edge] = field(default_factory=set)
 
@@ -83,8 +85,12 @@ class NodeAgents:
         return 0
 
     def start(self, now_us: int) -> list[Effect]:
-        """Nothing to do before a robot comes."""
-        return []
+        """What my nodes kept by notices in an earlier life is forgotten, and so it is free."""
+        if self.site.rules is not Rules.KEEP_ON_NOTICE:
+            return []
+        mine = (node for node in self.site.graph.nodes if self._is_mine(node))
+        me, neighbours = self.fleet.node_id, self.site.graph.neighbours
+        return [Send(EdgeNotice(me, node, other, EdgeState.FREE, 0)) for node in mine for other in neighbours[node]]
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """Nothing: a host of agents has no devices."""
@@ -105,7 +111,7 @@ class NodeAgents:
             case RobotAt():
                 self._on_robot(message)
             case EdgeNotice() if self._is_mine(message.other):
-                self._on_notice(message, now_us)
+                return self._on_notice(message, now_us)
             case TokenGrant():
                 self._on_grant(message)
             case Heartbeat():
@@ -139,6 +145,10 @@ class NodeAgents:
 
     def statements(self, now_us: int) -> list[Effect]:
         """The rights that it holds; edges that are kept are said again when asked for."""
+        if self.site.rules is Rules.KEEP_ON_NOTICE:
+            me, kept = self.fleet.node_id, sorted(self._kept.items())
+            said = [Send(EdgeNotice(me, node, other, EdgeState.KEPT, 0)) for node, other in kept if other is not None]
+            return [*said, *self.fleet.tokens.statements()]
         self._kept.clear()
         return self.fleet.tokens.statements()
 
@@ -161,16 +171,17 @@ class NodeAgents:
         if one is not None and at.node != one.heading.end:
             del self.waiting[at.sender]
 
-    def _on_notice(self, notice: EdgeNotice, now_us: int) -> None:
+    def _on_notice(self, notice: EdgeNotice, now_us: int) -> list[Effect]:
         key, pair = edge_token(notice.node, notice.other), (notice.other, notice.node)
         if notice.edge_state is EdgeState.KEPT:
             self.kept_by_other.add(pair)
-            return
+            return []
         self.kept_by_other.discard(pair)
         if notice.edge_state is EdgeState.RESERVED:
             self.promised[key] = (notice.robot, now_us + PROMISE_US)
-        else:
-            self.promised.pop(key, None)
+            return self._on_reserved(notice.node, notice.other, now_us)
+        self.promised.pop(key, None)
+        return []
 
     def _on_grant(self, grant: TokenGrant) -> None:
         """A promise that is redeemed."""
@@ -210,9 +221,13 @@ class NodeAgents:
         if slot:
             self.promised[slot_token(after, slot)] = (robot, until_us)
         me = self.fleet.node_id
+        if self.site.rules is Rules.KEEP_ON_NOTICE and self._kept.get(node) == after:
+            # For its own needs: the notice of the reservation tells the neighbour.
+            self._note_own(node, self._kept.pop(node), None)
         return [
             Send(NodeAnswer(me, robot, node, verdict, after, slot)),
             Send(EdgeNotice(me, node, after, EdgeState.RESERVED, robot)),
+            *self._on_reserved(node, after, now_us),
         ]
 
     def _is_stuck(self, robot: int, taken: set[Edge], slot: int | None) -> bool:
@@ -283,22 +298,50 @@ class NodeAgents:
             for ends in sorted(self._seen_taken - taken)
             if keeper(self.site, edge_token(*ends)) == me
         ]
-        self._seen_taken = taken
+        released, self._seen_taken = sorted(self._seen_taken - taken), taken
+        if self.site.rules is Rules.KEEP_ON_NOTICE:
+            # Where a robot came from a neighbour has released an edge now; what is kept there is let go (row G22).
+            return [
+                *effects,
+                *(one for ends in released for one in self._change(self._behind.pop(ends, NOWHERE), None)),
+            ]
         if self.site.rules is not Rules.KEEP:
             return effects
         for node in self.site.graph.nodes:
             if not self._is_mine(node):
                 continue
-            kept, before = kept_edge(self.site.graph, taken, node), self._kept.get(node)
-            if kept != before:
-                self._kept[node] = kept
-                effects += [
-                    Send(EdgeNotice(me, node, other, state, 0))
-                    for other, state in ((before, EdgeState.FREE), (kept, EdgeState.KEPT))
-                    if other is not None
-                ]
-                self._note_own(node, before, kept)
+            effects += self._change(node, kept_edge(self.site.graph, taken, node))
         return effects
+
+    def _on_reserved(self, node: int, after: int, now_us: int) -> list[Effect]:
+        """To the letter (row G21): the far end of a reserved edge counts its free ones, and keeps the last."""
+        if self.site.rules is not Rules.KEEP_ON_NOTICE:
+            return []
+        self._behind[edge(node, after)] = node
+        if not self._is_mine(after):
+            return []
+        graph, kept = self.site.graph, self._kept.get(after)
+        gone = {
+            ends
+            for ends in (edge(after, other) for other in graph.neighbours[after])
+            if self._is_taken(edge_token(*ends), NOBODY, now_us)
+        }
+        gone |= {edge(*pair) for pair in self.kept_by_other if after in pair} | {edge(node, after)}
+        last = kept_edge(graph, gone, after) if kept is None else kept
+        return self._change(after, last)
+
+    def _change(self, node: int, kept: int | None) -> list[Effect]:
+        """A node of mine keeps another edge than before, or none: the agent at its other end is told."""
+        before, me = self._kept.get(node), self.fleet.node_id
+        if kept == before or not self._is_mine(node):
+            return []
+        self._kept[node] = kept
+        self._note_own(node, before, kept)
+        return [
+            Send(EdgeNotice(me, node, other, state, 0))
+            for other, state in ((before, EdgeState.FREE), (kept, EdgeState.KEPT))
+            if other is not None
+        ]
 
     def _note_own(self, node: int, before: int | None, kept: int | None) -> None:
         """Agents of one host tell each other without the bus."""

@@ -123,6 +123,12 @@ def grid(rows: int, columns: int, length_mm: int = 1) -> Graph:
     return Graph({**right, **down})
 
 
+def cube(dimensions: int, length_mm: int = 1) -> Graph:
+    """A hypercube: 2 to the ``dimensions`` nodes, 2 or more, each joined to those that differ in one binary digit."""
+    nodes, digits = range(1 << dimensions), [1 << digit for digit in range(dimensions)]
+    return Graph({edge(node, node ^ digit): length_mm for node in nodes for digit in digits})
+
+
 def complete(nodes: int, length_mm: int = 1) -> Graph:
     """Every node joined to every other."""
     return Graph({(one, other): length_mm for one in range(nodes) for other in range(one + 1, nodes)})

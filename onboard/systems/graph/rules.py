@@ -1,8 +1,10 @@
 """What a node agent answers (rows G15 to G22): pure rules over the edges that are taken and who wants what.
 
-Three rule sets. ``PAPER``: an edge is granted where it is free. ``KEEP``: besides, a node with traffic at it keeps its
-last free edge and refuses it to the neighbour (row G21). ``EDGE_AND_NODE``: an edge is granted with a slot in the
-node behind it, so nobody ever waits on an edge: what a robot holds while it waits is no edge (decision 14).
+Four rule sets. ``PAPER``: an edge is granted where it is free. ``KEEP``: besides, a node with traffic at it keeps its
+last free edge and refuses it to the neighbour (row G21). ``KEEP_ON_NOTICE`` is that rule to the letter: a node counts
+when a neighbour has reserved an edge to it, and lets go what it keeps when one has released an edge.
+``EDGE_AND_NODE``: an edge is granted with a slot in the node behind it, so nobody ever waits on an edge: what a robot
+holds while it waits is no edge (decision 14).
 """
 
 from collections.abc import Container
@@ -17,6 +19,7 @@ class Rules(Enum):
 
     PAPER = "paper"
     KEEP = "keep"
+    KEEP_ON_NOTICE = "keep-on-notice"
     EDGE_AND_NODE = "edge-and-node"
 
 
@@ -43,7 +46,10 @@ def kept_edge(graph: Graph, taken: Container[tuple[int, int]], node: int) -> int
 
 
 def may_enter(graph: Graph, taken: Container[tuple[int, int]], node: int, after: int, rules: Rules) -> bool:
-    """Whether the node grants the edge to ``after`` (rows G17, G18, G21); a slot behind it is the caller's matter."""
+    """Whether the node grants the edge to ``after`` (rows G17, G18, G21).
+
+    A slot behind it, and what the other end keeps since a notice, are the caller's matter.
+    """
     if edge(node, after) in taken:
         return False
     return rules is not Rules.KEEP or kept_edge(graph, taken, after) != node

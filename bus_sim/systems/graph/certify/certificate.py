@@ -3,14 +3,17 @@
 import random
 from dataclasses import dataclass
 from itertools import islice
+from math import comb, perm
 
-from bus_sim.systems.graph.certify.model import ARRIVED, GraphModel, State
+from bus_sim.systems.graph.certify.model import ARRIVED, KEEPS, GraphModel, State
 from bus_sim.systems.graph.certify.search import DeadlockSearch, Stuck, TaskSet, TooLargeError, task_sets
-from onboard.systems.graph.network import Graph, complete, grid, ring
+from onboard.systems.graph.network import Graph, complete, cube, grid, ring
 from onboard.systems.graph.rules import Rules
 
 #: States that a search may remember before it gives up: about half a gigabyte.
 LIMIT = 1_500_000
+#: As many task sets are listed to draw from them; of more they are drawn one by one.
+MOST_LISTED = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,9 @@ def stuck_lines(stuck: Stuck) -> list[str]:
 def _where(state: State) -> str:
     words = []
     for number, robot in enumerate(state, start=1):
-        if robot.start == ARRIVED:
+        if robot.start == KEEPS:
+            words.append(f"N{robot.node} keeps its edge to N{robot.goal}")
+        elif robot.start == ARRIVED:
             words.append(f"R{number} is in N{robot.node}")
         elif robot.start < 0:
             words.append(f"R{number} waits in N{robot.node}")
@@ -76,6 +81,8 @@ ROWS: tuple[CertificateRow, ...] = (
     CertificateRow("3x3 grid", grid(3, 3), 2),
     CertificateRow("3x3 grid", grid(3, 3), 3),
     CertificateRow("3x3 grid", grid(3, 3), 4, (4000, 7)),
+    CertificateRow("cube Q3", cube(3), 2),
+    CertificateRow("cube Q3", cube(3), 3),
     CertificateRow("ring C5", ring(5), 2),
     CertificateRow("ring C6", ring(6), 2),
     CertificateRow("ring C8", ring(8), 2),
@@ -86,9 +93,25 @@ ROWS: tuple[CertificateRow, ...] = (
 )
 
 
+def number_of_task_sets(graph: Graph, robots: int) -> int:
+    """How many ``task_sets`` are: starts, times goals of which none is its robot's start (inclusion and exclusion)."""
+    nodes = len(graph.nodes)
+    signed = ((1 - own % 2 * 2) * comb(robots, own) * perm(nodes - own, robots - own) for own in range(robots + 1))
+    goals = sum(signed)
+    return comb(nodes, robots) * goals
+
+
 def sampled(graph: Graph, robots: int, count: int, seed: int) -> list[TaskSet]:
-    """Task sets drawn evenly and without repetition from all of them."""
-    return random.Random(seed).sample(list(task_sets(graph, robots)), count)
+    """Task sets drawn evenly and without repetition from all of them. Raises ``ValueError`` for more than there are."""
+    chance = random.Random(seed)
+    if number_of_task_sets(graph, robots) <= MOST_LISTED:
+        return chance.sample(list(task_sets(graph, robots)), count)
+    found: dict[TaskSet, None] = {}
+    while len(found) < count:
+        starts, goals = sorted(chance.sample(graph.nodes, robots)), chance.sample(graph.nodes, robots)
+        if all(one != other for one, other in zip(starts, goals, strict=True)):
+            found[TaskSet(tuple(starts), tuple(goals))] = None
+    return list(found)
 
 
 def count_stuck(

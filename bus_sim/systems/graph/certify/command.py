@@ -14,24 +14,34 @@ from bus_sim.engine import Engine, add_where_options, engine_of, shown
 from bus_sim.options import RunOptions
 from bus_sim.sites import SiteNotFoundError, find_site
 from bus_sim.systems.graph.against_optimum import compare
-from bus_sim.systems.graph.certify.certificate import ROWS, Certificate, certify, count_stuck, stuck_lines
+from bus_sim.systems.graph.certify.certificate import (
+    MOST_LISTED,
+    ROWS,
+    Certificate,
+    certify,
+    count_stuck,
+    number_of_task_sets,
+    stuck_lines,
+)
 from bus_sim.systems.graph.certify.counterexample import play_file, play_on_bus, write_counterexample
 from bus_sim.systems.graph.certify.model import GraphModel
 from bus_sim.systems.graph.certify.throughput import Pace, Throughput, measure
-from onboard.systems.graph.network import Graph, complete, grid, ring
+from onboard.systems.graph.network import Graph, complete, cube, grid, ring
 from onboard.systems.graph.rules import Rules
 from onboard.systems.graph.site import FactoryGraph
 
 T = TypeVar("T")
 #: Cases that are compared with the optimum at most.
 MOST_CASES = 20
-_SPEC = re.compile(r"(?:ring:(\d{1,2})|complete:(\d{1,2})|grid:(\d{1,2})x(\d{1,2}))")
+_SPEC = re.compile(r"(?:ring:(\d{1,2})|complete:(\d{1,2})|cube:([2-6])|grid:(\d{1,2})x(\d{1,2}))")
 _RULES = [rules.value for rules in Rules]
 
 HELP = """\
 rules:
   paper          an edge is granted where it is free; who is told to stop waits on its edge
   keep           besides, a node with traffic at it keeps its last free edge and refuses it to the neighbour
+  keep-on-notice that rule to the letter: a node counts its free edges when a neighbour has reserved one to it, and lets
+                 go what it keeps when a neighbour has released one
   edge-and-node  an edge is granted together with a slot in the node behind it; who waits does so in a node
 
 All interleavings of all task sets are searched. The number of robots with the best throughput is proposed among those
@@ -52,7 +62,7 @@ def add_certify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     parser.add_argument(
         "site",
         nargs="?",
-        help="name of a shipped graph site, a site file, or ring:N, complete:N, grid:RxC",
+        help="name of a shipped graph site, a site file, or ring:N, complete:N, grid:RxC, cube:D",
     )
     parser.add_argument("--robots", type=int, metavar="K", help="number of robots (default: the site's)")
     parser.add_argument("--rules", choices=_RULES, help="the node agents' rules (default: the site's, else paper)")
@@ -69,6 +79,11 @@ def add_certify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         help="instead, 1 to 4 robots on a 3x3 grid on the bus: time to the last goal over the exact optimum",
     )
     add_where_options(parser)
+    parser.add_argument(
+        "--count", action="store_true", help="count the task sets that can stick, under --rules or under each rule set"
+    )
+    parser.add_argument("--sample", type=int, metavar="N", help="with --count: of so many task sets that are drawn")
+    parser.add_argument("--seed", type=int, default=1, metavar="S", help="with --sample: the draw (default: 1)")
     parser.add_argument("--table", action="store_true", help="count the task sets that can stick on known graphs")
 
 
@@ -94,6 +109,10 @@ def run_certify(args: argparse.Namespace) -> int:
     if args.capacity is not None and args.capacity < 1:
         raise SiteNotFoundError(f"--capacity {args.capacity}: must be 1 or more")
     capacity = args.capacity or (site.capacity if site is not None else robots)
+    if args.count:
+        return _count(graph, robots, [rules] if args.rules is not None else list(Rules), capacity, args)
+    if args.sample is not None:
+        raise SiteNotFoundError("--sample: only with --count; a certificate looks at all task sets")
     found = certify(graph, robots, rules, capacity)
     _say(found, f"{args.site}, {robots} robots, rules {rules.value}", args.counterexample, graph, rules, capacity)
     _propose(graph, rules, capacity if args.capacity or site else None, min(args.up_to, len(graph.nodes)), engine)
@@ -103,7 +122,9 @@ def run_certify(args: argparse.Namespace) -> int:
 def _graph(text: str) -> tuple[Graph, FactoryGraph | None]:
     spec = _SPEC.fullmatch(text)
     if spec is not None:
-        nodes, joined, rows, columns = (int(one) if one else 0 for one in spec.groups())
+        nodes, joined, dimensions, rows, columns = (int(one) if one else 0 for one in spec.groups())
+        if dimensions:
+            return cube(dimensions), None
         if max(nodes, joined) > 2 or min(rows, columns) > 1:
             return (ring(nodes) if nodes else complete(joined) if joined else grid(rows, columns)), None
         raise SiteNotFoundError(f"{text}: too small; a ring or complete graph has 3 nodes or more, a grid 2x2 or more")
@@ -186,8 +207,28 @@ def _compared(site: FactoryGraph, cases: int, robots: int) -> tuple[int, str]:
     return robots, compare(site, grid(3, 3, 6000), robots, cases).line()
 
 
+def _count(graph: Graph, robots: int, rules: list[Rules], capacity: int, args: argparse.Namespace) -> int:
+    """So many of all task sets, or of those drawn, can stick; 0 where none can under any of ``rules``."""
+    if graph.dead_ends:
+        raise SiteNotFoundError(f"{args.site}: N{graph.dead_ends[0]} is a dead end, from which nobody comes back")
+    every = number_of_task_sets(graph, robots)
+    if args.sample is None and every > MOST_LISTED:
+        raise SiteNotFoundError(f"--count: {every} task sets of {robots} robots; draw some of them with --sample N")
+    if args.sample is not None and not 0 < args.sample <= every:
+        raise SiteNotFoundError(f"--sample {args.sample}: must be 1 to {every}, as many as there are")
+    drawn = f", {args.sample} of them drawn with seed {args.seed}" if args.sample is not None else ""
+    print(f"{args.site}, {robots} robots: {every} task sets{drawn}\n{'rules':14}  can stick")
+    sample = (args.sample, args.seed) if args.sample is not None else None
+    stuck = 0
+    for one in rules:
+        _, found = count_stuck(graph, robots, one, capacity, sample=sample)
+        print(f"{one.value:14}  {found:9}", flush=True)
+        stuck += found
+    return 1 if stuck else 0
+
+
 def _table(engine: Engine) -> int:
-    print(f"{'graph':10} robots  task sets  {'rule off':>8}  {'rule on':>8}  seconds")
+    print(f"{'graph':10} robots  task sets  {'rule off':>8}  {'rule on':>8}  {'to the letter':>13}  seconds")
     for _, line in sorted(_shown(engine(_counted, range(len(ROWS))), len(ROWS))):
         print(line, flush=True)
     return 0
@@ -197,6 +238,7 @@ def _counted(number: int) -> tuple[int, str]:
     row, began = ROWS[number], time.perf_counter()
     sets, off = count_stuck(row.graph, row.robots, Rules.PAPER, sample=row.sample)
     _, on = count_stuck(row.graph, row.robots, Rules.KEEP, sample=row.sample)
+    _, letter = count_stuck(row.graph, row.robots, Rules.KEEP_ON_NOTICE, sample=row.sample)
     drawn = f"  drawn with seed {row.sample[1]}" if row.sample is not None else ""
     took_s = time.perf_counter() - began
-    return number, f"{row.name:10} {row.robots:6}  {sets:9}  {off:8}  {on:8}  {took_s:7.1f}{drawn}"
+    return number, f"{row.name:10} {row.robots:6}  {sets:9}  {off:8}  {on:8}  {letter:13}  {took_s:7.1f}{drawn}"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from onboard.systems.graph.network import NOWHERE, Edge, Graph, edge
-from onboard.systems.graph.rules import Heading, Rules, are_head_on, may_enter, other_edges
+from onboard.systems.graph.rules import Heading, Rules, are_head_on, kept_edge, may_enter, other_edges
 
 #: Instead of the node behind: this robot has come to its goal.
 ARRIVED = -2
@@ -30,8 +30,10 @@ class ModelRobot(NamedTuple):
         return _STANDS - self.start if self.start <= _STANDS else self.start
 
 
-#: One robot each. Where names do not matter the robots are sorted.
+#: One robot each, and under ``KEEP_ON_NOTICE`` behind them what nodes keep: from ``node`` to ``goal``, ``start`` is
+#: ``KEEPS``. Where names do not matter all are sorted.
 State = tuple[ModelRobot, ...]
+KEEPS = -1_000
 
 
 class ModelMove(NamedTuple):
@@ -56,18 +58,41 @@ class GraphModel:
 
     def is_over(self, state: State) -> bool:
         """Whether all have come to their goals."""
-        return all(robot.start == ARRIVED for robot in state)
+        return all(robot.start in (ARRIVED, KEEPS) for robot in state)
 
     def moves(self, state: State) -> list[tuple[ModelMove, State]]:
         """Everything that can happen next, each with the state after it; no robot changes its place in the tuple."""
         on_edges = {edge(robot.start, robot.node): robot for robot in state if robot.start >= 0}
         found: list[tuple[ModelMove, State]] = []
         for number, robot in enumerate(state):
-            if robot.start != ARRIVED:
+            if robot.start not in (ARRIVED, KEEPS):
                 step = self._of_edge_and_node if self.rules is Rules.EDGE_AND_NODE else self._of_paper
                 for move, after in step(number, robot, state, on_edges):
-                    found.append((move, (*state[:number], after, *state[number + 1 :])))
+                    following = (*state[:number], after, *state[number + 1 :])
+                    if self.rules is Rules.KEEP_ON_NOTICE:
+                        following = self._noticed(robot, after, following)
+                    found.append((move, following))
         return found
+
+    # --- what nodes keep by notices (row G21, G22) -------------------------------------------------------------
+
+    def _noticed(self, before: ModelRobot, after: ModelRobot, state: State) -> State:
+        """What nodes keep once a robot has gone on: of the edge ahead its far end is told, and of the one behind."""
+        kept = {(one.node, one.goal) for one in state if one.start == KEEPS}
+        if after.start >= 0:
+            kept.discard((after.start, after.node))
+            taken = {edge(one.start, one.node) for one in state if one.start >= 0} | {edge(*one) for one in kept}
+            last = kept_edge(self.graph, taken, after.node)
+            if last is not None:
+                kept.add((after.node, last))
+        if before.start >= 0:
+            kept = {one for one in kept if one[0] != before.start}
+        robots = (one for one in state if one.start != KEEPS)
+        return (*robots, *(ModelRobot(KEEPS, *one) for one in sorted(kept)))
+
+    def _is_kept(self, state: State, node: int, other: int) -> bool:
+        """Whether the far end of an edge keeps it."""
+        return self.rules is Rules.KEEP_ON_NOTICE and ModelRobot(KEEPS, other, node) in state
 
     # --- robots that wait on edges -----------------------------------------------------------------------------
 
@@ -80,7 +105,7 @@ class GraphModel:
         wants = self.graph.next_node(start, node, goal)
         if wants is None:
             return []
-        if may_enter(self.graph, on_edges, node, wants, self.rules):
+        if may_enter(self.graph, on_edges, node, wants, self.rules) and not self._is_kept(state, node, wants):
             return [(ModelMove(number, "goes to", wants), ModelRobot(node, wants, goal))]
         other = on_edges.get(edge(node, wants))
         if other is None or start < 0 or not are_head_on(Heading(start, node, wants), self._heading(other)):
@@ -88,6 +113,7 @@ class GraphModel:
         return [
             (ModelMove(number, "is sent to", after), ModelRobot(node, after, goal))
             for after in other_edges(self.graph, on_edges, node, start, self.rules)
+            if not self._is_kept(state, node, after)
         ]
 
     def _heading(self, robot: ModelRobot) -> Heading:
