@@ -126,6 +126,13 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         metavar=("MEAN", "SIGMA"),
         help="cars at normal intervals of this mean and standard deviation, in seconds",
     )
+    demand.add_argument(
+        "--random-out",
+        nargs=2,
+        type=float,
+        metavar=("MEAN", "SIGMA"),
+        help="with --random: intervals at which cars are fetched (default: as they come)",
+    )
     demand.add_argument("--cars", type=int, default=50, metavar="N", help="number of cars with --random (default: 50)")
     _add_when(run.add_argument_group("which part of the day (default: all of it where a site is named)"))
     how = run.add_argument_group("how it runs")

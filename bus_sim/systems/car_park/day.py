@@ -36,7 +36,9 @@ class ParkingDay:
     day: str | None = None
     stalls: tuple[str, ...] = ()
     one_car_s: float | None = None
+    #: Mean and deviation of the intervals of arrivals; of departures too, unless ``random_out_s`` tells them.
     random_s: tuple[float, float] | None = None
+    random_out_s: tuple[float, float] | None = None
     cars: int = 50
     window: str | None = None
     #: Of what was before the window only who is still inside is played, shortly before it.
@@ -56,7 +58,7 @@ def choose_demand(day: ParkingDay, site: Site | None = None, seed: int = 1) -> D
     if day.one_car_s is not None:
         return Demand.one_car(stay_s=day.one_car_s, seed=seed)
     if day.random_s is not None:
-        return Demand.by_mean(*day.random_s, seed, count=day.cars)
+        return Demand.by_mean(*day.random_s, seed, count=day.cars, out=day.random_out_s)
     first, last = _days(day.day)
     if day.counts is not None:
         return Demand.from_counts(day.counts, day=first, until=last, seed=seed, form=day.form, inside=day.inside)
@@ -130,6 +132,7 @@ def asked_day(args: Namespace, *, live: bool) -> ParkingDay:
         stalls=tuple(name for name in args.stalls.split(",") if name),
         one_car_s=args.one_car,
         random_s=tuple(args.random) if args.random is not None else None,
+        random_out_s=tuple(args.random_out) if args.random_out is not None else None,
         cars=args.cars,
         window=window,
         short_eve=True,
@@ -166,9 +169,12 @@ def _check_numbers(args: Namespace) -> None:
         raise DemandError(f"--one-car {args.one_car:g}: must be seconds, 0 or more")
     if args.cars < 0:
         raise DemandError(f"--cars {args.cars}: must be 0 or more")
-    if args.random is not None and not (args.random[0] > 0 and args.random[1] >= 0):
-        mean, sigma = args.random
-        raise DemandError(f"--random {mean:g} {sigma:g}: the mean must be above 0 s, the deviation 0 s or more")
+    for option, law in (("--random", args.random), ("--random-out", args.random_out)):
+        if law is not None and not (law[0] > 0 and law[1] >= 0):
+            mean, sigma = law
+            raise DemandError(f"{option} {mean:g} {sigma:g}: the mean must be above 0 s, the deviation 0 s or more")
+    if args.random_out is not None and args.random is None:
+        raise DemandError("--random-out: departures alone; say with --random how cars arrive")
 
 
 def _window(args: Namespace, *, live: bool) -> str | None:
