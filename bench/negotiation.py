@@ -9,15 +9,19 @@ Counted per call, from the call to the winner's firm itinerary: bids; messages (
 are one message each); frames on the bus, where a call is three and an itinerary, which comes with the award, one more
 than its legs. "ms to winner" is from the call to the moment at which the winner knows; "in vain" are bids that were no
 better than one before them on the wire; "best" is how often the cheapest bidder, and nobody else, won.
+
+A third table is of frames that single receivers miss: how many calls in a hundred end with two winners, with none, and
+with one whom the initiator does not know, with the award and without (row P11).
 """
 
 import asyncio
 import random
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+from bus_sim.can.faults import FaultKind, InjectedFault
 from bus_sim.can.medium import Medium
 from bus_sim.can.node import NodeOptions, SimulatedBus
 from bus_sim.systems.car_park.baselines.contract_net import ContractNetInitiator, ContractNetParticipant
@@ -29,6 +33,8 @@ from onboard.core.effects import Effect, Send
 from onboard.core.frame import Frame
 from onboard.core.negotiation import (
     Awarded,
+    AwardedAgain,
+    CallKey,
     Closed,
     DelayRule,
     Negotiation,
@@ -57,6 +63,9 @@ FIRST_ROBOT = 11
 PROCESSING_US = 100
 SLOWER_US = (0, 1_000, 5_000, 20_000)
 SLOWER_FLEET = 20
+#: Share of frames that each receiver misses by itself, in the third table.
+LOSSES = (0.0, 0.001, 0.01, 0.02, 0.05, 0.1)
+LOSSY_FLEET = 10
 #: From the deadline to the first motion, and the work at both ends without the way between them, us.
 START_US, WORK_US = 150_000, 30_000_000
 
@@ -125,6 +134,24 @@ class Tally:
     crossed: int = 0
     latency_us: int = 0
     winners: list[int] = field(default_factory=list)
+    #: By task: who acts as its winner, and whom the initiator takes for it.
+    acting: dict[Reference, set[int]] = field(default_factory=dict)
+    named: dict[Reference, int] = field(default_factory=dict)
+
+    @property
+    def doubled(self) -> int:
+        """Calls with two winners or more."""
+        return sum(len(nodes) > 1 for nodes in self.acting.values())
+
+    @property
+    def unserved(self) -> int:
+        """Calls without a winner to the end."""
+        return self.calls - len(self.acting)
+
+    @property
+    def misnamed(self) -> int:
+        """Calls with one winner, who is not the one whom the initiator named."""
+        return sum(len(nodes) == 1 and self.named.get(task) not in nodes for task, nodes in self.acting.items())
 
 
 class Node:
@@ -135,6 +162,7 @@ class Node:
         self.robot: IdleRobot | None = None
         self.closed: Closed | None = None
         self._standing: Bid | None = None
+        self._plans: dict[CallKey, Itinerary] = {}
         self._loop, self._tally = loop, tally
         self._bus = bus
         self._decoder = Decoder(fleet_codec())
@@ -148,10 +176,15 @@ class Node:
                     self._say(message)
                 case Awarded() if self.robot is not None:
                     self._tally.winners.append(self.robot.node_id)
+                    self._tally.acting.setdefault(item.call.task, set()).add(self.robot.node_id)
                     self._tally.latency_us += now_us
-                    self._say(self.robot.firm(item))
+                    self._plans[item.call_key] = self.robot.firm(item)
+                    self._say(self._plans[item.call_key])
+                case AwardedAgain(call_key=key):
+                    self._say(self._plans[key])
                 case Closed():
                     self.closed = item
+                    self._tally.named[item.call.task] = item.winner
         self._set_timer()
 
     def _say(self, message: Message) -> None:
@@ -208,7 +241,7 @@ def mip(silent: bool = False, delay: Callable[[int], DelayRule] | None = None) -
         kind = KindCode.COMPARTMENT if node_id == INITIATOR else KindCode.ROBOT
         rule = delay(node_id) if delay is not None else better_bids_sooner
         slot = slot_of(site, node_id)
-        return Negotiation(node_id, kind, site.timing, robot, silent=silent, delay=rule, slot=slot)
+        return Negotiation(node_id, kind, replace(site.timing, silent=silent), robot, delay=rule, slot=slot)
 
     return make
 
@@ -242,12 +275,13 @@ def alley(robots: int) -> WaySite:
     return way_site(parse_site(text, "bench", crowded=True))  # they negotiate and do not drive
 
 
-async def _measure(maker: Maker, site: WaySite, calls: int, seed: int, processing_us: int) -> Tally:
+async def _measure(maker: Maker, site: WaySite, calls: int, seed: int, processing_us: int, loss: float = 0.0) -> Tally:
     loop = asyncio.get_running_loop()
     if not isinstance(loop, VirtualTimeLoop):
         raise TypeError("to be run in virtual time")
     tally, chance = Tally(), random.Random(seed)  # chance in a simulation, not a secret
-    medium = Medium(loop, bit_rate=site.bitrate)
+    lost = InjectedFault(FaultKind.OMISSION, probability=loss, seed=seed)
+    medium = Medium(loop, bit_rate=site.bitrate, faults=(lost,) if loss else ())
     robots = {m.node_id: IdleRobot(site, m.node_id) for m in site.machines.values() if m.kind is KindCode.ROBOT}
     fleet = frozenset(robots)
     options = NodeOptions(processing_us=processing_us)
@@ -267,6 +301,9 @@ async def _measure(maker: Maker, site: WaySite, calls: int, seed: int, processin
         await _call(caller, robots, tally, site, number + 1, chance)
         # Over before the next: every deadline has passed, every frame has left.
         await asyncio.sleep(2 * site.timing.call_window_us / 1e6)
+    if loss:
+        # What was lost is said again, more and more slowly.
+        await asyncio.sleep(60)
     tally.calls = calls
     tally.frames = medium.statistics().frames
     return tally
@@ -299,10 +336,15 @@ async def _call(
 
 
 def measure(
-    maker: Maker, robots: int, calls: int = CALLS, seed: int = SEED, processing_us: int = PROCESSING_US
+    maker: Maker,
+    robots: int,
+    calls: int = CALLS,
+    seed: int = SEED,
+    processing_us: int = PROCESSING_US,
+    loss: float = 0.0,
 ) -> Tally:
-    """One row of the table, in virtual time."""
-    return run(_measure(maker, alley(robots), calls, seed, processing_us))
+    """One row of the table, in virtual time; ``loss`` is the share of frames that each receiver misses."""
+    return run(_measure(maker, alley(robots), calls, seed, processing_us, loss))
 
 
 def _print_protocols(calls: int) -> None:
@@ -318,6 +360,18 @@ def _print_protocols(calls: int) -> None:
                 f"{robots:>6} {name:<18} {tally.bids / calls:>9.2f} {tally.messages / calls:>13.2f} "
                 f"{tally.frames / calls:>11.2f} {latency_ms:>12.1f} {tally.crossed:>8} {tally.best_won / calls:>6.0%}"
             )
+
+
+def _print_losses(calls: int) -> None:
+    print(
+        f"\n{LOSSY_FLEET} robots, frames missed by single receivers, calls in a hundred\n\n"
+        f"{'missed':>7} {'protocol':<12} {'two winners':>11} {'none':>6} {'not the one named':>18}"
+    )
+    for loss in LOSSES:
+        for name in ("MIP", "MIP, silent"):
+            tally = measure(PROTOCOLS[name], LOSSY_FLEET, calls, loss=loss)
+            double, none, misnamed = (100 * one / calls for one in (tally.doubled, tally.unserved, tally.misnamed))
+            print(f"{loss:>7.1%} {name:<12} {double:>11.1f} {none:>6.1f} {misnamed:>18.1f}")
 
 
 def _print_slower_boards(calls: int) -> None:
@@ -341,6 +395,7 @@ def main() -> None:
     )
     _print_protocols(calls)
     _print_slower_boards(calls)
+    _print_losses(calls)
 
 
 if __name__ == "__main__":

@@ -46,6 +46,7 @@ def read_timing(table: TomlTable, robots: int, machines: int, bitrate: int) -> D
         table.integer("heartbeat_ms", 100, 60_000, 2_000) * 1000,
         table.integer("bus_time_ms", 100, 60_000, 5_000) * 1000,
         table.integer("drive_refresh_ms", 10, 450, 200) * 1000,
+        silent=table.choice("award", ["said", "silent"], "said") == "silent",
         door_us=table.integer("door_ms", 100, 60_000, 3_000) * 1000,
         grip_us=table.integer("grip_ms", 100, 60_000, 2_000) * 1000,
     )

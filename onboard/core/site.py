@@ -83,6 +83,8 @@ class Timing:
     drive_refresh_us: int
     #: Share of the time left for a bid that its sub-calls may take, per cent.
     sub_call_percent: int = 50
+    #: Nobody says awards: at the deadline the best bid that was heard has won (row P11).
+    silent: bool = False
 
 
 class MotionNeeds(Enum):

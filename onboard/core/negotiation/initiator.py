@@ -123,7 +123,6 @@ class Initiator:
     timing: Timing
     policy: RestartPolicy
     number: Callable[[], int]
-    silent: bool = False
     counters: Counters = field(default_factory=Counters)
     trust: Trust = field(default_factory=Trust)
     #: Whether a node's bids count for nothing, because it is in the way by its own word or by its silence.
@@ -299,7 +298,9 @@ class Initiator:
 
     def decide(self, now_us: int) -> Outcome:
         """The best bid has won; in the silent form everybody is taken to know that."""
-        return self._fire(InitiatorEvent.HEARD, now_us) if self.silent else self.award(now_us)
+        if self.timing.silent and not self.is_round:
+            return self._fire(InitiatorEvent.HEARD, now_us)
+        return self.award(now_us)
 
     def award(self, now_us: int) -> Outcome:
         """Say who has won.

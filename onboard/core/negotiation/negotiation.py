@@ -36,7 +36,7 @@ def never(call: CallForProposals) -> bool:
 
 @dataclass
 class Negotiation:
-    """Participants by call, initiators by own call number. ``silent`` is the award-free form, for comparison only.
+    """Participants by call, initiators by own call number.
 
     ``boot``, 0 to 255, begins the call numbers, so that a machine that starts again does not use those of a moment
     ago. ``delay`` and ``slot`` say when to speak; without a slot, bids that are ready at one moment may cross.
@@ -46,7 +46,6 @@ class Negotiation:
     kind: KindCode
     timing: Timing
     estimator: Estimator
-    silent: bool = False
     policy: RestartPolicy = field(default_factory=RestartPolicy)
     counters: Counters = field(default_factory=Counters)
     participants: dict[CallKey, Participant] = field(default_factory=dict)
@@ -79,7 +78,6 @@ class Negotiation:
             self.timing,
             self.policy,
             self._next_call,
-            self.silent,
             self.counters,
             self.trust,
             self.is_obstacle,
@@ -186,6 +184,8 @@ class Negotiation:
         """Take part in a call that stands, in a round from its begin to its end; ``heard`` are its bids so far."""
         since_us, until_us = round_us
         participant = self._participant(call, until_us, now_us)
+        # Who wins a round is what its initiator makes of all its calls: that has to be said.
+        participant.timing = replace(participant.timing, silent=False)
         self.participants[participant.key] = participant
         # Released and awarded calls are told as ever; before the first bid there is nothing to tell.
         participant.open(since_us)
@@ -234,7 +234,6 @@ class Negotiation:
             self.timing,
             self.policy,
             lambda: call,
-            False,
             self.counters,
             self.trust,
             self.is_obstacle,
@@ -284,7 +283,6 @@ class Negotiation:
             self._timing_of(call, deadline_us - now_us),
             self.estimator,
             self.counters,
-            self.silent,
             deadline_us,
             SubCalls(call, deadline_us, self.timing, partial(self._open_sub_call, left_out)),
             self.delay,

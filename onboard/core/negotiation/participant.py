@@ -91,7 +91,6 @@ class Participant:
     timing: Timing
     estimator: Estimator
     counters: Counters
-    silent: bool
     deadline_us: int
     subs: SubCalls
     delay: DelayRule = delay_us
@@ -302,7 +301,7 @@ class Participant:
 
     def believe(self, now_us: int) -> Outcome:
         """The deadline passed with my bid best. I may prepare; I act only on the award (but in the silent form)."""
-        if self.silent and not self.call.hold_ms:
+        if self.timing.silent and not self.call.hold_ms:
             return self._fire(ParticipantEvent.AWARD_ME, now_us)
         self.counters.beliefs_without_award += 1
         return []

@@ -9,7 +9,7 @@ so every run crosses the wrap.
 import heapq
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from onboard.contract.codes import Criterion, Grade, KindCode, Operation, Reason
 from onboard.contract.messages import Award, Bid, CallForProposals, Itinerary, Message, Reference, Stamp
@@ -142,7 +142,7 @@ class Machine:
         if isinstance(costs, Costs):
             costs.node = node_id
         self.node_id = node_id
-        self.negotiation = Negotiation(node_id, kind, TIMING, costs, silent=silent, slot=slot)
+        self.negotiation = Negotiation(node_id, kind, replace(TIMING, silent=silent), costs, slot=slot)
         self.committed: set[CallKey] = set()
         self.assigned: list[CallForProposals] = []
         self.parts: list[tuple[SubCallAnswer, ...]] = []
