@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from bus_sim.systems.car_park.compare.free_flow import Acts, FreeFlow
+from bus_sim.systems.car_park.bounds.free_flow import Acts, FreeFlow
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.plant.customer import REACTION_US
 from onboard.contract.codes import KindCode
