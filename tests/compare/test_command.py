@@ -37,7 +37,7 @@ def test_a_window_of_a_day_counts_only_its_own_customers(tmp_path: Path, capsys:
     [
         (["--seeds", "5-1"], "first and last such as 1-5"),
         (["--seeds", "one"], "first and last such as 1-5"),
-        (["--parts", "nights"], "some of random, day, small"),
+        (["--parts", "nights"], "some of random, day, small, stored"),
         (["--parts", "random", "--random", "0", "1"], "must be above 0"),
     ],
 )
