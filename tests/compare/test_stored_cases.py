@@ -9,7 +9,7 @@ import pytest
 from bus_sim.cli import main
 from bus_sim.systems.car_park.compare import stored_cases as module
 from bus_sim.systems.car_park.compare.optimum import is_available, least_waiting_ms
-from bus_sim.systems.car_park.compare.plans import Planner, Situation
+from bus_sim.systems.car_park.compare.plans import CasePlanner, Situation
 from bus_sim.systems.car_park.compare.resolved import resolved_waiting_ms
 from bus_sim.systems.car_park.compare.small_case import Case
 from bus_sim.systems.car_park.compare.stored_cases import AIM, GapTable, StoredCase, as_text, stored_cases
@@ -56,13 +56,13 @@ def test_the_gap_of_who_negotiate_is_within_the_aim(capsys: pytest.CaptureFixtur
 @pytest.mark.parametrize("one", QUICK[:3], ids=lambda one: one.name)
 def test_the_plans_are_as_good_as_those_of_cp_sat(one: StoredCase) -> None:
     case = first_cars(one.case, 2)
-    assert Planner(case).best(Situation.of(case))[0] == least_waiting_ms(case)
+    assert CasePlanner(case).best(Situation.of(case))[0] == least_waiting_ms(case)
 
 
 def test_who_knows_all_that_will_be_has_no_gap() -> None:
     """One car: nothing can be known beforehand but that it comes, and where it is fetched from."""
     case = first_cars(CASES[0].case, 1)
-    alone_ms = Planner(case).best(Situation.of(case))[0]
+    alone_ms = CasePlanner(case).best(Situation.of(case))[0]
     near_ms = resolved_waiting_ms(case) - alone_ms
     assert 0 <= near_ms <= max(map(max, case.way_ms))
 

@@ -38,7 +38,7 @@ class BayVisit(NamedTuple):
 
 
 @dataclass
-class _Seen:
+class _SeenVisit:
     """Of one customer: the bay driven into; and when asking for the car, its place, and whether a robot carried it."""
 
     came_to: Station | None = None
@@ -52,7 +52,7 @@ class VisitLog:
     def __init__(self, plant: Plant, seed: int) -> None:
         self._plant = plant
         self._seed = seed
-        self._seen: dict[Customer, _Seen] = {}
+        self._seen: dict[Customer, _SeenVisit] = {}
         #: When each car, by its name, was last taken aboard wholly: its shuttle home.
         self._carried_us: dict[str, int] = {}
         plant.street.watch(self._on_step)
@@ -62,7 +62,7 @@ class VisitLog:
         """Of all who have their ticket, or their car, those who came, or asked, at a loop time (us) that counts."""
         found: list[BayVisit] = []
         for customer in self._plant.street.customers:
-            visit, seen = customer.visit, self._seen.get(customer, _Seen())
+            visit, seen = customer.visit, self._seen.get(customer, _SeenVisit())
             acts, carried_us = Acts.of(customer.stay, self._seed), self._carried_us.get(customer.stay.car.name)
             came_us, parked_us, asked_us, gone_us = visit.arrived_us, visit.parked_us, visit.asked_us, visit.gone_us
             if came_us is not None and parked_us is not None and seen.came_to is not None and counts(came_us):
@@ -78,7 +78,7 @@ class VisitLog:
         return found
 
     def _on_step(self, customer: Customer) -> None:
-        visit, now_us, seen = customer.visit, self._plant.timers.now_us(), self._seen.setdefault(customer, _Seen())
+        visit, now_us, seen = customer.visit, self._plant.timers.now_us(), self._seen.setdefault(customer, _SeenVisit())
         if customer.state is CustomerState.PARKED and visit.parked_us == now_us and customer.compartment is not None:
             seen.came_to = customer.compartment.body.station
         elif customer.state is CustomerState.AT_DESK and visit.asked_us == now_us:

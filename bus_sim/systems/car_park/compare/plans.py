@@ -125,7 +125,7 @@ class _Ahead(NamedTuple):
 
 
 @dataclass
-class Planner:
+class CasePlanner:
     """Plans of one case. ``is_tidy``: of plans with equal waiting the one whose robots are done first, all together.
 
     Who does not know who will ask would else put cars anywhere, as no place is worse for those who are known.

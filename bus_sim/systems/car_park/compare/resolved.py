@@ -8,7 +8,7 @@ words take none.
 
 from dataclasses import replace
 
-from bus_sim.systems.car_park.compare.plans import Planner, Robot, Service, Situation, after
+from bus_sim.systems.car_park.compare.plans import CasePlanner, Robot, Service, Situation, after
 from bus_sim.systems.car_park.compare.small_case import Case
 
 
@@ -33,7 +33,7 @@ class _Day:
         """All plans one after the other."""
         while self._comes or self._asks:
             self._hear(min([*self._comes.values(), *self._asks.values()]))
-            _, plan = Planner(self._known, is_tidy=True).best(self._now)
+            _, plan = CasePlanner(self._known, is_tidy=True).best(self._now)
             self._carry_out(plan)
         return self._waited_ms
 

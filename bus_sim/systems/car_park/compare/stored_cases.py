@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from importlib.resources import files
 from typing import NamedTuple
 
-from bus_sim.systems.car_park.compare.plans import Planner, Situation, after, fetch, park
+from bus_sim.systems.car_park.compare.plans import CasePlanner, Situation, after, fetch, park
 from bus_sim.systems.car_park.compare.resolved import resolved_waiting_ms
 from bus_sim.systems.car_park.compare.small_case import Case, Visitor, earliest_finish, play_case
 from onboard.core.site import Station
@@ -20,7 +20,7 @@ NAME = "small_cases.json"
 AIM = 1.10
 
 
-class Turn(NamedTuple):
+class BayTurn(NamedTuple):
     """One car at the bay, in or, the second time, out: the place, and the robot by its rank among all then."""
 
     car: int
@@ -37,7 +37,7 @@ class StoredCase:
     case: Case
     clairvoyant_ms: int
     resolved_ms: int
-    plan: tuple[Turn, ...]
+    plan: tuple[BayTurn, ...]
 
     @property
     def negotiated_ms(self) -> int:
@@ -71,10 +71,10 @@ class StoredCase:
     @classmethod
     def solved(cls, name: str, seed: int, case: Case) -> "StoredCase":
         """A case with its optima, proven. Raises ``PlanError`` where that takes too long."""
-        clairvoyant_ms, way = Planner(case).best(Situation.of(case))
+        clairvoyant_ms, way = CasePlanner(case).best(Situation.of(case))
         now, plan = Situation.of(case), []
         for service in way:
-            plan.append(Turn(service.car, service.place, now.robots.index(service.robot)))
+            plan.append(BayTurn(service.car, service.place, now.robots.index(service.robot)))
             now = after(case, now, service)
         return cls(name, seed, case, clairvoyant_ms, resolved_waiting_ms(case), tuple(plan))
 
@@ -98,7 +98,7 @@ def stored_cases() -> tuple[StoredCase, ...]:
                 tuple(tuple(row) for row in layout["way_ms"]),
                 *(layout[name] for name in ("close_ms", "open_ms", "handle_ms", "react_ms")),
             )
-            plan = tuple(Turn(*turn) for turn in one["plan"])
+            plan = tuple(BayTurn(*turn) for turn in one["plan"])
             name = f"{kind}, seed {one['seed']}"
             found.append(StoredCase(name, one["seed"], case, one["clairvoyant_ms"], one["resolved_ms"], plan))
     return tuple(found)
