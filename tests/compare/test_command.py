@@ -7,7 +7,6 @@ import pytest
 
 from bus_sim.cli import main
 from bus_sim.systems.car_park.compare.plays import POLICIES
-from bus_sim.systems.car_park.compare.table import BOUND
 
 
 def test_p56_one_command_makes_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -16,11 +15,11 @@ def test_p56_one_command_makes_the_table(tmp_path: Path, capsys: pytest.CaptureF
     assert main(["compare", "small", *words]) == 0
     out = capsys.readouterr().out
     lines = [line for line in out.splitlines() if line.startswith("| ")]
-    assert [line.split(" | ")[0].removeprefix("| ") for line in lines[1:]] == [*POLICIES, BOUND]
+    assert [line.split(" | ")[0].removeprefix("| ") for line in lines[1:]] == [*POLICIES]
     rows = json.loads(told.read_text(encoding="utf-8"))["random"]["rows"]
-    assert [row["policy"] for row in rows] == [*POLICIES, BOUND]
-    assert all(row["to_bound"] >= 1 for row in rows)
-    assert all(0 < row["empty_share"] < 1 and row["messages_per_task"] > 0 for row in rows[:-1])
+    assert [row["policy"] for row in rows] == [*POLICIES]
+    assert all(row["to_bays_alone"] >= 1 and row["to_free_flow"] >= 1 for row in rows)
+    assert all(0 < row["empty_share"] < 1 and row["messages_per_task"] > 0 for row in rows)
 
 
 def test_a_window_of_a_day_counts_only_its_own_customers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -30,7 +29,7 @@ def test_a_window_of_a_day_counts_only_its_own_customers(tmp_path: Path, capsys:
     assert main(["compare", "level1", *options]) == 0
     assert "level1: 2019-07-24 05:40 to 06:00" in capsys.readouterr().out
     rows = json.loads(told.read_text(encoding="utf-8"))["day"]["rows"]
-    assert [row["wait_in"]["count"] for row in rows] == [2] * (len(POLICIES) + 1)
+    assert [row["wait_in"]["count"] for row in rows] == [2] * len(POLICIES)
 
 
 @pytest.mark.parametrize(
@@ -38,7 +37,7 @@ def test_a_window_of_a_day_counts_only_its_own_customers(tmp_path: Path, capsys:
     [
         (["--seeds", "5-1"], "first and last such as 1-5"),
         (["--seeds", "one"], "first and last such as 1-5"),
-        (["--parts", "nights"], "some of random, day, small"),
+        (["--parts", "nights"], "some of random, day, small, stored"),
         (["--parts", "random", "--random", "0", "1"], "must be above 0"),
     ],
 )

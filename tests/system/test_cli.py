@@ -77,6 +77,7 @@ def test_the_real_day_serves_everybody(tmp_path: Path, capsys: pytest.CaptureFix
     assert f"cars         {cars}" in shown and "refused: full 0, too large 0" in shown
     assert "opened again 0   refused 0" in shown
     assert "waiting out  nobody" in shown or is_long()
+    assert "at least: bays alone " in shown and " times)   free flow " in shown
     assert "HALTED" not in shown and "VIOLATION" not in shown
 
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from bus_sim.systems.car_park.bay_times import BayTimes
+from bus_sim.systems.car_park.bounds.visits import VisitLog
+from bus_sim.systems.car_park.bounds.waiting import WaitBounds
 from bus_sim.systems.car_park.by_hand import ByHand
 from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.plant.bodies import random_car
@@ -75,6 +77,7 @@ class CarParkStage(SystemStage[Plant]):
         self._clock = DayClock(coming.zero)
         self._indicators = Indicators(run.site)
         self._bays = BayTimes(run.plant)
+        self._visits = VisitLog(run.plant, run.options.seed)
         self._hurried: list[Customer] = []
 
     # --- how it stands -----------------------------------------------------------------------------------------
@@ -224,6 +227,7 @@ class CarParkStage(SystemStage[Plant]):
             unserved=unserved(street),
             wait_in=Durations.of(street.in_wait_us),
             wait_out=Durations.of(street.out_wait_us),
+            bounds=self._bounds(ended),
             burst=self._burst(ended),
             fleet=fleet,
             bays=self._bays.figures(),
@@ -237,6 +241,10 @@ class CarParkStage(SystemStage[Plant]):
             halted=(*self.halted, *ended.failures),
             trace=str(trace) if trace is not None else None,
         )
+
+    def _bounds(self, ended: EndedRun) -> WaitBounds:
+        visits = self._visits.visits(lambda moment_us: moment_us >= ended.begin_us)
+        return WaitBounds.of(way_site(self.run.site), visits)
 
     def _played(self, ended: EndedRun) -> str | None:
         """What of the window the figures are of, as far as it was played; None for a whole run."""

@@ -5,6 +5,7 @@ from textwrap import wrap
 
 from bus_sim.can.statistics import BusStatistics
 from bus_sim.systems.car_park.bay_times import BayFigures, bay_lines
+from bus_sim.systems.car_park.bounds.waiting import WaitBounds
 from bus_sim.systems.car_park.plant.street import StreetSummary
 from onboard.trace.durations import Durations
 from onboard.trace.indicators import FleetIndicators
@@ -27,8 +28,8 @@ class BurstFigures:
 class RunSummary:
     """All figures of one run, or of its window alone. Loads are fractions of the bit rate, times are in s.
 
-    ``fleet`` is what the bus tells; cars, refusals, waiting and ``bays`` are what the plant saw. Who still waits at
-    the end is in ``unserved`` and not in the waiting times.
+    ``fleet`` is what the bus tells; cars, refusals, waiting and ``bays`` are what the plant saw. Who still waits at the
+    end is in ``unserved`` and not in the waiting times, nor in their ``bounds``.
     """
 
     site: str
@@ -45,6 +46,7 @@ class RunSummary:
     unserved: int
     wait_in: Durations
     wait_out: Durations
+    bounds: WaitBounds
     burst: BurstFigures | None
     fleet: FleetIndicators
     bays: tuple[BayFigures, ...]
@@ -103,6 +105,8 @@ class RunSummary:
             f"waiting in   {self.wait_in}",
             f"waiting out  {self.wait_out}",
         ]
+        if self.bounds.visits:
+            text.append(f"all waiting  {self.bounds.line()}")
         burst = self.burst
         if burst is not None and burst.count > 1:
             text.append(

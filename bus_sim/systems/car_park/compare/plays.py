@@ -2,11 +2,13 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from bus_sim.options import RunOptions
 from bus_sim.run import run_until
+from bus_sim.systems.car_park.bounds.visits import VisitLog
+from bus_sim.systems.car_park.bounds.waiting import WaitBounds
 from bus_sim.systems.car_park.compare import obedience
 from bus_sim.systems.car_park.compare.dispatcher import Dispatcher
 from bus_sim.systems.car_park.compare.policies import AnyFirst, JointChoice, NearestFirst, Policy
@@ -17,6 +19,7 @@ from bus_sim.systems.car_park.window import DayWindow
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.site import Site
 from onboard.trace.indicators import Indicators
+from onboard.ways.site import way_site
 
 MIP = "MIP, nobody in charge"
 #: All policies that can be played, by name; None is our protocol. The joint choice is what others are compared with.
@@ -41,7 +44,7 @@ class Play:
     """What came of it: waiting times in us, ``left`` customers still waiting at the end, and the bus's figures.
 
     ``parked_us`` and ``gone_us`` are when the customers of ``in_us`` and ``out_us`` were through, in the demand's time;
-    ``refused`` those who were sent away.
+    ``refused`` those who were sent away; ``bounds`` what all were to wait at least.
     """
 
     policy: str
@@ -58,6 +61,7 @@ class Play:
     parked_us: tuple[int, ...] = ()
     gone_us: tuple[int, ...] = ()
     refused: int = 0
+    bounds: WaitBounds = field(default_factory=WaitBounds)
 
 
 def play(site: Site, demand: Demand, policy: str, seed: int, window: DayWindow | None = None) -> Play:
@@ -99,6 +103,7 @@ class _Run:
         self._indicators = Indicators(site)
         self._simulation = build(site, RunOptions(seed=seed), loop)
         self._simulation.observers.append(self._indicators.feed)
+        self._visits = VisitLog(self._simulation.plant, seed)
 
     async def play(self) -> Play:
         """The whole run."""
@@ -173,6 +178,7 @@ class _Run:
             tuple(one.parked_us - self._origin_us for one in parked if one.parked_us is not None),
             tuple(one.gone_us - self._origin_us for one in served if one.gone_us is not None),
             sum(one.outcome in _SENT_AWAY for one in visits),
+            WaitBounds.of(way_site(simulation.site), self._visits.visits(self._counts)),
         )
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from bus_sim.systems.car_park.compare.free_flow import Acts, FreeFlow
+from bus_sim.systems.car_park.bounds.free_flow import Acts, FreeFlow
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.plant.customer import REACTION_US
 from onboard.contract.codes import KindCode
@@ -128,13 +128,17 @@ class _CaseState:
     taken_until: dict[int, int | None] = field(default_factory=dict)
     parked_ms: dict[int, int] = field(default_factory=dict)
     bay_ms: int = 0
+    #: From when on who is served next is called for, where that is done ahead.
+    looks_ms: int = 0
     waited_ms: list[int] = field(default_factory=list)
 
 
-def play_case(case: Case, rule: Rule) -> int:
+def play_case(case: Case, rule: Rule, *, ahead: bool = False) -> int:
     """The customers' total waiting (ms) where each task is given by ``rule`` when the compartment tells it.
 
-    The bay serves as the compartment does: a ticket whose car is stored first, then whoever came first.
+    The bay serves as the compartment does: a ticket whose car is stored first, then whoever came first. It tells a task
+    with the key, and once the bay is locked; ``ahead`` (``call_at = "arrival"``) as somebody drives in, and the next
+    car while the bay works. A robot that is there then waits for the lock.
     """
     state = _CaseState([(home, 0) for home in case.homes])
     coming = {number: one.arrival_ms for number, one in enumerate(case.visitors)}
@@ -145,19 +149,23 @@ def play_case(case: Case, rule: Rule) -> int:
             + [(max(at_ms, state.bay_ms), 1, number, False) for number, at_ms in coming.items()]
         )
         if fetch:
-            _fetch(case, state, rule, number, begin_ms, leaving.pop(number))
+            asked_ms = leaving.pop(number)
+            locked_ms = begin_ms + case.close_ms
+            told_ms = max(asked_ms, state.stored[number][1], state.looks_ms) if ahead else locked_ms
+            _fetch(case, state, rule, number, (asked_ms, min(told_ms, locked_ms), locked_ms))
         else:
-            _park(case, state, rule, number, begin_ms, coming.pop(number))
+            told_ms = begin_ms + case.react_ms + (0 if ahead else case.visitors[number].drive_in_ms)
+            _park(case, state, rule, number, (coming.pop(number), told_ms, begin_ms))
             departure_ms = case.visitors[number].departure_ms
             if departure_ms is not None:
                 leaving[number] = max(departure_ms, state.parked_ms[number])
     return sum(state.waited_ms)
 
 
-def _park(case: Case, state: _CaseState, rule: Rule, number: int, begin_ms: int, came_ms: int) -> None:
-    visitor = case.visitors[number]
-    told_ms = begin_ms + case.react_ms + visitor.drive_in_ms
-    out_ms = told_ms + visitor.walk_ms
+def _park(case: Case, state: _CaseState, rule: Rule, number: int, times_ms: tuple[int, int, int]) -> None:
+    """``times_ms``: when the driver came, his task is told, and the bay is his."""
+    visitor, (came_ms, told_ms, begin_ms) = case.visitors[number], times_ms
+    out_ms = begin_ms + case.react_ms + visitor.drive_in_ms + visitor.walk_ms
     ready_ms = out_ms + case.close_ms
     offers = []
     for robot, (here, free_ms) in enumerate(state.robots):
@@ -174,23 +182,25 @@ def _park(case: Case, state: _CaseState, rule: Rule, number: int, begin_ms: int,
     state.stored[number] = offer.place, offer.finish_ms
     state.taken_until[offer.place] = None
     state.parked_ms[number] = out_ms
+    state.looks_ms = told_ms
     state.bay_ms = offer.taken_ms + case.close_ms + case.open_ms
     state.waited_ms.append(out_ms - came_ms)
 
 
-def _fetch(case: Case, state: _CaseState, rule: Rule, number: int, begin_ms: int, asked_ms: int) -> None:
-    visitor = case.visitors[number]
+def _fetch(case: Case, state: _CaseState, rule: Rule, number: int, times_ms: tuple[int, int, int]) -> None:
+    """``times_ms``: when the car was asked for, its task is told, and the bay is locked."""
+    visitor, (asked_ms, told_ms, locked_ms) = case.visitors[number], times_ms
     place, stored_ms = state.stored[number]
-    told_ms = begin_ms + case.close_ms
     offers = []
     for robot, (here, free_ms) in enumerate(state.robots):
         way_ms = case.way_ms[here][place]
-        taken_ms = max(max(free_ms, told_ms) + way_ms, stored_ms) + case.handle_ms
+        taken_ms = max(max(free_ms, told_ms) + way_ms, stored_ms, locked_ms) + case.handle_ms
         finish_ms = taken_ms + case.way_ms[place][case.bay] + case.open_ms + case.handle_ms
         offers.append(TaskOffer(finish_ms, robot, place, taken_ms, way_ms, free_ms))
     offer = rule(offers, told_ms)
     state.robots[offer.robot] = case.bay, offer.finish_ms
     state.taken_until[place] = offer.taken_ms
+    state.looks_ms = offer.finish_ms + case.close_ms
     gone_ms = offer.finish_ms + case.close_ms + case.open_ms + case.react_ms + visitor.drive_out_ms
     state.bay_ms = gone_ms
     state.waited_ms.append(gone_ms - asked_ms)

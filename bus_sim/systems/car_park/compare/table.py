@@ -1,26 +1,25 @@
-"""The comparison as a table: one row for each policy and one for the bound, over all runs in which nobody got stuck."""
+"""The comparison as a table: one row for each policy with its own bounds, over all runs in which nobody got stuck."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
+from bus_sim.systems.car_park.bounds.waiting import WaitBounds
 from bus_sim.systems.car_park.compare.plays import Play
 from bus_sim.systems.car_park.compare.policies import JointChoice
 from onboard.trace.durations import Durations
 
-BOUND = "free-flow bound"
-
 
 @dataclass(frozen=True)
 class PolicyRow:
-    """One policy, or the bound, which has waiting times only. Waiting is of all visits together; shares are 0 to 1."""
+    """One policy. ``bounds`` are of all visits together, as they went under this policy; shares are 0 to 1."""
 
     policy: str
     wait_in: Durations
     wait_out: Durations
-    waiting_s: float
-    tasks_per_h: float | None = None
-    empty_share: float | None = None
-    messages_per_task: float | None = None
+    bounds: WaitBounds
+    tasks_per_h: float
+    empty_share: float
+    messages_per_task: float
 
 
 @dataclass(frozen=True)
@@ -33,9 +32,14 @@ class ComparisonTable:
     faults: tuple[str, ...]
 
     def to_json(self) -> dict[str, object]:
-        """Plain values for ``json.dump``, with the two ratios of each row."""
+        """Plain values for ``json.dump``, with the three ratios of each row."""
         rows = [
-            {**asdict(row), "to_joint_choice": self._ratio(row, JointChoice.name), "to_bound": self._ratio(row, BOUND)}
+            {
+                **asdict(row),
+                "to_joint_choice": self._to_joint_choice(row),
+                "to_bays_alone": row.bounds.to_bays_alone,
+                "to_free_flow": row.bounds.to_free_flow,
+            }
             for row in self.rows
         ]
         return {"title": self.title, "rows": rows, "left_out": self.left_out, "faults": self.faults}
@@ -46,36 +50,36 @@ class ComparisonTable:
             f"{self.title}",
             "",
             "| who decides | in: mean / 95 % / max, s | out: mean / 95 % / max, s | all: mean, s | to joint choice "
-            "| to bound | tasks/h | empty travel | messages a task |",
-            "|---|---|---|---|---|---|---|---|---|",
+            "| bays alone, s: times | free flow, s: times | tasks/h | empty travel | messages a task |",
+            "|---|---|---|---|---|---|---|---|---|---|",
         ]
         text += [self._line(row) for row in self.rows]
         text += ["", *(f"left out: {line}" for line in self.left_out)] if self.left_out else []
         return text + [f"FAULT {line}" for line in self.faults]
 
-    def _ratio(self, row: PolicyRow, name: str) -> float | None:
-        other = next((one for one in self.rows if one.policy == name), None)
-        return row.waiting_s / other.waiting_s if other is not None and other.waiting_s else None
+    def _to_joint_choice(self, row: PolicyRow) -> float | None:
+        other = next((one.bounds for one in self.rows if one.policy == JointChoice.name), None)
+        return row.bounds.waited_s / other.waited_s if other is not None and other.waited_s else None
 
     def _line(self, row: PolicyRow) -> str:
-        ratios = [self._ratio(row, name) for name in (JointChoice.name, BOUND)]
+        ratio, bounds = self._to_joint_choice(row), row.bounds
         cells = [
             row.policy,
             _waits(row.wait_in),
             _waits(row.wait_out),
-            f"{row.waiting_s:.1f}",
-            *("" if ratio is None else f"{ratio:.2f}" for ratio in ratios),
-            "" if row.tasks_per_h is None else f"{row.tasks_per_h:.1f}",
-            "" if row.empty_share is None else f"{row.empty_share:.0%}",
-            "" if row.messages_per_task is None else f"{row.messages_per_task:.0f}",
+            f"{bounds.waited_s:.1f}",
+            "" if ratio is None else f"{ratio:.2f}",
+            f"{bounds.bays_alone_s:.1f}: {bounds.to_bays_alone:.2f}",
+            f"{bounds.free_flow_s:.1f}: {bounds.to_free_flow:.2f}",
+            f"{row.tasks_per_h:.1f}",
+            f"{row.empty_share:.0%}",
+            f"{row.messages_per_task:.0f}",
         ]
         return f"| {' | '.join(cells)} |"
 
 
-def tabulate(
-    title: str, plays: Sequence[Play], bounds_us: dict[int, tuple[Sequence[int], Sequence[int]]]
-) -> ComparisonTable:
-    """All plays of one part as a table; ``bounds_us`` are the least waiting times in and out, by seed.
+def tabulate(title: str, plays: Sequence[Play]) -> ComparisonTable:
+    """All plays of one part as a table.
 
     A seed with a policy under which customers are still waiting at the end is left out for all: their waiting would
     be missing.
@@ -84,10 +88,6 @@ def tabulate(
     dropped = {one.seed for one in stuck}
     kept = [one for one in plays if one.seed not in dropped]
     rows = [_row(policy, [one for one in kept if one.policy == policy]) for policy in dict.fromkeys(_names(plays))]
-    least = [bounds for seed, bounds in bounds_us.items() if seed not in dropped]
-    least_in_us = [time_us for ins_us, _ in least for time_us in ins_us]
-    least_out_us = [time_us for _, outs_us in least for time_us in outs_us]
-    rows.append(_bare(BOUND, least_in_us, least_out_us))
     return ComparisonTable(
         title,
         tuple(rows),
@@ -100,20 +100,15 @@ def _names(plays: Sequence[Play]) -> list[str]:
     return [one.policy for one in plays]
 
 
-def _bare(policy: str, in_us: Sequence[int], out_us: Sequence[int]) -> PolicyRow:
-    return PolicyRow(policy, Durations.of(in_us), Durations.of(out_us), Durations.of([*in_us, *out_us]).mean_s)
-
-
 def _row(policy: str, plays: Sequence[Play]) -> PolicyRow:
-    bare = _bare(policy, [us for one in plays for us in one.in_us], [us for one in plays for us in one.out_us])
     tasks = sum(one.tasks for one in plays)
     hours = sum(one.seconds_s for one in plays) / 3600
     travel_mm = sum(one.travel_mm for one in plays)
     return PolicyRow(
         policy,
-        bare.wait_in,
-        bare.wait_out,
-        bare.waiting_s,
+        Durations.of([us for one in plays for us in one.in_us]),
+        Durations.of([us for one in plays for us in one.out_us]),
+        WaitBounds.over(one.bounds for one in plays),
         tasks / hours if hours else 0.0,
         sum(one.empty_mm for one in plays) / travel_mm if travel_mm else 0.0,
         sum(one.messages for one in plays) / tasks if tasks else 0.0,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from heapq import heappop, heappush
 
-from bus_sim.systems.car_park.compare.free_flow import Acts, FreeFlow
+from bus_sim.systems.car_park.bounds.free_flow import Acts, FreeFlow
 from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.design.fleet import FleetModel, ServedCall
 from bus_sim.systems.car_park.plant.customer import REACTION_US
