@@ -1,0 +1,140 @@
+"""What customers are promised: at the desk and on the bus, as first shown; and only where the site asks for it."""
+
+from dataclasses import replace
+from functools import cache
+
+from bus_sim.systems.car_park.promised import PromiseFigures, seen_of
+from onboard.contract.base import Reference
+from onboard.contract.car_park import Promise
+from onboard.contract.car_park_device import DeskPromise
+from onboard.contract.codes import DeskInput, DoorPosition, LightColour
+from onboard.contract.messages import (
+    BayState,
+    CarAt,
+    DeskEvent,
+    DoorState,
+    SyncRequest,
+    TicketRead,
+)
+from onboard.core.effects import Effect, Send, Tell
+from onboard.core.serial import to_bus_ms
+from onboard.holon.holon import Holon
+from onboard.systems.car_park.bay_generation import BayGeneration
+from onboard.systems.car_park.promises import LEAST_CYCLES, MOST_CYCLES, STEP_US, TOLD_US
+from onboard.systems.registry import factory_for
+from tests.sites import one_floor
+from tests.system.scene import Scene, play, stays
+
+PROMISING = replace(one_floor(), promises=True)
+BAY, ROBOT = 1, 11
+CAR, OTHER = Reference(BAY, 7), Reference(BAY, 8)
+
+
+@cache
+def three_who_ask() -> Scene:
+    """One asks alone, and later two at nearly the same time."""
+    return play(PROMISING, stays((0, 200), (100, 400), (300, 410)))
+
+
+def test_each_who_asks_is_told_once_at_the_desk_and_all_hear_the_same_on_the_bus() -> None:
+    scene = three_who_ask()
+    words, shown = scene.all(Promise, "fleet"), scene.all(DeskPromise)
+    assert len(words) == len({word.car for _, word in words}) == 3
+    first = {word.car: (time_us, word) for time_us, word in reversed(shown)}
+    for customer, (said_us, word) in zip(scene.simulation.plant.street.customers, words, strict=True):
+        read = customer.visit.promised
+        assert read is not None and customer.visit.asked_us is not None
+        assert 0 < read.read_us - customer.visit.asked_us < TOLD_US + 100_000
+        assert abs(read.read_us - said_us) < 50_000
+        assert abs(read.ready_us - word.ready_ms * 1_000) < 10_000 and read.spread_us == word.spread_ms * 1_000
+        assert word.car in first
+
+
+def test_the_car_of_who_asks_alone_is_there_when_it_was_promised() -> None:
+    visit = three_who_ask().simulation.plant.street.customers[0].visit
+    assert visit.promised is not None and visit.ready_us is not None
+    # Told with the award, of a robot that nobody is in the way of: the output door is all that is not known yet.
+    assert visit.promised.spread_us <= PROMISING.timing.door_us
+    assert abs(visit.ready_us - visit.promised.ready_us) <= visit.promised.spread_us
+
+
+def test_who_stands_behind_another_is_told_later_and_less_exactly() -> None:
+    second, third = (one.visit for one in three_who_ask().simulation.plant.street.customers[1:])
+    assert second.promised is not None and third.promised is not None
+    assert third.promised.ready_us > second.promised.ready_us + 20_000_000
+    assert third.promised.spread_us > second.promised.spread_us
+
+
+def test_the_run_s_summary_counts_what_was_promised_and_kept() -> None:
+    seen = seen_of(one.visit for one in three_who_ask().simulation.plant.street.customers)
+    figures = PromiseFigures.of(seen)
+    assert figures is not None and figures.count == 3
+    assert figures.kept == sum(abs(one.there_us - one.ready_us) <= one.spread_us for one in seen) / 3
+    assert "promised     3 customers" in figures.line()
+
+
+def test_nothing_is_promised_where_the_site_does_not_ask_for_it() -> None:
+    scene = play(one_floor(), stays((0, 100)), limit_s=400)
+    assert not scene.all(Promise) and not scene.all(DeskPromise)
+    assert scene.simulation.plant.street.customers[0].visit.promised is None
+
+
+class Desk:
+    """A compartment alone, which knows two cars at places, and no robot that bids."""
+
+    def __init__(self) -> None:
+        machine = PROMISING.machines[BAY]
+        self.holon, self.now_us = Holon(PROMISING, machine, factory_for(PROMISING, machine.kind), boot=1), 1_000
+        self.holon.start(0)
+        self.holon.tokens.trust()
+        for number, car in enumerate((CAR, OTHER)):
+            self.holon.receive(CarAt(ROBOT, car, PROMISING.places[number].number, 2, 2_700), self.now_us)
+        locked = DoorState(BAY, DoorPosition.OPEN, DoorPosition.LOCKED, LightColour.GREEN)
+        for state in (locked, BayState(BAY, 0, 0, 0, 0, False, False, 0)):
+            self.holon.sense(state, self.now_us)
+
+    def insert(self, sequence: int, car: Reference) -> list[Effect]:
+        read = [TicketRead(BAY, sequence, half, 0) for half in range(2)]
+        acts = (*read, DeskEvent(BAY, sequence, DeskInput.TICKET, car))
+        return [effect for one in acts for effect in self.holon.sense(one, self.now_us)]
+
+    def until(self, end_us: int) -> list[Effect]:
+        effects: list[Effect] = []
+        while (due_us := self.holon.next_wake()) is not None and due_us <= end_us:
+            self.now_us = max(self.now_us, due_us)
+            effects += self.holon.wake(self.now_us)
+        self.now_us = end_us
+        return effects
+
+
+def promises_in(effects: list[Effect]) -> list[Promise]:
+    return [one.message for one in effects if isinstance(one, Send) and isinstance(one.message, Promise)]
+
+
+def test_who_is_told_before_anything_is_known_is_told_by_the_site_s_own_constants_and_within_four_seconds() -> None:
+    desk = Desk()
+    asked_us = desk.now_us
+    said = desk.insert(1, CAR) + desk.insert(2, OTHER)
+    assert not promises_in(said + desk.until(asked_us + TOLD_US - 1))
+    told_us = asked_us + TOLD_US
+    effects = desk.until(told_us)
+    one, two = promises_in(effects)
+    assert (one.car, two.car) == (CAR, OTHER)
+    cycle_us = BayGeneration(PROMISING, PROMISING.machines[BAY], lambda _, now_us: now_us).cycle_us()
+    assert one.ready_ms + one.spread_ms == to_bus_ms(told_us + MOST_CYCLES * cycle_us)
+    early_us = told_us + LEAST_CYCLES * cycle_us - 1_000 * (one.ready_ms - one.spread_ms)
+    assert 0 <= early_us <= 2 * STEP_US, "to the early side it is rounded up"
+    assert two.ready_ms > one.ready_ms and two.spread_ms >= one.spread_ms
+    shown = [effect.message for effect in effects if isinstance(effect, Tell)]
+    assert [word.car for word in shown if isinstance(word, DeskPromise)] == [CAR, OTHER]
+
+
+def test_who_asks_what_others_know_hears_what_is_promised_and_customers_are_not_told_again() -> None:
+    desk = Desk()
+    desk.insert(1, CAR)
+    said = promises_in(desk.until(desk.now_us + TOLD_US))
+    desk.insert(2, CAR)
+    assert not promises_in(desk.until(desk.now_us + 3 * TOLD_US))
+    asked = desk.holon.receive(SyncRequest(ROBOT, 0, 0), desk.now_us)
+    again = promises_in(asked + desk.until(desk.now_us + 5_000_000))
+    assert said and again == said
