@@ -1,7 +1,10 @@
-"""What customers are promised: at the desk and on the bus, as first shown; and only where the site asks for it."""
+"""What customers are promised: at the desk, on the bus, on the page and over MQTT, as first shown; and only there."""
 
+import json
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 from bus_sim.systems.car_park.promised import PromiseFigures, seen_of
 from onboard.contract.base import Reference
@@ -13,15 +16,19 @@ from onboard.contract.messages import (
     CarAt,
     DeskEvent,
     DoorState,
+    Message,
     SyncRequest,
     TicketRead,
 )
 from onboard.core.effects import Effect, Send, Tell
 from onboard.core.serial import to_bus_ms
+from onboard.gateway.fleet import FleetTopics
+from onboard.gateway.settings import GatewaySettings
 from onboard.holon.holon import Holon
 from onboard.systems.car_park.bay_generation import BayGeneration
 from onboard.systems.car_park.promises import LEAST_CYCLES, MOST_CYCLES, STEP_US, TOLD_US
 from onboard.systems.registry import factory_for
+from onboard.web.picture import LivePicture
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays
 
@@ -34,6 +41,11 @@ CAR, OTHER = Reference(BAY, 7), Reference(BAY, 8)
 def three_who_ask() -> Scene:
     """One asks alone, and later two at nearly the same time."""
     return play(PROMISING, stays((0, 200), (100, 400), (300, 410)))
+
+
+def told() -> Iterator[tuple[int, Message]]:
+    """The fleet bus."""
+    return ((said.time_us, said.message) for said in three_who_ask().said if said.bus == "fleet")
 
 
 def test_each_who_asks_is_told_once_at_the_desk_and_all_hear_the_same_on_the_bus() -> None:
@@ -77,6 +89,31 @@ def test_nothing_is_promised_where_the_site_does_not_ask_for_it() -> None:
     scene = play(one_floor(), stays((0, 100)), limit_s=400)
     assert not scene.all(Promise) and not scene.all(DeskPromise)
     assert scene.simulation.plant.street.customers[0].visit.promised is None
+
+
+def test_the_page_shows_a_promise_until_the_car_is_there() -> None:
+    picture, shown = LivePicture(PROMISING), []
+    for time_us, message in told():
+        picture.feed(message, time_us)
+        if isinstance(message, Promise | CarAt):
+            shown.append(json.loads(json.dumps(picture.snapshot()))["promises"])
+    first = next(one for one in shown if one)[0]
+    assert first["at"] == "IOC1" and first["spread_us"] > 0
+    assert max(map(len, shown)) == 2, "two waited at a time"
+    assert picture.snapshot()["promises"] == []
+    assert "promises" not in LivePicture(one_floor()).snapshot()
+
+
+def test_a_promise_is_told_over_mqtt_and_with_the_task_of_the_car() -> None:
+    topics = FleetTopics(PROMISING, GatewaySettings(epoch_us=0))
+    said = [one for time_us, message in told() for one in topics.feed(message, time_us)]
+    promises: list[Any] = [body for topic, body in said if topic == "promise"]
+    assert len({body["car"] for body in promises}) == 3 and {body["by"] for body in promises} == {"IOC1"}
+    for body in promises:
+        assert body["at"] < body["ready"] and body["ready_from"] < body["ready"] < body["ready_to"]
+    tasks = [body for topic, body in said if topic == "task" and body.get("what") == "retrieve"]
+    over = {body["car"]: body for body in tasks if body["phase"] == "done"}
+    assert {car: body["ready"] for car, body in over.items()} == {body["car"]: body["ready"] for body in promises}
 
 
 class Desk:
