@@ -31,6 +31,7 @@ from onboard.systems.registry import factory_for
 from onboard.web.picture import LivePicture
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays
+from tests.system.test_desks import two
 
 PROMISING = replace(one_floor(), promises=True)
 BAY, ROBOT = 1, 11
@@ -89,6 +90,16 @@ def test_nothing_is_promised_where_the_site_does_not_ask_for_it() -> None:
     scene = play(one_floor(), stays((0, 100)), limit_s=400)
     assert not scene.all(Promise) and not scene.all(DeskPromise)
     assert scene.simulation.plant.street.customers[0].visit.promised is None
+
+
+def test_who_is_sent_to_another_compartment_reads_at_the_desk_of_the_ticket_what_that_one_promises() -> None:
+    scene = play(replace(two("nearest"), promises=True), stays((0, 150)))
+    (_, word), *others = scene.all(Promise, "fleet")
+    assert word.sender == 2 and not others
+    for desk in ("IOC1", "IOC2"):
+        shown_us, shown = scene.all(DeskPromise, desk)[0]
+        assert shown.car == word.car and shown.spread_ms == word.spread_ms
+        assert abs(shown_us // 1_000 + shown.in_ms - word.ready_ms) < 20
 
 
 def test_the_page_shows_a_promise_until_the_car_is_there() -> None:
