@@ -19,12 +19,13 @@ def seal_dbc_text() -> str:
 
 
 def systems() -> list[str]:
-    """Names of the systems that have a file of their own."""
+    """Names of the systems that have a file of their own, as site files say them."""
     names = (entry.name for entry in files(__name__).iterdir() if entry.name.endswith(".dbc"))
-    return sorted(name.removesuffix(".dbc") for name in names if name not in ("fleet.dbc", "device.dbc", "seal.dbc"))
+    own = (name for name in names if name not in ("fleet.dbc", "device.dbc", "seal.dbc"))
+    return sorted(name.removesuffix(".dbc").replace("_", "-") for name in own)
 
 
 def system_dbc_text(system: str) -> str | None:
-    """Text of ``<system>.dbc``: what one system says beyond the two others, on both buses; None for nothing."""
-    file = files(__name__).joinpath(f"{system}.dbc")
+    """What one system says beyond the two others, on both buses, of its file (``_`` for ``-``); None for nothing."""
+    file = files(__name__).joinpath(f"{system.replace('-', '_')}.dbc")
     return file.read_text(encoding="utf-8") if file.is_file() else None

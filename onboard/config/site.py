@@ -66,7 +66,9 @@ def site_digest(site: Site) -> int:
     text = json.dumps(
         _meaning(site, {"digest", "time_zone", *site.demand}), sort_keys=True, separators=(",", ":"), default=_plain
     )
-    words = getattr(part(site.system, "frames"), "WORDS", None)
+    module = part(site.system, "frames")
+    asked_by = getattr(module, "ASKED_BY", None)
+    words = getattr(module, "WORDS", None) if asked_by is None or getattr(site, asked_by) else None
     text += "" if words is None else f"{words:08X}"
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:2], "big") or 1
 

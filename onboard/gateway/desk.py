@@ -35,6 +35,8 @@ _ERRORS = {
     "MALFORMED": "validationError",
     **dict.fromkeys(("OLD_UPDATE", "NOT_CONTINUED", "ORDER_OVER", "NO_ORDER"), "orderUpdateError"),
 }
+#: What an order's life tells of its task.
+_OF_TASK = ("task", "car", "promised", "ready", "spread_s", "ready_from", "ready_to")
 _HEARD = (CallOpened, CallRepeated, LoadTold, TaskTold)
 
 
@@ -201,7 +203,7 @@ class GatewayDesk:
         body: Json = {"at": self._publisher.at(now_us), "id": order.name, "phase": order.life.value}
         if order.task is not None:
             stands = self._publisher.fleet.task(order.task, now_us)
-            body |= {key: stands[key] for key in ("task", "car", "promised") if key in stands}
+            body |= {key: stands[key] for key in _OF_TASK if key in stands}
         if order.giver:
             body["orderedBy"] = order.giver
         if order.owner:

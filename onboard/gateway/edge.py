@@ -7,11 +7,13 @@ orders from outside.
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from onboard.contract.messages import Reference
 from onboard.core.site import Site
 from onboard.gateway.bus_orders import BusOrders, NoBusOrders
 from onboard.gateway.dialect import Json
 from onboard.gateway.positions import Tracker, TrackTracker
 from onboard.history.history import History
+from onboard.history.system import SystemFact
 from onboard.systems.registry import part
 from onboard.systems.words import words_of
 from onboard.trace.view import SiteView
@@ -47,6 +49,17 @@ class SystemEdge:
     def place(self, number: int) -> str | None:
         """A station as topics name it; None for one that the site does not have."""
         return words_of(self.site).place(number)
+
+    def told(self, fact: SystemFact, history: History, now_us: int) -> tuple[str, Json] | None:
+        """What a fact of this system's own is told as, below the site's topic; times in us of the log end in ``_us``.
+
+        None where nothing is told of it.
+        """
+        return None
+
+    def of_load(self, load: Reference, history: History, now_us: int) -> Json:
+        """What is known of a load beside what a task for it tells; times as in ``told``."""
+        return {}
 
     def body(self) -> PhysicalLimits:
         """What a mobile machine is, as far as the site file tells."""

@@ -20,6 +20,7 @@ from onboard.history.calls import CallAnswered, CallHistory, CallOpened
 from onboard.history.history import Fact
 from onboard.history.lives import Beat
 from onboard.history.places import PlaceTold
+from onboard.history.system import SystemFact
 from onboard.history.tasks import TaskTold
 from onboard.trace.words import Words
 from onboard.ways.site import way_site
@@ -71,6 +72,10 @@ class FleetTopics:
                 yield from self._on_end(fact.call, fact, now_us)
             case TaskTold() if fact.before is not fact.report.phase:
                 yield from self._on_report(fact.report, now_us)
+            case SystemFact():
+                own = self._edge.told(fact, self.picture.history, now_us)
+                if own is not None:
+                    yield own[0], self._stamped({"at_us": now_us, **own[1]})
             case Beat() | PlaceTold() if not self._is_mobile(message.sender):
                 yield from self._fixed(message.sender, now_us)
         reason = _reason(message)
@@ -110,6 +115,8 @@ class FleetTopics:
             promised: Json = next((bid["cost"] for bid in reversed(shown["bids"]) if bid["by"] == shown["winner"]), {})
             if "end_us" in promised:
                 body["promised"] = self._at(promised["end_us"])
+            if call.terms.operation is Operation.RETRIEVE:
+                body |= self._stamped(self._edge.of_load(call.terms.car, self.picture.history, now_us))
         return body
 
     def place(self, number: int) -> str | None:

@@ -35,7 +35,7 @@ def _sent_by(system: str, machine: Machine, machines: Iterable[Machine]) -> Iter
         # A system's own contract does not say which of its kinds has which devices.
         yield from ((layout, machine.name) for layout in system_layouts(system)[1])
         return
-    for layout in device_layouts():
+    for layout in device_layouts(system):
         if set(layout.senders) | set(layout.receivers) <= _ENDS[machine.kind]:
             yield layout, machine.name
 

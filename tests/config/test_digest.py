@@ -9,6 +9,7 @@ from bus_sim.sites import find_site, site_text
 from dbc import system_dbc_text, systems
 from onboard.config.site import parse_site, site_digest
 from onboard.core.site import Site
+from onboard.systems.car_park.site import car_park
 from onboard.systems.registry import part
 from tests.mapd.sites import made
 
@@ -44,6 +45,13 @@ def test_a_field_that_a_later_version_adds_changes_nothing_until_it_is_used() ->
     assert site_digest(later(**names, doors=2)) != site.digest
 
 
+def _site_of(system: str) -> Site:
+    """One on which all words of its system are said."""
+    if system == "mapd":
+        return made(2, [])
+    return replace(car_park(find_site("level1")), promises=True) if system == "car-park" else find_site(system)
+
+
 @pytest.mark.parametrize("system", systems())
 def test_builds_that_mean_other_things_by_a_systems_own_words_are_strangers(
     system: str, monkeypatch: pytest.MonkeyPatch
@@ -51,10 +59,18 @@ def test_builds_that_mean_other_things_by_a_systems_own_words_are_strangers(
     text = system_dbc_text(system)
     assert text is not None
     lines = [line for line in text.splitlines() if line.startswith(("BO_ ", " SG_ "))]
-    module, site = part(system, "frames"), made(2, []) if system == "mapd" else find_site(system)
+    module, site = part(system, "frames"), _site_of(system)
     assert module is not None and crc32("\n".join(lines).encode()) == module.WORDS
+    before = site_digest(site)
     monkeypatch.setattr(module, "WORDS", module.WORDS ^ 1)
-    assert site_digest(site) != site.digest
+    assert site_digest(site) != before
+
+
+def test_words_that_a_site_does_not_ask_for_make_no_strangers_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    module, site = part("car-park", "frames"), find_site("level1")
+    assert module is not None
+    monkeypatch.setattr(module, "WORDS", module.WORDS ^ 1)
+    assert site_digest(site) == site.digest
 
 
 def test_defaults_are_left_out_at_any_depth() -> None:

@@ -6,7 +6,7 @@ from bus_sim.sites import find_site
 from onboard.core import authority, backoff, bus_time, mirror, site
 from onboard.core.negotiation import bidding, initiator, negotiation, participant, sub_calls, trust, winners
 from onboard.holon import fixed_times, holding, presence, regeneration, rights, witness
-from onboard.systems.car_park import bay_calls, bay_task, sill, stall, starting, stewardship, travel
+from onboard.systems.car_park import bay_calls, bay_task, promises, sill, stall, starting, stewardship, travel
 from onboard.ways import all_or_none, left_behind, passing, retreats, standing
 from onboard.wire import decoder
 
@@ -113,6 +113,7 @@ TIMES: dict[str, tuple[Time, ...]] = {
             "a winner that plans no work has lost its task: longer than one without a way keeps it",
         ),
         Time("T_claim", bay_task.SETTLING_US, _FIXED, "after a restart, time for a winner to say that it is one"),
+        Time("T_told", promises.TOLD_US, _FIXED, "from a ticket to the word when its car will be there"),
     ),
     "restart": (
         Time("T_share", witness.ANSWER_PERIOD_US, _FIXED, "who asks so soon after an answer shares the next"),

@@ -16,8 +16,9 @@ from onboard.contract.messages import Message
 from onboard.contract.runs import singles
 from onboard.core.frame import Frame
 from onboard.core.site import Site
+from onboard.systems.contract import codecs_for
 from onboard.trace.check.checks import Checks, LogVerdict
-from onboard.wire.codec import Codec, device_codec, fleet_codec
+from onboard.wire.codec import Codec
 from onboard.wire.decoder import Decoder
 
 M = TypeVar("M", bound=Message)
@@ -130,9 +131,10 @@ async def _play(
 ) -> Scene:
     simulation = build(site, options, loop)
     scene = Scene(simulation)
-    _listen(scene, FLEET, fleet_codec())
+    codecs = codecs_for(site)
+    _listen(scene, FLEET, codecs.fleet)
     for node_id, machine in site.machines.items():
-        _listen(scene, machine.name, device_codec(), node_id)
+        _listen(scene, machine.name, codecs.device, node_id)
     simulation.plant.street.add_all(demand, ORIGIN_US)
     if plant is not None:
         plant(simulation)

@@ -40,6 +40,15 @@ def test_every_message_of_the_contract_has_its_stream_from_those_who_may_send_it
     assert all(why for _, why in reasons())
 
 
+def test_promises_have_a_stream_where_they_are_made() -> None:
+    site = car_park(find_site("standard"))
+    promising = operation(dataclasses.replace(site, promises=True))
+    assert [one for one in promising if one not in operation(site)] == [
+        one for one in promising if one.name == "Promise"
+    ]
+    assert {one.node for one in promising if one.name == "Promise"} == set(site.compartments)
+
+
 def test_streams_are_told_once_and_have_the_priority_of_their_identifiers() -> None:
     streams = operation(find_site("small"))
     assert len({(stream.node, stream.name) for stream in streams}) == len(streams)

@@ -77,6 +77,30 @@ def _said(trace: Path) -> list[Message]:
     return [one for one in found if one is not None]
 
 
+def test_a_customer_reads_when_the_car_will_be_there_until_it_is(
+    browser: Page, errors: list[str], tmp_path: Path
+) -> None:
+    text = (SITE_FILES / "level1.toml").read_text(encoding="utf-8")
+    (tmp_path / "promising.toml").write_text(f"{text}\n[negotiation]\npromises = true\n", encoding="utf-8")
+    words = ["bus_sim.cli", "run", "promising.toml", "--by-hand", "--speed", "50", "--web", "0"]
+    process, address = start(words, tmp_path)
+    try:
+        browser.goto(address)
+        expect(browser.locator("#link")).to_have_text("connected")
+        browser.get_by_role("button", name="car in", exact=True).click()
+        expect(browser.locator("[data-figure=parked]")).to_have_text("1")
+        expect(browser.locator("#promised")).to_be_visible()
+        browser.get_by_role("button", name="car out", exact=True).click()
+        line = browser.locator("#promises tbody tr")
+        expect(line).to_contain_text("IOC1")
+        expect(line).to_contain_text("3.0 s")
+        expect(browser.locator("[data-figure=fetched]")).to_have_text("1")
+        expect(line).to_have_count(0)
+    finally:
+        end(process)
+    assert not errors
+
+
 def test_another_system_is_simulated_and_obeys(browser: Page, errors: list[str], tmp_path: Path) -> None:
     words = ["bus_sim.cli", "run", "terminal", "--speed", "40", "--web", "0", "--trace", "terminal.log"]
     with served(words, tmp_path) as address:

@@ -13,7 +13,7 @@ from onboard.contract.constants import MAX_NODE_ID
 from onboard.contract.messages import OperatorOrder, Reference
 from onboard.wire import network_doc
 from onboard.wire.codec import fleet_codec
-from onboard.wire.dbc_file import read_layouts
+from onboard.wire.dbc_file import device_layouts, fleet_layouts, read_layouts
 from onboard.wire.network_doc import network_page
 from onboard.wire.site_dbc import site_dbc
 from tests.sites import ONE_FLOOR, one_floor
@@ -68,7 +68,7 @@ def test_the_sites_dbc_has_one_message_for_each_machine() -> None:
 
 
 def test_the_sites_dbc_keeps_signals_comments_tables_and_cycles() -> None:
-    ours = {layout.name: layout for layout in layouts()}
+    ours = {layout.name: layout for layout in (*fleet_layouts("car-park"), *device_layouts("car-park"))}
     for found in read_layouts(site_dbc(one_floor(robots=2))):
         name, _, kind = found.name.partition("_")
         original = ours[kind]

@@ -15,6 +15,7 @@ from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.plant.bodies import random_car
 from bus_sim.systems.car_park.plant.customer import Customer, CustomerEvent, CustomerState, VisitOutcome
 from bus_sim.systems.car_park.plant.plant import Plant, is_told_off, looks_for_ticket
+from bus_sim.systems.car_park.promised import PromiseFigures, seen_of
 from bus_sim.systems.car_park.show import ConsoleShow, DayClock
 from bus_sim.systems.car_park.simulation import Simulation
 from bus_sim.systems.car_park.summary import BurstFigures, RunSummary, bus_figures, unserved
@@ -231,6 +232,7 @@ class CarParkStage(SystemStage[Plant]):
             burst=self._burst(ended),
             fleet=fleet,
             bays=self._bays.figures(),
+            promises=PromiseFigures.of(seen_of((one.visit for one in self.customers), ended.begin_us)),
             messages=sum(fleet.messages.values()),
             frames=frames,
             error_frames=errors,

@@ -7,6 +7,7 @@ from bus_sim.can.statistics import BusStatistics
 from bus_sim.systems.car_park.bay_times import BayFigures, bay_lines
 from bus_sim.systems.car_park.bounds.waiting import WaitBounds
 from bus_sim.systems.car_park.plant.street import StreetSummary
+from bus_sim.systems.car_park.promised import PromiseFigures
 from onboard.trace.durations import Durations
 from onboard.trace.indicators import FleetIndicators
 
@@ -50,6 +51,7 @@ class RunSummary:
     burst: BurstFigures | None
     fleet: FleetIndicators
     bays: tuple[BayFigures, ...]
+    promises: PromiseFigures | None
     messages: int
     frames: int
     error_frames: int
@@ -113,6 +115,8 @@ class RunSummary:
                 f"worst {burst.span_s / 60:.0f} min  from {burst.begins} on {burst.count} cars came; "
                 f"waiting in {burst.wait_in}"
             )
+        if self.promises is not None:
+            text.append(self.promises.line())
         return text
 
     def _bus(self) -> list[str]:

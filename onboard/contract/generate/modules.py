@@ -45,7 +45,8 @@ def contracts() -> tuple[DbcFile, ...]:
     for name in systems():
         text = system_dbc_text(name)
         assert text is not None
-        found.append(read_contract(name, text, name, shared))
+        module = name.replace("-", "_")
+        found.append(read_contract(module, text, module, shared))
     return _with_common_tables(tuple(found))
 
 
@@ -89,7 +90,7 @@ def generated(every: tuple[DbcFile, ...]) -> dict[str, str]:
             sets = tuple(one for one in contract.sets if one.module == module)
             files[f"{module}.py"] = _classes(contract, module, frames, sets, own)
             files[f"packing/{module}.py"] = _packing(contract, module, frames, sets, own)
-            if module in systems():
+            if module.replace("_", "-") in systems():
                 files[f"packing/{module}.py"] += _words(contract)
             if contract in (fleet, device):
                 names = [frame.layout.name for frame in frames] + [one.name for one in sets]
@@ -101,7 +102,9 @@ def generated(every: tuple[DbcFile, ...]) -> dict[str, str]:
 def _classes(
     contract: DbcFile, module: str, frames: tuple[DbcMessage, ...], sets: tuple[FrameSet, ...], where: dict[str, str]
 ) -> str:
-    about = _ABOUT.get(module, f"What the machines of the system {contract.name} say beyond the messages of all")
+    about = _ABOUT.get(
+        module, f"What the machines of the system {contract.name.replace('_', '-')} say beyond the messages of all"
+    )
     about += ", on their device buses" if module.endswith("_device") else ""
     own = tuple(table for table in contract.tables if table.module == module)
     used = {name for frame in frames for name in uses(frame.fields)}

@@ -361,8 +361,15 @@ class BayCalls:
 
     def taken_at_us(self, now_us: int) -> int | None:
         """When the winner of the job will have been at the bay, by its plan, bus us; None where it has told of none."""
-        leg = None if self.job is None else self._work_here(self.job.winner)
-        return None if leg is None else from_bus_ms(leg.end_ms, now_us)
+        return self.done_at_us(self.job, now_us)
+
+    def done_at_us(self, task: BayTask | None, now_us: int) -> int | None:
+        """The same for any task in hand; a robot that has both does what is ahead last."""
+        works = [] if task is None else self._works_here(task.winner)
+        has_both = self.job is not None and self.ahead is not None and self.job.winner == self.ahead.winner
+        if not works or (task is self.ahead and has_both and len(works) == 1):
+            return None
+        return from_bus_ms(works[-1 if task is self.ahead else 0].end_ms, now_us)
 
     def brings(self, node: int) -> bool:
         """Whether the work that a machine has next, by its plan, is at the bay."""
@@ -372,7 +379,9 @@ class BayCalls:
 
     def _work_here(self, node: int) -> Leg | None:
         """What a machine does first at the bay by its plan."""
+        return next(iter(self._works_here(node)), None)
+
+    def _works_here(self, node: int) -> list[Leg]:
         plan, here = self.fleet.mirror.itineraries.get(node), tuple(self.station)
-        legs = () if plan is None else plan.legs
-        at_bay = (leg for leg in legs if (leg.track, leg.to_index, leg.side) == here)
-        return next((leg for leg in at_bay if leg.action is LegAction.WORK), None)
+        at_bay = [leg for leg in (plan.legs if plan else ()) if (leg.track, leg.to_index, leg.side) == here]
+        return [leg for leg in at_bay if leg.action is LegAction.WORK]

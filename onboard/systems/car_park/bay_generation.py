@@ -75,7 +75,7 @@ class BayGeneration:
         if self.site.desk is DeskPolicy.NEAREST and not self._has_room(CallKey(call.sender, call.call)):
             return None
         if not self._is_by_way(call):
-            return to_bus_ms(self._ready_us(call, now_us) + before * self._cycle_us())
+            return to_bus_ms(self._ready_us(call, now_us) + before * self.cycle_us())
         me = self.machine.node_id
         if self.site.desk is DeskPolicy.OWN and call.car.origin == me:
             return self.floor(call, now_us)
@@ -131,7 +131,7 @@ class BayGeneration:
         cost = self.lower_bound(call, now_us)
         return None if cost is None else Proposal(cost, None, PROGRAM, ())
 
-    def _cycle_us(self) -> int:
+    def cycle_us(self) -> int:
         """One customer served: both doors twice, the shuttle's stroke twice, grip, and the driver."""
         park = self.site
         stroke_us = run_duration_us(park.shuttle_reach_mm, park.shuttle)

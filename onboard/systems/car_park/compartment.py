@@ -48,21 +48,14 @@ from onboard.core.site import Station
 from onboard.systems.car_park import bay_task, custody
 from onboard.systems.car_park.bay_calls import BayCalls
 from onboard.systems.car_park.bay_generation import BayGeneration
-from onboard.systems.car_park.bay_memory import (
-    BayMemory,
-    job_over_record,
-    job_record,
-)
-from onboard.systems.car_park.bay_task import (
-    DESK_INPUT,
-    BayPhase,
-    BayTask,
-)
+from onboard.systems.car_park.bay_memory import BayMemory, job_over_record, job_record
+from onboard.systems.car_park.bay_task import DESK_INPUT, BayPhase, BayTask
 from onboard.systems.car_park.desk_calls import DeskCalls
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.outputs import BayOutputs
 from onboard.systems.car_park.pipeline import Pipeline
 from onboard.systems.car_park.program import Program
+from onboard.systems.car_park.promises import Promises
 from onboard.systems.car_park.site import ANY_CLASS, car_park
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.systems.car_park.ticket_slot import TicketSlot
@@ -91,6 +84,7 @@ class Compartment:
     calls: BayCalls = field(init=False)
     desks: DeskCalls = field(init=False)
     pipeline: Pipeline = field(init=False)
+    promises: Promises = field(init=False)
     _key: DeskInput | None = None
     _robot_waits: bool = False
 
@@ -108,6 +102,7 @@ class Compartment:
         self.calls.take_up()
         self.pipeline = Pipeline(self.fleet, self._park, self.calls, self.memory, self.tickets, self.outputs)
         self.desks = DeskCalls(self.fleet, self._park, self.memory, self.generation, self.outputs, self.tickets)
+        self.promises = Promises(self._park, self.generation, self.calls, self.tickets, self.outputs)
         self._table: dict[BayPhase, Callable[[int], list[Effect]]] = {
             BayPhase.STARTING: self._when_starting,
             BayPhase.FREE: self._when_free,
@@ -230,12 +225,14 @@ class Compartment:
         if self.doors is None or self.bay is None:
             return effects
         effects += self._table[self.phase](now_us) + self.pipeline.look_ahead(self.phase, now_us)
-        return effects + self.pipeline.outage.review(self.phase, now_us)
+        effects += self.pipeline.outage.review(self.phase, now_us)
+        return effects + (self.promises.review(self.phase, now_us) if self._park.promises else [])
 
     def next_wake(self) -> int | None:
         """When a refused call is made again, or a winner counts as lost."""
         waits = self.phase in (BayPhase.AWAITING, BayPhase.HANDOVER)
-        times = self.calls.next_wake(is_job_asked=waits), self.pipeline.next_wake(self.phase), self.desks.next_wake()
+        times = [self.calls.next_wake(is_job_asked=waits), self.pipeline.next_wake(self.phase), self.desks.next_wake()]
+        times += [self.promises.next_wake()] if self._park.promises else []
         return min((one for one in times if one is not None), default=None)
 
     def looks_from(self) -> int:
@@ -248,7 +245,8 @@ class Compartment:
 
     def statements(self, now_us: int) -> list[Effect]:
         """The cars in my custody and the tokens that I hold."""
-        return self.stewardship.car_statements() + self.fleet.tokens.statements() + self.desks.statements()
+        told = self.desks.statements() + self.promises.statements()
+        return self.stewardship.car_statements() + self.fleet.tokens.statements() + told
 
     # --- the desk ----------------------------------------------------------------------------------------------
 

@@ -12,6 +12,7 @@ from collections import Counter, deque
 from dataclasses import dataclass, field
 from typing import Any
 
+from onboard.contract.car_park import Promise
 from onboard.contract.codes import (
     CallResult,
     Criterion,
@@ -353,6 +354,9 @@ class DeskCalls:
                 return self._on_award(message)
             case TaskReport() if message.sender in self.park.compartments:
                 return self._on_report(message, now_us), None
+            case Promise() if message.car in self.asked:
+                ready_us, spread_us = from_bus_ms(message.ready_ms, now_us), message.spread_ms * 1_000
+                return [self.outputs.promise(message.car, ready_us, spread_us, now_us)], None
         return [], None
 
     def _on_award(self, award: Award) -> tuple[list[Effect], Reference | None]:

@@ -6,6 +6,7 @@ It is the same path as a customer's press (row P52), and the compartment calls f
 from collections.abc import Callable
 from typing import Any
 
+from onboard.contract.car_park import Promise
 from onboard.contract.codes import Operation, OperatorAction
 from onboard.contract.constants import ANY_STATION, OUTSIDE
 from onboard.contract.messages import OperatorOrder, Reference
@@ -14,9 +15,12 @@ from onboard.gateway.dialect import Json
 from onboard.gateway.edge import PhysicalLimits, SystemEdge
 from onboard.gateway.order import GatewayOrder, OrderRequest
 from onboard.gateway.roles import Role
+from onboard.gateway.state import reference_text
 from onboard.history.calls import CallOpened, CallRepeated
-from onboard.history.history import Fact
+from onboard.history.history import Fact, History
 from onboard.history.loads import LoadTold
+from onboard.history.system import SystemFact
+from onboard.systems.car_park.history import PromiseTold, car_park_history
 from onboard.systems.car_park.site import CarPark
 from onboard.trace.view import SiteView
 from onboard.ways.site import way_site
@@ -135,6 +139,20 @@ class CarParkEdge(SystemEdge):
         """Orders from outside become tickets and keys at the compartments' desks."""
         return CarParkOrders(self._park, view, place)
 
+    def told(self, fact: SystemFact, history: History, now_us: int) -> tuple[str, Json] | None:
+        """A promise to a customer, the first time that it is heard."""
+        if not isinstance(fact, PromiseTold) or not fact.is_first:
+            return None
+        word = fact.word
+        machines = self._park.machines
+        body = {"car": reference_text(word.car), "by": machines[word.sender].name}
+        return "promise", body | _when(word, history, now_us)
+
+    def of_load(self, load: Reference, history: History, now_us: int) -> Json:
+        """When a car will be there for its driver, as the customer was first told."""
+        word = car_park_history(history).promises.get(load)
+        return {} if word is None else _when(word, history, now_us)
+
     def body(self) -> PhysicalLimits:
         """The carrier's axis and length; it takes the heaviest car."""
         axis = self._park.carrier
@@ -151,6 +169,14 @@ class CarParkEdge(SystemEdge):
         dimensions = {"length": limits.max_length_mm / 1000, "width": 0.0, "height": limits.max_height_mm / 1000}
         most_kg = float(limits.max_load_kg)
         return {"loadSets": [{"setName": "car", "loadType": "car", "loadDimensions": dimensions, "maxWeight": most_kg}]}
+
+
+def _when(word: Promise, history: History, now_us: int) -> Json:
+    ready_us, spread_us = history.clock.log_us(word.ready_ms, now_us), word.spread_ms * 1_000
+    if ready_us is None:
+        return {}
+    ends = {"ready_from_us": ready_us - spread_us, "ready_to_us": ready_us + spread_us}
+    return {"ready_us": ready_us, "spread_s": word.spread_ms / 1_000, **ends}
 
 
 EDGE = CarParkEdge

@@ -7,6 +7,7 @@ which do nothing when they come twice; a desk that hears the number of its last 
 
 from dataclasses import dataclass, field
 
+from onboard.contract.car_park_device import DeskPromise
 from onboard.contract.codes import DeskText, DoorAction, DoorName, DoorPosition, LightColour, Reason
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import BayState, DeskOrder, DoorOrder, DoorState, LightOrder, Reference, TicketPrint
@@ -21,6 +22,8 @@ from onboard.systems.car_park.unheard import Unheard
 #: A desk tells nobody what it shows: its last order is said again with so many states of the bay: a second at the
 #: sensors' pace.
 DESK_TIMES = 4
+#: The longest wait that a desk can show, ms: 24 bits (dbc/car_park.dbc).
+MOST_PROMISED_MS = (1 << 24) - 1
 
 #: By these somebody comes to what is in the bay, or is shut in with it: not while another machine holds the bay.
 _INTO_THE_BAY = ((DoorName.INPUT, DoorAction.OPEN), (DoorName.OUTPUT, DoorAction.CLOSE))
@@ -45,6 +48,8 @@ class BayOutputs:
     _doors: dict[DoorName, DoorOrder] = field(default_factory=dict)
     _desk: DeskOrder | None = None
     _desk_left: int = 0
+    #: The promise that the desk shows beside its text: of which car, when it will be there, bus us, and the spread, us.
+    _promise: tuple[Reference, int, int] | None = None
     #: The code of the ticket that the desk's last order prints, or the next one will.
     _print: list[TicketPrint] = field(default_factory=list)
     _unheard: Unheard = field(default_factory=Unheard)
@@ -71,6 +76,18 @@ class BayOutputs:
         self._print = []
         return self._order_desk(self._next(), text, car, compartment)
 
+    def promise(self, car: Reference, ready_us: int, spread_us: int, now_us: int) -> Effect:
+        """When a car will be there, for the desk to show beside its text; bus us."""
+        self._promise, self._desk_left = (car, ready_us, spread_us), DESK_TIMES
+        self._unheard.ordered("desk")
+        return self._promised(now_us)
+
+    def _promised(self, now_us: int) -> Effect:
+        assert self._promise is not None
+        car, ready_us, spread_us = self._promise
+        in_ms = min(max(0, ready_us - now_us) // 1000, MOST_PROMISED_MS)
+        return Tell(DeskPromise(self.node_id, car, in_ms, spread_us // 1000))
+
     @property
     def shown(self) -> tuple[DeskText, Reference] | None:
         """What the desk was ordered to show last, and about which car; None before the first order."""
@@ -91,6 +108,7 @@ class BayOutputs:
 
     def _order_desk(self, sequence: int, text: DeskText, car: Reference, compartment: int = NOBODY) -> Effect:
         self._desk, self._desk_left = DeskOrder(self.node_id, sequence, text, car, compartment), DESK_TIMES
+        self._promise = None
         self._unheard.ordered("desk")
         return Tell(self._desk)
 
@@ -120,7 +138,8 @@ class BayOutputs:
         if self._desk is None or not self._desk_left or not self._unheard.is_due("desk", now_us, heard=False):
             return []
         self._desk_left -= 1
-        return [*(Tell(half) for half in self._print), Tell(self._desk)]
+        promised = [] if self._promise is None else [self._promised(now_us)]
+        return [*(Tell(half) for half in self._print), Tell(self._desk), *promised]
 
     def _next(self) -> int:
         self._sequence = successor(self._sequence, 8)

@@ -6,10 +6,12 @@ by floor from above, to scale, as ``_building`` arranges it.
 
 from typing import Any
 
+from onboard.contract.car_park_device import DeskPromise
 from onboard.contract.codes import KindCode, LegAction, TokenKind
 from onboard.contract.messages import BayState, DeskOrder, DoorState, Message, ShuttleState
 from onboard.core.site import Segment
 from onboard.history.history import Fact
+from onboard.systems.car_park.history import car_park_history
 from onboard.systems.car_park.outlines import Outlines, is_elevation, level_heights_mm, shifts
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.trace.scene.scene import Json
@@ -50,6 +52,9 @@ class CarParkScene:
                 self._shuttles[node] = {"mm": message.extension_mm, "side": int(message.side)}
             case DeskOrder():
                 self._desks[node] = message.text.name.lower().replace("_", " ")
+            case DeskPromise():
+                car, spread_s = self.words.load(message.car), message.spread_ms / 1_000
+                self._desks[node] = f"car {car} in {message.in_ms / 1_000:.1f} s, give or take {spread_s:.1f} s"
 
     def layout(self) -> Json:
         """Tracks and places; ``blockable`` are the segments that a person may name, ``building`` lies in mm.
@@ -90,7 +95,21 @@ class CarParkScene:
         return {
             "cars": {station: self.words.load(car) for station, car in self._history.loads.standing().items()},
             "blocked": [[*segment] for segment in sorted(self._history.orders.blocked)],
+            **({"promises": self._promises(now_us)} if car_park(self.site).promises else {}),
         }
+
+    def _promises(self, now_us: int) -> list[Json]:
+        """When each car that is waited for will be there, as its customer was first told; times in us of the log."""
+        words = car_park_history(self._history).open(self._history.loads.stations)
+        return [
+            {
+                "car": self.words.load(word.car),
+                "at": self.words.machine(word.sender),
+                "ready_us": self._clock.log_us(word.ready_ms, now_us),
+                "spread_us": word.spread_ms * 1_000,
+            }
+            for word in words
+        ]
 
     def machine(self, node: int, now_us: int) -> Json:
         """Segment, offset in mm, speed and car of one machine at ``now_us``."""

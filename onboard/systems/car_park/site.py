@@ -154,6 +154,8 @@ class CarPark(WaySite):
     desk: DeskPolicy = DeskPolicy.ANY
     #: Whether a bid brings its tentative itinerary: to be seen, as in the paper; nobody plans around it.
     tells_offers: bool = False
+    #: Whether a compartment tells who asks for a car when it will be there.
+    promises: bool = False
     #: In the order in which a car is tried against them; numbers are from 1.
     classes: tuple[SizeClass, ...] = ()
     #: Number of a place's class by its station's number; who is not named takes every car of the site.

@@ -179,6 +179,11 @@ _OPERATION = (
     TrafficBound("CarAt", _ALL, _two, _grip, "a car changes hands, in no less than a grip"),
 )
 
+#: Beside those where customers are promised when their cars come.
+_PROMISED = (
+    TrafficBound("Promise", _COMPARTMENT, _two, _second, "a ticket goes in, and one that was read elsewhere is won"),
+)
+
 #: Every machine asks all once, and who was not answered; it says all it has once to all who ask within a quarter of a
 #: second, and once to who asks late (``onboard/holon/witness.py``). Nobody holds cars or has plans yet.
 _POWER_UP = (
@@ -223,7 +228,7 @@ def numbers_of(site: Site) -> Numbers:
 
 def operation(site: Site) -> list[Stream]:
     """Everything that may be queued while a site runs."""
-    return list(_streams(site, _OPERATION))
+    return list(_streams(site, (*_OPERATION, *(_PROMISED if car_park(site).promises else ()))))
 
 
 def power_up(site: Site) -> list[Stream]:
@@ -251,7 +256,7 @@ def reasons() -> Iterator[tuple[str, str]]:
 
 
 def _streams(site: Site, rows: Iterable[TrafficBound]) -> Iterator[Stream]:
-    layouts = {layout.name: layout for layout in fleet_layouts()}
+    layouts = {layout.name: layout for layout in fleet_layouts(site.system)}
     numbers = numbers_of(site)
     for row in rows:
         if not row.burst(numbers):

@@ -131,6 +131,10 @@ function show() {
     task: task.task, cells: [task.task, task.at, task.what, task.phase, task.owner ?? "", `${Math.round((snapshot.now_us - task.since_us) / 1e6)} s`],
     owner: layout.machines.find((one) => one.name === task.owner)?.node,
   })), "task", (line) => (line.owner === undefined ? chooseCall(snapshot.calls.findLast((call) => call.task === line.task)?.id) : chooseMachine(line.owner)));
+  $("#promised").hidden = !snapshot.promises;
+  rows($("#promises tbody"), (snapshot.promises ?? []).map((one) => ({
+    car: one.car, cells: [one.car, one.at, one.ready_us === null ? "" : clock(one.ready_us), `${(one.spread_us / 1e6).toFixed(1)} s`],
+  })), "car", (line) => chooseMachine(layout.machines.find((machine) => machine.name === line.cells[1]).node));
   showCalls();
   showEvents();
   showFigures();

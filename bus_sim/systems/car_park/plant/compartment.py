@@ -11,6 +11,7 @@ from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.bodies import CarBody
 from bus_sim.systems.car_park.plant.door import Door
 from bus_sim.systems.car_park.plant.world import BayBody, CarParkWorld, WorldChange
+from onboard.contract.car_park_device import DeskPromise
 from onboard.contract.codes import DeskInput, DeskText, DoorName, DoorPosition, LightColour
 from onboard.contract.messages import (
     BayState,
@@ -66,6 +67,7 @@ class CompartmentPlant:
         self._repeat_timer: Timer | None = None
         self._watchers: list[Callable[[], None]] = []
         self._desk_watchers: list[Callable[[DeskText, Reference], None]] = []
+        self._promise_watchers: list[Callable[[DeskPromise], None]] = []
         travel_us = car_park(site).timing.door_us
         self._sees_width = car_park(site).measures_width
         self.doors = {
@@ -125,6 +127,10 @@ class CompartmentPlant:
         """Call ``watcher`` with every text shown."""
         self._desk_watchers.append(watcher)
 
+    def watch_promises(self, watcher: Callable[[DeskPromise], None]) -> None:
+        """Call ``watcher`` with every promise shown."""
+        self._promise_watchers.append(watcher)
+
     # --- what people do at the desk ----------------------------------------------------------------------------
 
     def press_key(self, *, charging: bool = False) -> None:
@@ -179,6 +185,9 @@ class CompartmentPlant:
             self._halves.take(message)
         elif isinstance(message, DeskOrder) and message != self._desk_order:
             self._obey(message)
+        elif isinstance(message, DeskPromise):
+            for watcher in self._promise_watchers:
+                watcher(message)
 
     def _obey(self, order: DeskOrder) -> None:
         code = self._halves.code(order.sequence)

@@ -111,15 +111,29 @@ TABLE: dict[tuple[CustomerState, CustomerEvent], tuple[CustomerState, str]] = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class WordAtDesk:
+    """What a customer first reads of when the car will be there: within ``spread_us`` of ``ready_us``, loop time."""
+
+    read_us: int
+    ready_us: int
+    spread_us: int
+
+
 @dataclass
 class CustomerVisit:
-    """What is measured of one customer; times in us of loop time, None while not reached."""
+    """What is measured of one customer; times in us of loop time, None while not reached.
+
+    ``ready_us``: when the desk said that the car is there.
+    """
 
     outcome: VisitOutcome = VisitOutcome.STAYING
     arrived_us: int | None = None
     parked_us: int | None = None
     asked_us: int | None = None
     gone_us: int | None = None
+    promised: WordAtDesk | None = None
+    ready_us: int | None = None
 
     @property
     def in_wait_us(self) -> int | None:
@@ -203,9 +217,17 @@ class Customer:
     def reads(self, event: CustomerEvent, where: CompartmentPlant | None) -> None:
         """A desk's text about this customer's car: one goes where it says, and where the car is ready."""
         self.is_told_off = event is CustomerEvent.FULL
+        if event is CustomerEvent.READY and self.visit.ready_us is None:
+            self.visit.ready_us = self._timers.now_us()
         if self.state is CustomerState.AT_DESK and event in _GOES_THERE and where is not None:
             self.compartment, self.is_sent = where, True
         self.on(event)
+
+    def reads_when(self, in_us: int, spread_us: int) -> None:
+        """A desk's word when this customer's car will be there; the first one is kept."""
+        if self.visit.promised is None:
+            now_us = self._timers.now_us()
+            self.visit.promised = WordAtDesk(now_us, now_us + in_us, spread_us)
 
     @property
     def _place(self) -> CompartmentPlant:

@@ -10,6 +10,7 @@ from bus_sim.systems.car_park.plant.compartment import CompartmentPlant
 from bus_sim.systems.car_park.plant.customer import REACTION_US, Customer, CustomerEvent, CustomerState, VisitOutcome
 from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.world import CarParkWorld
+from onboard.contract.car_park_device import DeskPromise
 from onboard.contract.codes import DeskText
 from onboard.contract.messages import Reference
 from onboard.systems.car_park.site import DeskPolicy, car_park
@@ -75,6 +76,7 @@ class Street:
         for node_id, compartment in compartments.items():
             compartment.watch(partial(self._look, node_id))
             compartment.watch_desk(partial(self._read, node_id))
+            compartment.watch_promises(self._read_when)
 
     def watch(self, watcher: Callable[[Customer], None]) -> None:
         """Call ``watcher`` after each step of a customer, once it is clear who waits where."""
@@ -213,6 +215,11 @@ class Street:
         if reader is not None:
             there = self._compartments[node_id].text_compartment if event is CustomerEvent.SENT else node_id
             reader.reads(event, self._compartments.get(there))
+
+    def _read_when(self, word: DeskPromise) -> None:
+        reader = self._by_ticket.get(word.car)
+        if reader is not None:
+            reader.reads_when(word.in_ms * 1_000, word.spread_ms * 1_000)
 
     def _at_key(self, node_id: int) -> Customer | None:
         waiting = self._waiting[node_id]

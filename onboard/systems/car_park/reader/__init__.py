@@ -37,6 +37,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
     rest_at = RestAt(negotiation.choice("rest_at", [one.value for one in RestAt], "nearest"))
     desk = DeskPolicy(negotiation.choice("desk", [one.value for one in DeskPolicy], "any"))
     tells_offers = negotiation.choice("offers", ["kept", "told"], "kept") == "told"
+    promises = negotiation.flag("promises", default=False)
     timing = replace(timing, sub_call_percent=negotiation.integer("sub_call_percent", 20, 80, 50))
     root.check_unknown()
     sound = sound_tracks(root, layout)
@@ -63,6 +64,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
         rest_at=rest_at,
         desk=desk,
         tells_offers=tells_offers,
+        promises=promises,
         bay_uses={bay.node: bay.use for bay in bays if bay.use is not BayUse.BOTH},
         classes=classes,
         place_class=place_class,
