@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from bus_sim.systems.car_park.battery_figures import battery_figures
 from bus_sim.systems.car_park.bay_times import BayTimes
 from bus_sim.systems.car_park.by_hand import ByHand
 from bus_sim.systems.car_park.demand import Demand, Stay
@@ -227,6 +228,7 @@ class CarParkStage(SystemStage[Plant]):
             burst=self._burst(ended),
             fleet=fleet,
             bays=self._bays.figures(),
+            batteries=battery_figures(self.run),
             messages=sum(fleet.messages.values()),
             frames=frames,
             error_frames=errors,
