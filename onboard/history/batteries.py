@@ -30,7 +30,7 @@ class Batteries:
         self.levels: dict[int, BatteryLevel] = {}
 
     def on_level(self, word: BatteryLevel) -> BatteryTold:
-        """Take up one word."""
+        """Take up one word, and tell it with the one before: what is news is for who shows it."""
         fact = BatteryTold(word, self.levels.get(word.sender))
         self.levels[word.sender] = word
         return fact

@@ -15,7 +15,7 @@ from onboard.core.negotiation import CallKey, NeededAnswers, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine, Segment, Station
 from onboard.systems.car_park.ahead import Ahead, Checked, key_of
-from onboard.systems.car_park.alternatives import Alternative, Solution
+from onboard.systems.car_park.alternatives import Alternative, Solution, can_be_told
 from onboard.systems.car_park.charging import Charging
 from onboard.systems.car_park.clearance import MAX_EXPANSIONS, Clearance, Seen
 from onboard.systems.car_park.fetching import to_fetch_from
@@ -244,19 +244,14 @@ class CarParkGeneration:
             alternatives += more
             if best is not None and not self._have_room(best, now_us):
                 best = None
-        if (
-            best is not None
-            and behind_bids
-            and not (self._can_tell(best) and self.charging.lasts(self.program, best, now_us))
-        ):
+        if best is not None and behind_bids and not self._can_bid(best, now_us):
             best = None
         return best, alternatives
 
-    def _can_tell(self, solution: Solution) -> bool:
-        """Whether one itinerary can tell it with what may be won before it, whose ways back are then given up."""
-        before = [[step.work is not None for step in one.steps] for one in self.tentative.values()]
-        steps = sum(len(works) - works[::-1].index(True) if True in works else len(works) for works in before)
-        return solution.kept + steps + len(solution.steps) <= MAX_STEPS
+    def _can_bid(self, solution: Solution, now_us: int) -> bool:
+        """Whether one itinerary can tell it with what may be won before it, and the battery lasts for it."""
+        is_short = can_be_told(solution, self.tentative.values())
+        return is_short and self.charging.lasts(self.program, solution, now_us)
 
     def _have_room(self, solution: Solution, now_us: int) -> bool:
         """Whether each machine that only stands in the way finds another refuge in time, around this and all plans."""
@@ -349,7 +344,8 @@ class CarParkGeneration:
 
     def _start(self, call: CallForProposals, now_us: int, *, behind_bids: bool = True) -> tuple[int, Segment, int]:
         kept, segment, start_us = self._free_from(now_us, behind_bids=behind_bids)
-        return kept, segment, max(start_us, max(self._deadline_us(call, now_us), now_us) + AWARD_LATENCY_US)
+        earliest_us = max(self._deadline_us(call, now_us), now_us) + AWARD_LATENCY_US
+        return kept, segment, max(start_us, earliest_us)
 
     def _free_from(self, now_us: int, *, behind_bids: bool) -> tuple[int, Segment, int]:
         kept, segment, start_us = self.program.branch(now_us)

@@ -1,8 +1,9 @@
 """A robot's battery: what its drives draw, what flows in at a charger, and the gauge that tells it."""
 
 from collections.abc import Callable
+from typing import Protocol
 
-from bus_sim.devices.link import BusDeviceLink
+from bus_sim.devices.link import DeviceBusLink, MessageFilter
 from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.world import CarParkWorld, WorldChange
 from onboard.contract.messages import BatteryState, Message
@@ -16,6 +17,12 @@ ROUNDING_WS = 1e-3
 _US_IN_S, _S_IN_H = 1_000_000, 3_600
 #: What of the world changes what a robot draws.
 _COUNTS = frozenset({WorldChange.CARRIER, WorldChange.SHUTTLE, WorldChange.CAR})
+
+
+class PoweredLink(DeviceBusLink, Protocol):
+    """A device bus whose actuators can be made deaf, as ``BusDeviceLink``."""
+
+    incoming: list[MessageFilter]
 
 
 class RobotBattery:
@@ -32,7 +39,7 @@ class RobotBattery:
         battery: Battery,
         world: CarParkWorld,
         timers: Timers,
-        link: BusDeviceLink,
+        link: PoweredLink,
         dead: Callable[[], frozenset[Segment]],
     ) -> None:
         self.node_id = node_id

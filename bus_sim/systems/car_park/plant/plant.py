@@ -53,6 +53,12 @@ class Plant:
             for device in devices.values():
                 device.start()
 
+    def set_dead(self, chargers: frozenset[Segment]) -> None:
+        """From now on these chargers give no power, and all others do."""
+        self.dead_chargers = chargers
+        for battery in self.batteries.values():
+            battery.look()
+
     def _add_battery(self, node_id: int, site: WaySite, link: BusDeviceLink) -> None:
         battery = car_park(site).battery
         if battery is None:
