@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,12 +15,13 @@ from bus_sim.systems.car_park.power import OF_BATTERIES
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
 from onboard.contract.battery import BatteryLevel
-from onboard.contract.codes import Grade, LegAction, Reason
-from onboard.contract.messages import Bid, Halted, Itinerary, Message
+from onboard.contract.codes import Grade, LegAction, Reason, TaskPhase
+from onboard.contract.messages import Bid, Halted, Itinerary, Message, TaskReport
 from onboard.core.site import Segment
 from onboard.gateway.publisher import FLEET, Publisher
 from onboard.gateway.settings import GatewaySettings
-from onboard.systems.car_park.site import CarPark, car_park
+from onboard.systems.car_park.report import lines
+from onboard.systems.car_park.site import CarPark, RestAt, car_park
 from onboard.trace.view import SiteView
 from onboard.ways.occupancy import final_position
 from onboard.web.picture import LivePicture
@@ -112,6 +114,16 @@ def test_a_bid_that_the_battery_cannot_pay_for_is_not_made() -> None:
     assert all(one.bids for one in levels(found, MR1))
 
 
+def test_a_task_that_the_battery_cannot_pay_for_any_more_is_given_back_untouched_and_done_by_the_other() -> None:
+    # Half way to the compartment what is left is good for some 40 s of driving.
+    fault = "battery_drop:target=MR1,at_s=24,percent=10,for_s=100000"
+    found = play(site(), stays((5, None)), plant=begin(1.0, 1.0, fault), limit_s=150, extra_s=90)
+    told = [(one.sender, one.phase, one.reason) for _, one in found.all(TaskReport, "fleet")]
+    assert told[:2] == [(MR1, TaskPhase.AWARDED, Reason.NONE), (MR1, TaskPhase.FORFEITED, Reason.IMPOSSIBLE)]
+    assert (MR2, TaskPhase.DONE, Reason.NONE) in told
+    assert levels(found, MR1)[-1].charging, "and it came to a charger with the rest"
+
+
 #: Robots begin where they are not charged.
 AWAY = 'chargers = ["p(2,7)", "p(3,3)"]'
 
@@ -173,6 +185,21 @@ def test_without_current_a_robot_goes_to_another_charger() -> None:
     found = play(park, stays((5, 60)), plant=plant, extra_s=300)
     assert found.simulation.plant.world.standing_segment(MR1) == Segment(2, 7)
     assert levels(found, MR1)[-1].charging
+
+
+def test_where_robots_wait_by_demand_one_that_is_charged_stays_until_it_is_full() -> None:
+    park = replace(site(AWAY), rest_at=RestAt.DEMAND)
+    found = play(park, stays(), plant=begin(0.7), extra_s=400)
+    found.assert_sound()
+    full_us = next(us for us, one in found.all(BatteryLevel, "fleet") if one.charging and one.charge_permille == 1000)
+    mine = [(us, one) for us, one in found.all(BatteryLevel, "fleet") if one.sender == MR1 and us < full_us]
+    began_us = next(us for us, one in mine if one.charging)
+    assert all(one.charging for us, one in mine if us >= began_us)
+
+
+def test_the_report_of_a_site_tells_its_batteries() -> None:
+    assert "batteries: 80 Wh, 1.0 h at rest, 0.1 h of driving; chargers: p(2,3), p(3,8)" in lines(site())
+    assert not [line for line in lines(car_park(parse_site(TEXT, "small.toml"))) if "batteries" in line]
 
 
 def test_campaigns_draw_faults_of_batteries_only_where_robots_have_them() -> None:
