@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from bus_sim.campaign.profiles import kinds_for
 from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
@@ -174,6 +176,16 @@ def test_a_person_charges_the_empty_robot_and_it_works_again() -> None:
     assert found.simulation.plant.street.is_over
     assert MR1 in bidders(found)
     assert levels(found, MR1)[-1].charge_permille > 500
+
+
+@pytest.mark.parametrize("at_s", [36, 63, 117])
+def test_at_whatever_moment_of_its_work_it_is_empty_and_charged_again_everybody_is_served(at_s: int) -> None:
+    # On its way to the first car, while it takes it, and between the two; 18 to 189 in steps of nine were played once.
+    fault = f"battery_drop:target=MR1,at_s={at_s},percent=0,for_s=60"
+    found = play(site(AWAY), stays((5, 100), (60, 150)), plant=begin(1.0, 1.0, fault), limit_s=900, extra_s=0)
+    assert found.simulation.plant.street.is_over
+    found.assert_sound()
+    assert {one.machine for _, one in found.all(Halted, "fleet")} == {MR1}
 
 
 def test_without_current_a_robot_goes_to_another_charger() -> None:
