@@ -1,6 +1,9 @@
-"""The wire contract as data: three files of all systems, and what single systems add. This only finds the files."""
+"""The wire contract as data: four files of all systems, and what single systems add. This only finds the files."""
 
 from importlib.resources import files
+
+#: What is no single system's.
+_OF_ALL = ("fleet.dbc", "device.dbc", "seal.dbc", "battery.dbc")
 
 
 def fleet_dbc_text() -> str:
@@ -18,10 +21,15 @@ def seal_dbc_text() -> str:
     return files(__name__).joinpath("seal.dbc").read_text(encoding="utf-8")
 
 
+def battery_dbc_text() -> str:
+    """Text of what machines with a battery tell of it on the fleet bus; only sites with batteries have it said."""
+    return files(__name__).joinpath("battery.dbc").read_text(encoding="utf-8")
+
+
 def systems() -> list[str]:
     """Names of the systems that have a file of their own, as site files say them."""
     names = (entry.name for entry in files(__name__).iterdir() if entry.name.endswith(".dbc"))
-    own = (name for name in names if name not in ("fleet.dbc", "device.dbc", "seal.dbc"))
+    own = (name for name in names if name not in _OF_ALL)
     return sorted(name.removesuffix(".dbc").replace("_", "-") for name in own)
 
 

@@ -124,14 +124,30 @@ _CLOCKS: Final[dict[str, Draw]] = {
     "clock_jump": lambda c, s: {"target": _any(c, s), "by_ms": _jump_ms(c)},
 }
 
+#: Only where robots have batteries. A person charges one that has become empty once the fault is over.
+_POWER: Final[dict[str, Draw]] = {
+    "battery_drop": lambda c, s: {
+        "target": _ROBOT(c, s),
+        "percent": c.choice([0, 1, 2, 5, 20, 45]),
+        "for_s": _lasting(60, 400, c),
+    },
+    "battery_drain": lambda c, s: {
+        "target": _ROBOT(c, s),
+        "factor": c.choice([3, 10, 30, 100]),
+        "for_s": _lasting(60, 400, c),
+    },
+    "chargers_off": lambda c, _: {"for_s": _lasting(60, 400, c)},
+}
+
 PROFILES: Final[dict[str, dict[str, Draw]]] = {
     "none": {},
     "bus": _BUS,
     "crash": _CRASH,
     "two-crashes": {"crash": _crash},
     "people": _PEOPLE,
-    "all": {**_BUS, **_CRASH, **_PEOPLE, **_MORE},
+    "all": {**_BUS, **_CRASH, **_PEOPLE, **_MORE, **_POWER},
     "clocks": _CLOCKS,
+    "power": {**_POWER, "crash": _crash, "pause": _CRASH["pause"], "power_cut": _CRASH["power_cut"]},
 }
 #: Kinds that have no moment of their own.
 _WITHOUT_TIME = frozenset({"lost_ticket", "linger", "oversize"})
@@ -139,8 +155,8 @@ _WITHOUT_TIME = frozenset({"lost_ticket", "linger", "oversize"})
 
 def kinds_for(profile: str, site: Site) -> dict[str, Draw]:
     """The kinds of a profile that are drawn for this site's system."""
-    kinds, drawn = PROFILES[profile], simulated_of(site).drawn
-    return kinds if drawn is None else {kind: draw for kind, draw in kinds.items() if kind in drawn}
+    system = simulated_of(site)
+    return {kind: draw for kind, draw in PROFILES[profile].items() if system.draws(kind, site)}
 
 
 def draw_faults(profile: str, seed: int, site: Site, span_s: tuple[float, float] = SPAN_S) -> tuple[Injection, ...]:

@@ -19,6 +19,7 @@ class Group(StrEnum):
     SENSOR = "sensor"
     ACTUATOR = "actuator"
     PEOPLE = "people"
+    POWER = "power"
 
 
 class FaultSetting(NamedTuple):
@@ -244,6 +245,20 @@ KINDS: Final[Mapping[str, Kind]] = {
         "a drive that takes up its next order and stops on the way",
         _one(for_s=_seconds(30.0), after_s=_seconds(1.5)),
     ),
+    "battery_drop": Kind(
+        Group.POWER,
+        "cells of a robot's battery fail: its charge falls; who stands empty is charged by a person after for_s",
+        _one(
+            for_s=_seconds(300.0),
+            percent=FaultSetting(float, "a number from 0 to 100", 2.0, 0.0, 100.0),
+        ),
+    ),
+    "battery_drain": Kind(
+        Group.POWER,
+        "a robot's battery drains so many times faster; who stands empty is charged by a person after for_s",
+        _one(for_s=_seconds(300.0), factor=FaultSetting(float, "a number from 1 to 1000", 10.0, 1.0, 1_000.0)),
+    ),
+    "chargers_off": Kind(Group.POWER, "no charger gives power", {"at_s": _AT, "for_s": _seconds(300.0)}),
     "lost_ticket": Kind(Group.PEOPLE, "a customer comes back without the ticket", {"car": _CAR}),
     "key_presses": Kind(
         Group.PEOPLE,

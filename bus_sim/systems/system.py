@@ -86,6 +86,10 @@ class SimulatedSystem(ABC, Generic[SiteT, PlantT]):
     #: Settings that it must have where it is there, and what is an example.
     needed: ClassVar[Mapping[str, str]] = {}
 
+    def draws(self, kind: str, site: SiteT) -> bool:
+        """Whether campaigns draw a kind of fault on this site."""
+        return self.drawn is None or kind in self.drawn
+
     # --- a run -------------------------------------------------------------------------------------------------
 
     @abstractmethod

@@ -235,3 +235,13 @@ class TicketRead(Message):
     half: int
     #: The half, as it was read. 0 to 1099511627775.
     code: int
+
+
+@message(frozen=True, slots=True)
+class BatteryState(Message):
+    """The battery's gauge: sent when charging begins or ends, when it is empty or full, and every 30 s."""
+
+    #: What is left of its capacity; 0: it is empty, and no drive moves. Less than a thousandth is told as 1. 0 to 1000.
+    charge_permille: int
+    #: 1: current flows in from a charger.
+    charging: bool

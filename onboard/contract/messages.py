@@ -6,6 +6,7 @@ Written by ``make docs`` from ``dbc/fleet.dbc`` and ``dbc/device.dbc``: change t
 from onboard.contract.base import NO_REFERENCE, Message, Reference, Stamp
 from onboard.contract.calls import Award, Bid, Call, CallForProposals, CallLoad, CallParent, CallTerms, LeftOut
 from onboard.contract.device import (
+    BatteryState,
     BayState,
     DeskEvent,
     DeskOrder,
@@ -62,6 +63,7 @@ from onboard.contract.rights import (
 __all__ = [
     "NO_REFERENCE",
     "Award",
+    "BatteryState",
     "BayState",
     "Bid",
     "Blocked",

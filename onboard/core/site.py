@@ -84,7 +84,7 @@ class Timing:
     #: Share of the time left for a bid that its sub-calls may take, per cent.
     sub_call_percent: int = 50
     #: Nobody says awards: at the deadline the best bid that was heard has won (row P11).
-    silent: bool = False
+    silent: bool = field(default=False, kw_only=True)
 
 
 class MotionNeeds(Enum):

@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from enum import Enum
 from typing import Any
 
+from onboard.contract.battery import BatteryLevel
+
 Json = dict[str, Any]
 
 
@@ -43,10 +45,13 @@ class Dialect:
         """A position on a map, in metres and radians."""
         return {"x": x_m, "y": y_m, "theta": theta, "mapId": map_id, self.position_known: True}
 
-    def power(self) -> Json:
-        """No machine of this project tells of a battery, and the schema wants one: full, and not charging."""
+    def power(self, level: BatteryLevel | None) -> Json:
+        """A machine's battery by its last word, percent; the schema wants one of who has none: full, not charging."""
         charge = "stateOfCharge" if self.is_third else "batteryCharge"
-        return {"powerSupply" if self.is_third else "batteryState": {charge: 100, "charging": False}}
+        told: Json = {charge: 100, "charging": False}
+        if level is not None:
+            told = {charge: level.charge_permille / 10, "charging": level.charging}
+        return {"powerSupply" if self.is_third else "batteryState": told}
 
     def safety(self, *, stopped: bool) -> Json:
         """An emergency stop, while it holds the machines: MANUAL, as a person said it and can lift it."""

@@ -9,6 +9,7 @@ from onboard.contract.messages import Blocked, Halted, Message, Reference, TaskR
 from onboard.core.site import Machine, Segment, Site
 from onboard.gateway.edge import edge_of
 from onboard.gateway.positions import MachinePosition, Tracker
+from onboard.history.batteries import BatteryTold
 from onboard.history.calls import CallAnswered
 from onboard.history.halts import HaltTold
 from onboard.history.hands import HandTold
@@ -158,7 +159,7 @@ class Machines:
     def _on_word(self, body: MobileMachine, fact: Fact | None) -> None:
         """What a mobile machine says of itself."""
         match fact:
-            case Beat(is_news=True) | WaitTold() | HandTold():
+            case Beat(is_news=True) | WaitTold() | HandTold() | BatteryTold():
                 self.changed.add(body.machine.node_id)
             case TaskTold(report=report):
                 self._on_report(body, report)

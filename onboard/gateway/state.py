@@ -64,7 +64,7 @@ def state(
             starting=body.state is MachineState.STARTING,
             in_service=body.state is MachineState.OBSTACLE and not body.is_held,
         ),
-        **dialect.power(),
+        **dialect.power(machines.history.batteries.levels.get(node)),
         **dialect.safety(stopped=machines.is_stopped),
         **_place(dialect, where),
     }
@@ -136,7 +136,9 @@ def _actions(task: TaskInHand | None, does: Operation | None) -> list[Json]:
 def _errors(machines: Machines, body: MobileMachine, now_us: int) -> list[Json]:
     node = body.machine.node_id
     found: list[Json] = []
-    word = machines.halted(node, now_us)
+    word, level = machines.halted(node, now_us), machines.history.batteries.levels.get(node)
+    if level is not None and level.charge_permille == 0:
+        found.append(_error("batteryEmpty", "FATAL", "the battery is empty; a person must charge it"))
     if word is not None:
         found.append(_halted(machines, word))
     if machines.is_silent(node, now_us):

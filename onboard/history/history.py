@@ -4,6 +4,7 @@ Here, and nowhere else for people's eyes, a message is looked at by its class. A
 it asks here, and what a message has changed it takes from the fact that ``feed`` returns.
 """
 
+from onboard.contract.battery import BatteryLevel
 from onboard.contract.messages import (
     Award,
     Bid,
@@ -27,6 +28,7 @@ from onboard.contract.messages import (
     Waiting,
 )
 from onboard.core.site import Site
+from onboard.history.batteries import Batteries, BatteryTold
 from onboard.history.calls import BidMade, CallAnswered, CallFact, CallOpened, CallRepeated, Calls
 from onboard.history.clock import LoggedBusTime
 from onboard.history.halts import Halts, HaltTold
@@ -59,6 +61,7 @@ Fact = (
     | WaitTold
     | HaltTold
     | HandTold
+    | BatteryTold
     | SlotTold
     | StopTold
     | RightTold
@@ -82,6 +85,7 @@ class History:
         self.rights = RightsHistory()
         self.hands = Hands()
         self.halts = Halts()
+        self.batteries = Batteries()
         self.orders = SiteOrders(machines)
         self.calls = Calls(CALL_LIMIT if is_bounded else None, self.clock)
         self.tasks = TaskFold(TASK_LIMIT if is_bounded else None)
@@ -131,6 +135,8 @@ class History:
                 return self.hands.on_manual(message)
             case Diagnostic():
                 self.lives.on_diagnostic(message)
+            case BatteryLevel():
+                return self.batteries.on_level(message)
         return None
 
     def _of_site(self, message: Message, time_us: int) -> Fact | None:

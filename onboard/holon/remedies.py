@@ -14,7 +14,9 @@ REMEDIES = {
     Reason.DUPLICATE_NODE_ID: "find who else speaks under its node-ID, then onboard operate release {name}",
     Reason.OPERATOR: "onboard operate release {name}",
     Reason.REGENERATION: "onboard operate regenerate is under way, or was broken off: start it again",
-    Reason.ACTUATOR_FAULT: "look at its drives and what they move, clear the fault, then start its controller again",
+    Reason.ACTUATOR_FAULT: (
+        "look at its drives and what they move, and at its battery, clear the fault, then start its controller again"
+    ),
     Reason.SENSOR_FAULT: (
         "its sensors deny what it knows of what it carries and moves: its own log says what; put that right, and it "
         "goes on by itself; else start its controller again"

@@ -9,6 +9,7 @@ from collections import Counter, deque
 from onboard.contract.codes import CallResult, ManualMode, Operation, TaskPhase
 from onboard.contract.messages import Message, Reference
 from onboard.core.site import Site
+from onboard.history.batteries import BatteryTold
 from onboard.history.calls import BidMade, CallAnswered, CallHistory, CallOpened
 from onboard.history.halts import HaltTold
 from onboard.history.hands import HandTold
@@ -82,6 +83,8 @@ class SiteView:
                 self.say(time_us, self._wait(fact))
             case SlotTold():
                 self.say(time_us, self._slot(fact))
+            case BatteryTold():
+                self._on_battery(fact, time_us)
             case HandTold(word=word):
                 self.say(time_us, f"{self.name(word.sender)} {_HANDS[word.manual_mode, word.at_rest]}")
 
@@ -109,6 +112,14 @@ class SiteView:
         why = self.words.reason(halted.reason) + (f", by {self.name(halted.cause)}" if halted.cause else "")
         person = "; a person must decide" if halted.needs_person else ""
         self.say(time_us, f"{self.name(halted.machine)} does not act: {why}{person}")
+
+    def _on_battery(self, told: BatteryTold, time_us: int) -> None:
+        name = self.name(told.word.sender)
+        if told.is_empty_now:
+            self.say(time_us, f"{name} stands: its battery is empty")
+        elif told.bids_changed:
+            level = f"its battery is {told.word.charge_permille / 10:.0f} % full"
+            self.say(time_us, f"{name} bids again: {level}" if told.word.bids else f"{name} charges first: {level}")
 
     def _wait(self, statement: WaitTold) -> str:
         word = statement.word

@@ -155,6 +155,13 @@ class LivePicture:
                 "why": view.words.reason(wait[1].reason),
                 "since_us": wait[0],
             }
+        level = self.history.batteries.levels.get(node)
+        if level is not None:
+            told["battery"] = {
+                "percent": level.charge_permille / 10,
+                "charging": level.charging,
+                "bids": level.bids,
+            }
         if self._marks is not None:
             counts = self._marks.counts
             told["seals"] = {mark.value: counts[node, mark] for mark in SealMark if counts[node, mark]}

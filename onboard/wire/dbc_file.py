@@ -14,7 +14,7 @@ from cantools.database import Signal as DbcSignal
 from cantools.database.can.database import Database
 from cantools.database.namedsignalvalue import NamedSignalValue
 
-from dbc import device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text
+from dbc import battery_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,13 +153,18 @@ CONTROLLER = "Controller"
 
 @cache
 def fleet_layouts(system: str = "") -> tuple[MessageLayout, ...]:
-    """Layouts of ``dbc/fleet.dbc`` and ``dbc/seal.dbc``, and of what a system adds to the fleet bus."""
-    return (*read_layouts(fleet_dbc_text()), *seal_layouts(), *system_layouts(system)[0])
+    """Layouts of ``dbc/fleet.dbc``, ``seal.dbc`` and ``battery.dbc``, and of what a system adds to the fleet bus."""
+    return (*read_layouts(fleet_dbc_text()), *seal_layouts(), *battery_layouts(), *system_layouts(system)[0])
 
 
 def seal_layouts() -> tuple[MessageLayout, ...]:
     """What proves who said a frame: in the contract of every site, said only where its file asks for it."""
     return read_layouts(seal_dbc_text())
+
+
+def battery_layouts() -> tuple[MessageLayout, ...]:
+    """What machines tell of their batteries: in the contract of every site, said only where its file has them."""
+    return read_layouts(battery_dbc_text())
 
 
 @cache

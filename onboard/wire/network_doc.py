@@ -5,10 +5,11 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
-from dbc import device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text, systems
+from dbc import battery_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text, systems
 from onboard.wire.dbc_file import (
     MessageLayout,
     SignalLayout,
+    battery_layouts,
     device_layouts,
     fleet_layouts,
     read_annotations,
@@ -62,7 +63,7 @@ def _link(name: str) -> str:
 def _value_tables() -> dict[tuple[tuple[int, str], ...], str]:
     """Name of each value table of the two contracts of all (``VAL_TABLE_``), by its content."""
     named: dict[tuple[tuple[int, str], ...], str] = {}
-    for text in (fleet_dbc_text(), device_dbc_text(), seal_dbc_text()):
+    for text in (fleet_dbc_text(), device_dbc_text(), seal_dbc_text(), battery_dbc_text()):
         named |= {choices: name for name, choices in read_annotations(text).tables.items()}
     return {**named, ((0, "NO"), (1, "YES")): "Answer"}
 
@@ -139,6 +140,7 @@ def network_page() -> str:
         _HEAD,
         *_bus("Fleet bus", fleet_dbc_text(), read_layouts(fleet_dbc_text())),
         *_bus("Seals on the fleet bus", seal_dbc_text(), seal_layouts()),
+        *_bus("Batteries on the fleet bus", battery_dbc_text(), battery_layouts()),
         *_bus("Device bus", device_dbc_text(), device_layouts()),
     ]
     layouts = [*fleet_layouts(), *device_layouts()]

@@ -14,7 +14,7 @@ from onboard.wire.speakers import GATEWAY, is_in
 
 #: Device messages by the roles of both ends: a robot's controller sends nothing to doors.
 _ENDS: dict[KindCode, frozenset[str]] = {
-    KindCode.ROBOT: frozenset({"Controller", "Drive", "Shuttle"}),
+    KindCode.ROBOT: frozenset({"Controller", "Drive", "Shuttle", "Battery"}),
     KindCode.LIFT: frozenset({"Controller", "Drive", "Platform"}),
     KindCode.COMPARTMENT: frozenset({"Controller", "Doors", "Desk", "Bay"}),
 }

@@ -8,7 +8,7 @@ import pytest
 from cantools.database.can import Message as DbcMessage
 
 import dbc
-from dbc import device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text, systems
+from dbc import battery_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text, systems
 from onboard.contract import constants
 from onboard.contract.base import OutOfRangeError
 from onboard.contract.codes import Reason
@@ -21,6 +21,7 @@ from tests.wire.samples import CODES, judge_of, message_of, random_value, signal
 
 FOLDER = Path(__file__).parents[2] / "onboard" / "contract"
 TEXTS = {"fleet": fleet_dbc_text(), "device": device_dbc_text(), "seal": seal_dbc_text()}
+TEXTS |= {"battery": battery_dbc_text()}
 OF_ALL = tuple(TEXTS)
 TEXTS |= {name: text for name in systems() if (text := system_dbc_text(name)) is not None}
 LAYOUTS = {(file, layout.name): layout for file, text in TEXTS.items() for layout in read_layouts(text)}

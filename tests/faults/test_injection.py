@@ -1,21 +1,30 @@
 """Faults as text and as data: what is read is what is written, and a mistake is one line with its remedy."""
 
+from dataclasses import replace
+
 import pytest
 
-from bus_sim.campaign.profiles import PROFILES, draw_at_rate, draw_faults
+from bus_sim.campaign.profiles import PROFILES, draw_at_rate, draw_faults, kinds_for
 from bus_sim.can.faults import InjectedFault
 from bus_sim.faults.arm import actions_for, check_targets
 from bus_sim.faults.bus import frame_faults
 from bus_sim.faults.injection import Injection, parse_injection
 from bus_sim.faults.table import KINDS, Value
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.power import OF_BATTERIES
+from onboard.systems.car_park.battery import Battery
+from onboard.systems.car_park.site import car_park
+
+#: What nothing strikes where robots have none.
+BATTERY = Battery(500, 600, 600, 400, 80, 500, 25, 50, 80, ())
 
 
 @pytest.mark.parametrize("profile", [name for name in PROFILES if name != "none"])
 def test_what_a_profile_draws_is_read_back_and_fits_the_site(profile: str) -> None:
-    site = find_site("small")
+    plain = find_site("small")
+    site = replace(car_park(plain), battery=BATTERY)
     seen = set()
-    for seed in range(60):
+    for seed in range(90):
         faults = draw_faults(profile, seed, site)
         assert faults == draw_faults(profile, seed, site)
         check_targets(faults, site)
@@ -23,6 +32,7 @@ def test_what_a_profile_draws_is_read_back_and_fits_the_site(profile: str) -> No
             seen.add(fault.kind)
             assert parse_injection(str(fault)) == fault
     assert seen == set(PROFILES[profile])
+    assert kinds_for(profile, plain).keys() == seen - OF_BATTERIES
 
 
 def test_at_a_rate_faults_fill_the_whole_run_and_name_cars_that_are_there() -> None:

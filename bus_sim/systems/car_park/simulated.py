@@ -9,7 +9,7 @@ from bus_sim.campaign.profiles import SPAN_S
 from bus_sim.demand import DemandError
 from bus_sim.faults import operators
 from bus_sim.options import RunOptions
-from bus_sim.systems.car_park import drives, people
+from bus_sim.systems.car_park import drives, people, power
 from bus_sim.systems.car_park.day import ParkingDay, asked_day, brought_in, choose_demand
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.car_park.forged import ForgedRetrievals
@@ -69,10 +69,17 @@ class CarParkSystem(SimulatedSystem[CarPark, Plant]):
         "door_forced": people.door_forced,
         "moved": people.moved,
         "blocked": operators.blocked,
+        "battery_drop": power.battery_drop,
+        "battery_drain": power.battery_drain,
+        "chargers_off": power.chargers_off,
     }
     attacks: Mapping[str, type[Any]] = {"orders": ForgedRetrievals}
     section = "demand"
     settings: ClassVar[Mapping[str, type]] = {"cars": int, "mean_s": float, "sigma_s": float, "min_stay_s": float}
+
+    def draws(self, kind: str, site: CarPark) -> bool:
+        """All that strikes: what is of batteries only where robots have them."""
+        return power.strikes(kind, site)
 
     # --- a run -------------------------------------------------------------------------------------------------
 

@@ -39,4 +39,5 @@ def build(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> Simulation:
     fleet, devices = buses_of(site, frame_faults(options.faults, site), loop)
     links = links_of(site, devices)
     plant = Plant(way_site(site), LoopTimers(loop), links, options.seed)
+    plant.judges_batteries = not options.faults
     return Simulation(site, options, loop, fleet, devices, plant, links)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from bus_sim.systems.car_park.battery_figures import battery_figures
 from bus_sim.systems.car_park.bay_times import BayTimes
 from bus_sim.systems.car_park.bounds.visits import VisitLog
 from bus_sim.systems.car_park.bounds.waiting import WaitBounds
@@ -233,6 +234,7 @@ class CarParkStage(SystemStage[Plant]):
             fleet=fleet,
             bays=self._bays.figures(),
             promises=PromiseFigures.of(seen_of((one.visit for one in self.customers), ended.begin_us)),
+            batteries=battery_figures(self.run),
             messages=sum(fleet.messages.values()),
             frames=frames,
             error_frames=errors,

@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 from textwrap import wrap
 
 from bus_sim.can.statistics import BusStatistics
+from bus_sim.systems.car_park.battery_figures import BatteryFigures, battery_lines
 from bus_sim.systems.car_park.bay_times import BayFigures, bay_lines
 from bus_sim.systems.car_park.bounds.waiting import WaitBounds
 from bus_sim.systems.car_park.plant.street import StreetSummary
@@ -29,8 +30,8 @@ class BurstFigures:
 class RunSummary:
     """All figures of one run, or of its window alone. Loads are fractions of the bit rate, times are in s.
 
-    ``fleet`` is what the bus tells; cars, refusals, waiting and ``bays`` are what the plant saw. Who still waits at the
-    end is in ``unserved`` and not in the waiting times, nor in their ``bounds``.
+    ``fleet`` is what the bus tells; cars, refusals, waiting, ``bays`` and ``batteries`` are what the plant saw. Who
+    still waits at the end is in ``unserved`` and not in the waiting times, nor in their ``bounds``.
     """
 
     site: str
@@ -52,6 +53,7 @@ class RunSummary:
     fleet: FleetIndicators
     bays: tuple[BayFigures, ...]
     promises: PromiseFigures | None
+    batteries: tuple[BatteryFigures, ...]
     messages: int
     frames: int
     error_frames: int
@@ -82,6 +84,7 @@ class RunSummary:
         if self.simulated_s < SHORTEST_S:
             return [f"site {self.site}, seed {self.seed}: ended in its first second; no figures"]
         text = [self._head(), *self._customers(), *self._bus(), *self.fleet.lines(), *bay_lines(self.bays)]
+        text += battery_lines(self.batteries)
         if self.wire_drops:
             drops = ", ".join(f"{reason} {count}" for reason, count in sorted(self.wire_drops.items()))
             text.append(f"dropped      {drops}")

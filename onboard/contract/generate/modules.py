@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from dbc import device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text, systems
+from dbc import battery_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text, systems
 from onboard.contract.generate.classes import (
     HEAD,
     enumerations,
@@ -32,6 +32,7 @@ _ABOUT = {
     "presence": "Who lives, who stands and why, and what people order",
     "rights": "Tokens: who asks for them, who gives and who holds them",
     "seal": "Seals: proof of who said what on the fleet bus",
+    "battery": "What machines with a battery tell of it on the fleet bus",
     "device": "What a machine says to its own drives, doors and sensors, and they to it",
 }
 
@@ -42,6 +43,7 @@ def contracts() -> tuple[DbcFile, ...]:
     device = read_contract("device", device_dbc_text(), CODES, fleet.tables)
     shared = (*fleet.tables, *device.tables)
     found = [fleet, device, read_contract("seal", seal_dbc_text(), "seal", shared)]
+    found.append(read_contract("battery", battery_dbc_text(), "battery", shared))
     for name in systems():
         text = system_dbc_text(name)
         assert text is not None

@@ -19,6 +19,7 @@ from onboard.contract.codes import (
     Side,
 )
 from onboard.contract.device import (
+    BatteryState,
     BayState,
     DeskEvent,
     DeskOrder,
@@ -371,6 +372,23 @@ def unpack_ticket_read(sender: int, data: bytes) -> TicketRead | None:
     return TicketRead(sender, sequence, half, code)
 
 
+def pack_battery_state(message: BatteryState) -> bytes:
+    charge_permille = message.charge_permille
+    if charge_permille < 0 or charge_permille > 1000:
+        raise OutOfRangeError("BatteryState.charge_permille", charge_permille, 0, 1000)
+    if message.charging:
+        charge_permille += 0x400
+    return _PACK_IXXXX(charge_permille)
+
+
+def unpack_battery_state(sender: int, data: bytes) -> BatteryState | None:
+    (word_0,) = _UNPACK_HXXXXXX(data)
+    charge_permille = word_0 & 0x3FF
+    if charge_permille > 1000:
+        return None
+    return BatteryState(sender, charge_permille, word_0 & 0x400 != 0)
+
+
 #: Every frame of this module.
 FRAMES = (
     FrameCode(
@@ -448,5 +466,16 @@ FRAMES = (
     ),
     FrameCode(
         "TicketRead", 0x16960000, 8, pack_ticket_read, unpack_ticket_read, TicketRead, TicketRead, ("Desk",), True
+    ),
+    FrameCode(
+        "BatteryState",
+        0x16970000,
+        8,
+        pack_battery_state,
+        unpack_battery_state,
+        BatteryState,
+        BatteryState,
+        ("Battery",),
+        True,
     ),
 )

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from onboard.core.site import Segment, Station
-from onboard.systems.car_park.program import CarStep
+from onboard.systems.car_park.program import MAX_STEPS, CarStep
 
 
 class Alternative(NamedTuple):
@@ -41,3 +41,10 @@ class Solution(NamedTuple):
     steps: tuple[CarStep, ...]
     finish_us: int
     place: Station
+
+
+def can_be_told(solution: Solution, before: Iterable[Solution]) -> bool:
+    """Whether one itinerary can tell it with what may be won ``before`` it, whose ways back are then given up."""
+    works = [[step.work is not None for step in one.steps] for one in before]
+    steps = sum(len(one) - one[::-1].index(True) if True in one else len(one) for one in works)
+    return solution.kept + steps + len(solution.steps) <= MAX_STEPS

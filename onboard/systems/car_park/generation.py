@@ -15,7 +15,8 @@ from onboard.core.negotiation import CallKey, NeededAnswers, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine, Segment, Station
 from onboard.systems.car_park.ahead import Ahead, Checked, key_of
-from onboard.systems.car_park.alternatives import Alternative, Solution
+from onboard.systems.car_park.alternatives import Alternative, Solution, can_be_told
+from onboard.systems.car_park.charging import Charging
 from onboard.systems.car_park.clearance import MAX_EXPANSIONS, Clearance, Seen
 from onboard.systems.car_park.fetching import to_fetch_from
 from onboard.systems.car_park.program import (
@@ -56,8 +57,6 @@ YIELDING_US = 45_000_000
 HEARD_US = 2_000_000
 #: Others' ways back are asked to yield for no less than so much: each that yields tells its plan anew.
 WORTH_US = 2_000_000
-
-
 #: What a request for an estimate comes to.
 Estimate = Proposal | NeededAnswers | None
 
@@ -76,11 +75,13 @@ class CarParkGeneration:
     #: What all its searches cost, and whether they are sliced.
     effort: Effort = field(default_factory=Effort)
     clearance: Clearance = field(init=False)
+    charging: Charging = field(init=False)
     #: What is worked out for bids that stand best, where searches are sliced.
     ahead: Ahead = field(init=False)
 
     def __post_init__(self) -> None:
         self.ahead = Ahead(self.effort)
+        self.charging = Charging(self.site, self.mirror, self.machine.node_id)
         self.clearance = Clearance(self.site, self.mirror, self.machine.node_id, self.effort)
 
     # --- the Estimator -----------------------------------------------------------------------------------------
@@ -114,7 +115,7 @@ class CarParkGeneration:
         """Whether this robot can take on any task."""
         program = self.program
         is_planned = program.standing is not None and not program.unplanned
-        return is_planned and not self.is_held and len(program.remaining) + 4 <= MAX_STEPS
+        return is_planned and not self.is_held and self.charging.bids and len(program.remaining) + 4 <= MAX_STEPS
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
         """First request: the best solution as a bid, or None: silence (row P45).
@@ -243,15 +244,14 @@ class CarParkGeneration:
             alternatives += more
             if best is not None and not self._have_room(best, now_us):
                 best = None
-        if best is not None and behind_bids and not self._can_tell(best):
+        if best is not None and behind_bids and not self._can_bid(best, now_us):
             best = None
         return best, alternatives
 
-    def _can_tell(self, solution: Solution) -> bool:
-        """Whether one itinerary can tell it with what may be won before it, whose ways back are then given up."""
-        before = [[step.work is not None for step in one.steps] for one in self.tentative.values()]
-        steps = sum(len(works) - works[::-1].index(True) if True in works else len(works) for works in before)
-        return solution.kept + steps + len(solution.steps) <= MAX_STEPS
+    def _can_bid(self, solution: Solution, now_us: int) -> bool:
+        """Whether one itinerary can tell it with what may be won before it, and the battery lasts for it."""
+        is_short = can_be_told(solution, self.tentative.values())
+        return is_short and self.charging.lasts(self.program, solution, now_us)
 
     def _have_room(self, solution: Solution, now_us: int) -> bool:
         """Whether each machine that only stands in the way finds another refuge in time, around this and all plans."""

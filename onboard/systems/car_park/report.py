@@ -32,9 +32,20 @@ def lines(site: CarPark) -> list[str]:
         _reached_line(site),
         machines_line(site, _KINDS),
         f"{_room_words(site)}, {robots_text(robots_of(site))}",
+        *_battery_lines(site),
         *(_loss_line(site, lift) for lift in lifts),
         *_one_way_lines(site),
     ]
+
+
+def _battery_lines(site: CarPark) -> list[str]:
+    battery = site.battery
+    if battery is None:
+        return []
+    driving_h = battery.capacity_wh / (battery.rest_w + battery.drive_w)
+    rest = f"{battery.capacity_wh / battery.rest_w:.1f} h at rest, " if battery.rest_w else ""
+    chargers = ", ".join(map(str, battery.chargers))
+    return [f"batteries: {battery.capacity_wh} Wh, {rest}{driving_h:.1f} h of driving; chargers: {chargers}"]
 
 
 def _room_words(site: CarPark) -> str:

@@ -1,5 +1,7 @@
 """Where a robot with nothing to do waits: near the next call, by the calls that were heard, given where others stand.
 
+Where robots run on batteries, it goes to charge first, as it needs (``charging.py``).
+
 It minds its own plan alone and says nothing new: its move is an itinerary without work, which yields to whoever carries
 or fetches (``onboard.ways.retreats``), and from which it bids as from a way back. What it knows of the demand it has
 heard since power-up; a restart begins anew.
@@ -13,8 +15,9 @@ from collections import Counter, deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import Grade, KindCode, LegAction, Operation
-from onboard.contract.messages import CallForProposals, Itinerary, Message, Stamp
+from onboard.contract.codes import Grade, KindCode, LegAction, Operation, Reason
+from onboard.contract.messages import BatteryState, CallForProposals, Itinerary, Message, Stamp
+from onboard.core.effects import Effect
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.clearance import MAX_EXPANSIONS
@@ -39,6 +42,8 @@ REST_US, STAGGER_US = 10_000_000, 250_000
 MARGIN_US = 2_000_000
 #: Where somebody is in the way it is tried again so much later, us.
 RETRY_US = 5_000_000
+#: Who charges first, and so is not called, sets off so long after its last work, us: a contact is sensed by then.
+LOW_REST_US = 2_000_000
 
 
 @dataclass
@@ -64,8 +69,8 @@ class Resting:
 
     @property
     def is_on(self) -> bool:
-        """Whether robots of this site go where calls are likely."""
-        return self.park.rest_at is RestAt.DEMAND
+        """Whether robots of this site go where calls are likely, or to chargers."""
+        return self.park.rest_at is RestAt.DEMAND or self.park.battery is not None
 
     @property
     def program(self) -> Program:
@@ -84,6 +89,22 @@ class Resting:
         elif isinstance(message, Itinerary) and message.grade is Grade.FIRM and self._due_us is None:
             self._due_us = now_us + self._rest_us
 
+    def sense(self, state: BatteryState, now_us: int) -> list[Effect]:
+        """The gauge tells how full the battery is; a task that it cannot pay for any more is given back untouched."""
+        effects = self.generation.charging.sense(state, now_us)
+        here = self.program.standing if self.program.step is None else None
+        if here is not None and self._due_us is None and self.generation.charging.wants(here):
+            self._due_us = now_us + self._pause_us
+        lost = self.going_around.untouched() if self.program.remaining else []
+        if lost and not self.generation.charging.pays(self.program.remaining, now_us):
+            effects += self.going_around.drop(lost[-1:], now_us)
+            effects += self.going_around.forfeit(lost[-1], Reason.IMPOSSIBLE, now_us)
+        return effects
+
+    @property
+    def _pause_us(self) -> int:
+        return LOW_REST_US if self.generation.charging.is_low else self._rest_us
+
     def next_wake(self) -> int | None:
         """When a robot that has nothing to do looks whether it should wait elsewhere, bus us."""
         return self._due_us if self.is_on and self.program.step is None else None
@@ -91,27 +112,37 @@ class Resting:
     def sets_off(self, now_us: int) -> bool:
         """Whether a robot with nothing to do goes elsewhere, where that ``is_on``: its program leads there then."""
         if self.program.version != self._version:
-            self._version, self._due_us = self.program.version, max(self._due_us or 0, now_us + self._rest_us)
+            self._version, self._due_us = self.program.version, max(self._due_us or 0, now_us + self._pause_us)
         if self._due_us is None or now_us < self._due_us:
             return False
         self._due_us = None
         here = self.program.standing
         if here is None or self.generation.is_held or self.generation.tentative or not self.going_around.is_at_ease:
             return False
-        there = self._best(here)
-        if there is None:
+        there = self._aims(here, now_us)
+        if not there:
             return False
         self._due_us = now_us + RETRY_US
         return self._plan(here, there, now_us)
 
-    def _plan(self, here: Segment, there: Segment, now_us: int) -> bool:
-        """Whether there is a way at once, around all plans; it is the program then."""
+    def _aims(self, here: Segment, now_us: int) -> frozenset[Segment]:
+        """Where it should wait instead of here: any of these."""
+        charging = self.generation.charging
+        if charging.wants(here):
+            return charging.chargers(here, now_us)
+        best = None if self.park.rest_at is RestAt.NEAREST or charging.stays(here) else self._best(here)
+        return frozenset() if best is None else frozenset([best])
+
+    def _plan(self, here: Segment, there: frozenset[Segment], now_us: int) -> bool:
+        """Whether there is a way around all plans, at once or, to a charger, behind whoever is before; then it goes."""
         mirror = self.fleet.mirror
         floors = mirror.lift_floors(now_us, now_us)
         taken, node = mirror.reservations, self.fleet.node_id
-        search = planning(self.park, taken, node, here, now_us, (), frozenset([there]), MAX_EXPANSIONS, floors)
+        search = planning(self.park, taken, node, here, now_us, (), there, MAX_EXPANSIONS, floors)
         route = self.generation.effort.whole(search)
-        if isinstance(route, NoRoute) or len(route.legs) >= MAX_STEPS or route.legs[0].action is LegAction.STAND:
+        if isinstance(route, NoRoute) or len(route.legs) >= MAX_STEPS:
+            return False
+        if route.legs[0].action is LegAction.STAND and not self.generation.charging.wants(here):
             return False
         self.program.replace(list(steps_of(route, ())), Stamp(to_bus_ms(now_us), node, 0))
         return True

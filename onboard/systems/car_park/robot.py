@@ -8,6 +8,7 @@ from functools import partial
 from onboard.contract.codes import CallResult, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
 from onboard.contract.messages import (
     Award,
+    BatteryState,
     CallForProposals,
     DriveState,
     Itinerary,
@@ -148,15 +149,14 @@ class ParkingRobot:
         return []
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
-        """States of drive and shuttle; a shuttle that fails stops the robot for good."""
+        """States of drive, shuttle and battery; a shuttle that fails, or an empty battery, stops the robot for good."""
         if isinstance(message, DriveState):
             return self.carriage.sense(message, now_us)
-        if isinstance(message, ShuttleState):
-            effects = self.shuttle.sense(message, now_us)
-            if self.shuttle.fault and self._fault is Reason.NONE:
-                effects += self._fail(Reason.ACTUATOR_FAULT, now_us)
-            return effects
-        return []
+        effects = self.shuttle.sense(message, now_us) if isinstance(message, ShuttleState) else []
+        effects += self.resting.sense(message, now_us) if isinstance(message, BatteryState) else []
+        if (self.shuttle.fault or self.generation.charging.is_empty) and self._fault is Reason.NONE:
+            effects += self._fail(Reason.ACTUATOR_FAULT, now_us)
+        return effects
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Another machine's plan may mean that mine has to come later, or to take another way."""

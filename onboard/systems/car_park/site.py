@@ -8,6 +8,7 @@ from typing import ClassVar
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import CallForProposals
 from onboard.core.site import MotionNeeds, Site, Station
+from onboard.systems.car_park.battery import Battery
 from onboard.ways.site import Axis, WaySite
 from onboard.work.timing import DeviceTiming
 
@@ -158,6 +159,8 @@ class CarPark(WaySite):
     promises: bool = False
     #: In the order in which a car is tried against them; numbers are from 1.
     classes: tuple[SizeClass, ...] = ()
+    #: What robots run on; None: on power that does not end.
+    battery: Battery | None = None
     #: Number of a place's class by its station's number; who is not named takes every car of the site.
     place_class: dict[int, int] = field(default_factory=dict)
     #: What the file calls alleys beside the one that each floor has by itself, by track number.

@@ -281,11 +281,17 @@ function machineLines() {
   for (const [track, from, to, begin, end] of told.plan ?? []) lines.push(`${clock(begin)} to ${clock(end)}: ${track >= 128 ? "lift or spur" : "floor"} ${track}, ${from} to ${to}`);
   const seals = Object.entries(told.seals ?? {}).map(([mark, count]) => `${count} ${mark}`);
   if (seals.length) lines.push(`frames: ${seals.join("; ")}`);
+  if (told.battery) lines.push(batteryLine(told.battery));
   if (told.desk) lines.push(`the desk shows: ${told.desk}`);
   if (told.doors) lines.push(`street door ${told.doors.input}, alley door ${told.doors.output}, light ${told.doors.light}`);
   const task = snapshot.tasks.find((one) => one.owner === machine.name);
   if (task) lines.push(`works on task ${task.task} (${task.what}, ${task.phase})${task.promised_us ? `, promised for ${clock(task.promised_us)}` : ""}`);
   return lines;
+}
+
+function batteryLine(battery) {
+  if (!battery.percent) return "battery empty: it stands";
+  return `battery ${battery.percent.toFixed(0)} %${battery.charging ? ", charging" : ""}${battery.bids ? "" : ", charges first"}`;
 }
 
 function callLines() {

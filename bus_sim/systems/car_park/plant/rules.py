@@ -28,6 +28,7 @@ class PlantRule(Enum):
     FALL = "a carrier in a shaft without a platform"
     ONE_ABOARD = "two bodies are on one platform"
     TURN_IN_MOUTH = "a carrier turns elsewhere than in a mouth"
+    POWER = "a battery is empty, and nothing has struck"
     RIDE_AT_REST = "a carrier moves on a moving platform"
 
 

@@ -20,7 +20,8 @@ def _silent_form(simulation: Simulation) -> None:
     """The seed papers' form: at the deadline everybody takes itself to know who has won."""
 
     def plant(controller: Controller) -> None:
-        controller.holon.negotiation.silent = True
+        negotiation = controller.holon.negotiation
+        negotiation.timing = changed(negotiation.timing, silent=True)
 
     at_start(simulation, None, plant)
 

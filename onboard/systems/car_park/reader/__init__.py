@@ -6,6 +6,7 @@ from onboard.config.reader import Common, TomlTable
 from onboard.config.timing import read_timing
 from onboard.contract.codes import KindCode
 from onboard.systems.car_park.reader.alleys import read_layout
+from onboard.systems.car_park.reader.battery import check_chargers, read_battery
 from onboard.systems.car_park.reader.built import only_tracks
 from onboard.systems.car_park.reader.classes import check_heights, read_classes
 from onboard.systems.car_park.reader.constants import read_constants
@@ -38,6 +39,8 @@ def read(root: TomlTable, common: Common) -> CarPark:
     desk = DeskPolicy(negotiation.choice("desk", [one.value for one in DeskPolicy], "any"))
     tells_offers = negotiation.choice("offers", ["kept", "told"], "kept") == "told"
     promises = negotiation.flag("promises", default=False)
+    power = root.table("battery")
+    battery = read_battery(power, layout, [home for _, home in fleet.robots])
     timing = replace(timing, sub_call_percent=negotiation.integer("sub_call_percent", 20, 80, 50))
     root.check_unknown()
     sound = sound_tracks(root, layout)
@@ -68,8 +71,11 @@ def read(root: TomlTable, common: Common) -> CarPark:
         bay_uses={bay.node: bay.use for bay in bays if bay.use is not BayUse.BOTH},
         classes=classes,
         place_class=place_class,
+        battery=battery,
         alley_names={number: name for (_, name), number in layout.named.items() if name != BASE},
     )
     site = check_whole(root, layout, only_tracks(site, sound), fleet, bays, crowded=common.crowded)
+    if battery is not None and not root.problems.found and not common.crowded:
+        check_chargers(power, site, battery)
     root.problems.raise_if_any()
     return site
