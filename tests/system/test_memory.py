@@ -27,6 +27,8 @@ FIGURES = {
     "NegotiationCounts.slack_ms",
     "Oracle._where",
     "Street._by_ticket",
+    "VisitLog._carried_us",
+    "VisitLog._seen",
 }
 
 

@@ -11,14 +11,16 @@ from bus_sim.systems.car_park.meter import Meter
 from bus_sim.systems.car_park.response import Measured, judge, measure, worst_by_message
 from onboard.contract.codes import KindCode
 from onboard.core.mirror import MISSED_HEARTBEATS
+from onboard.systems.car_park.battery import Battery
 from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.systems.car_park.traffic import excess, operation, power_up, reasons, waits
 from onboard.trace.response import ANYBODY, Stream, fifo_bounds
 from onboard.wire.dbc_file import fleet_layouts
 
 #: Sent by gateways, to those who ask for everything again, or while rights are disputed, regenerated or stood still;
-#: and seals, which only sites that ask for them have.
+#: seals and levels of batteries, which only sites that ask for them have.
 NOT_IN_OPERATION = {
+    "BatteryLevel",
     "Go", "Halted", "LeftOut", "OperatorOrder", "Regeneration", "RegenerationState", "SyncDone", "SyncRequest",
     "Seal", "SealAnswer", "SealChallenge", "SealFault", "SealTo",
     "TokenAssigned", "TokenDispute", "TokenGiven", "TokenSeen",
@@ -47,6 +49,14 @@ def test_promises_have_a_stream_where_they_are_made() -> None:
         one for one in promising if one.name == "Promise"
     ]
     assert {one.node for one in promising if one.name == "Promise"} == set(site.compartments)
+
+
+def test_batteries_have_a_stream_where_robots_run_on_them() -> None:
+    site = car_park(find_site("standard"))
+    powered = operation(dataclasses.replace(site, battery=Battery(480, 200, 300, 300, 80, 960, 25, 50, 80, ())))
+    assert {one.name for one in powered if one not in operation(site)} == {"BatteryLevel"}
+    robots = {one.node_id for one in site.machines.values() if one.kind is KindCode.ROBOT}
+    assert {one.node for one in powered if one.name == "BatteryLevel"} == robots
 
 
 def test_streams_are_told_once_and_have_the_priority_of_their_identifiers() -> None:

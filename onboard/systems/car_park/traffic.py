@@ -183,6 +183,10 @@ _OPERATION = (
 _PROMISED = (
     TrafficBound("Promise", _COMPARTMENT, _two, _second, "a ticket goes in, and one that was read elsewhere is won"),
 )
+#: Beside those where robots run on batteries.
+_POWERED = (
+    TrafficBound("BatteryLevel", _ROBOT, _two, _second, "another hundredth, and charging or bidding begins or ends"),
+)
 
 #: Every machine asks all once, and who was not answered; it says all it has once to all who ask within a quarter of a
 #: second, and once to who asks late (``onboard/holon/witness.py``). Nobody holds cars or has plans yet.
@@ -228,7 +232,9 @@ def numbers_of(site: Site) -> Numbers:
 
 def operation(site: Site) -> list[Stream]:
     """Everything that may be queued while a site runs."""
-    return list(_streams(site, (*_OPERATION, *(_PROMISED if car_park(site).promises else ()))))
+    park = car_park(site)
+    asked = (*(_PROMISED if park.promises else ()), *(_POWERED if park.battery is not None else ()))
+    return list(_streams(site, (*_OPERATION, *asked)))
 
 
 def power_up(site: Site) -> list[Stream]:

@@ -46,6 +46,8 @@ class Planner:
     stamp: Stamp = _NO_STAMP
     _looked_at: int = -1
     _again_at_us: int | None = None
+    #: Until when the plan that was made anew last stands, us: how it goes shows only then.
+    _stands_until_us: int = 0
     _patience_at_us: int | None = None
     _queue_at_us: int | None = None
     _said_at_us: int | None = None
@@ -274,6 +276,9 @@ class Planner:
         owned, traffic = self.owned, self.mirror.traffic
         if owned is None or (self.body.is_moving or self.body.is_handling):
             return []
+        if now_us < self._stands_until_us:
+            self._again_at_us, self._looked_at = self._stands_until_us, traffic.changes
+            return []
         self._patience_at_us = self._patience_end(now_us)
         due = self._again_at_us is not None and self._again_at_us <= now_us
         if traffic.changes == self._looked_at and not due:
@@ -296,6 +301,7 @@ class Planner:
         if plan is None or (plan.end >= end_us and not must) or (same_way and "blocked" in why):
             return []
         self.touched += 1
+        self._stands_until_us = now_us + AGAIN_US
         return [Report(f"plan made anew: {why}"), *self._adopt(plan, now_us)]
 
     def _patience_end(self, now_us: int) -> int | None:
