@@ -1,4 +1,4 @@
-"""When a robot charges: a task that it offers itself (issue 17, point 9), by its gauge and the site's ``[battery]``.
+"""When a robot charges: a task that it offers itself, by its gauge and the site's ``[battery]``.
 
 With nothing to do and less than ``seek_percent`` it goes to a charger as it goes to rest: by an itinerary without work,
 which others see, and which yields to whoever carries or fetches. On the way and at the charger it bids as ever: so
