@@ -333,8 +333,9 @@ class PassingOrder:
     def _is_in_front(self, node: int, other: int, segment: Segment, mine: Turn, theirs: Turn) -> bool:
         """Whether ``other`` passes before ``node`` by where it is: in my next run, from where it goes on or leaves.
 
-        Whatever was agreed, no plan leads through a body. Who stands there for ever gives way. Where my run ends in a
-        segment I come behind it with all that I do there until I leave: not into it behind the other, out of it before.
+        Whatever was agreed, no plan leads through a body. Who stands there for ever gives way. I come behind it with all
+        that I do in or after that run, and behind all that it does in a segment until it leaves: out of one before the
+        other, or through it again, that I came into behind it, would be a circle.
         """
         there = self.place(other)
         number = self._run_through(node, there)
@@ -344,11 +345,10 @@ class PassingOrder:
         step = _step(run)
         if segment.index not in range(there.index, run.to_index + step, step):
             return False
-        if not way.stays(segment, way.to_come(number), mine.to_come):
+        if mine.to_come > way.to_come(number) or self._run_through(other, self.place(node)) is not None:
             return False
-        if self._run_through(other, self.place(node)) is not None:
-            return False
-        return theirs.to_come in self._ways[other].line(segment, step)
+        before = self._ways[other]
+        return any(before.stays(segment, first, theirs.to_come) for first in before.line(segment, step))
 
     def _agreed_first(self, node: int, other: int, segment: Segment, one: Turn, two: Turn) -> int | None:
         """Who of two machines comes first in these turns by the times under which they last agreed."""

@@ -140,3 +140,16 @@ def test_a_predecessor_that_has_passed_and_comes_again_settles_it_too() -> None:
     assert order.verdict(BOB, Segment(1, 7), 1, ALICE) is Reason.TOKEN_NOT_GRANTABLE_YET
     order.on_progress(progress(ALICE, 0, 4))
     assert order.verdict(BOB, Segment(1, 7), 1, ALICE) is Reason.NONE
+
+
+def test_who_stands_in_my_way_goes_first_wherever_i_come_after_it() -> None:
+    """A clock that was set back has put Alice's way through Bob's body, and back again, before Bob goes on (41197)."""
+    alice = plan(ALICE, [(2, 8, 20), (8, 2, 40)])
+    bob = plan(BOB, [(5, 5, 60), (5, 12, 80)])
+    order = order_of(alice, bob)
+    assert [order.predecessor(ALICE, Segment(1, index)) for index in (5, 6, 7)] == [BOB, BOB, BOB]
+    assert [order.predecessor(BOB, Segment(1, index)) for index in (5, 6, 7)] == [NOBODY, NOBODY, NOBODY]
+    tell(order, plan(BOB, [(5, 5, 30), (5, 12, 80)], version=2))
+    found = order.meetings(BOB, ALICE)
+    assert {meeting.theirs.to_come for meeting in found} == {0, 1}
+    assert {order.in_front(BOB, ALICE, meeting) for meeting in found} == {BOB}
