@@ -156,10 +156,12 @@ class Witness:
         if digest == self.digest:
             return False
         if self.digest is not None:
-            old = [one for one, until_us in self.digests_before.items() if until_us < now_us - FRAMES_WAIT_US]
-            for one in old:
-                del self.digests_before[one]
-            self.digests_before[self.digest] = now_us
+            before = self.digests_before
+            # In the order of time: hundreds may come in one wait, and none of those is looked at for each.
+            before.pop(self.digest, None)
+            while before and next(iter(before.values())) < now_us - FRAMES_WAIT_US:
+                del before[next(iter(before))]
+            before[self.digest] = now_us
         self.digest = digest
         digested = self.mirror.digested
         if not any(isinstance(effect, Send) and isinstance(effect.message, digested) for effect in effects):

@@ -45,6 +45,7 @@ class RunSummary:
     unserved: int
     wait_in: Durations
     wait_out: Durations
+    wait_ready: Durations
     burst: BurstFigures | None
     fleet: FleetIndicators
     bays: tuple[BayFigures, ...]
@@ -102,6 +103,7 @@ class RunSummary:
             f"{self.refused_full}, too large {self.refused_too_large}{unchargeable}   waiting now {self.unserved}",
             f"waiting in   {self.wait_in}",
             f"waiting out  {self.wait_out}",
+            f"car ready    {self.wait_ready}",
         ]
         burst = self.burst
         if burst is not None and burst.count > 1:

@@ -105,7 +105,7 @@ TABLE: dict[tuple[CustomerState, CustomerEvent], tuple[CustomerState, str]] = {
     (CustomerState.AT_DESK, CustomerEvent.WAIT): (CustomerState.AT_DESK, "be_patient"),
     (CustomerState.AT_DESK, CustomerEvent.SENT): (CustomerState.AT_DESK, "be_patient"),
     (CustomerState.AT_DESK, CustomerEvent.UNKNOWN): (CustomerState.AT_DESK, "try_later"),
-    (CustomerState.AT_DESK, CustomerEvent.READY): (CustomerState.AWAITING_DOOR, "be_patient"),
+    (CustomerState.AT_DESK, CustomerEvent.READY): (CustomerState.AWAITING_DOOR, "see_car_ready"),
     (CustomerState.AWAITING_DOOR, CustomerEvent.DOOR_OPEN): (CustomerState.DRIVING_OUT, "fetch"),
     (CustomerState.DRIVING_OUT, CustomerEvent.TIMER): (CustomerState.GONE, "drive_away"),
 }
@@ -119,12 +119,18 @@ class CustomerVisit:
     arrived_us: int | None = None
     parked_us: int | None = None
     asked_us: int | None = None
+    ready_us: int | None = None
     gone_us: int | None = None
 
     @property
     def in_wait_us(self) -> int | None:
         """From arrival in the queue to walking away with a ticket."""
         return _span(self.arrived_us, self.parked_us)
+
+    @property
+    def ready_wait_us(self) -> int | None:
+        """From the ticket in the desk to reading that the car is ready: without the driver's own time."""
+        return _span(self.asked_us, self.ready_us)
 
     @property
     def out_wait_us(self) -> int | None:
@@ -180,6 +186,12 @@ class Customer:
             self._leave_us = origin_us + self.stay.departure_us
         if self.stay.cancel_us is not None:
             self._timers.call_at(origin_us + self.stay.cancel_us, lambda: self.on(CustomerEvent.CANCEL))
+
+    def begin_parked(self, ticket: Ticket, origin_us: int) -> None:
+        """The car stands inside since before loop time 0, which no figure counts."""
+        self.state, self.ticket, self.visit.parked_us = CustomerState.PARKED, ticket, -1
+        if self.stay.departure_us is not None:
+            self._timers.call_at(origin_us + self.stay.departure_us, self.leave_now)
 
     @property
     def is_leaving(self) -> bool:
@@ -316,6 +328,10 @@ class Customer:
         self.state = CustomerState.GONE
         self.visit.outcome = VisitOutcome.TICKET_UNKNOWN
 
+    def _see_car_ready(self) -> None:
+        self._be_patient()
+        self.visit.ready_us = self._timers.now_us()
+
     def _fetch(self) -> None:
         if self._place.car != self.stay.car:
             there = self._place.car.name if self._place.car is not None else "no car"
@@ -352,6 +368,7 @@ class Customer:
         "cancel": _cancel,
         "be_patient": _be_patient,
         "try_later": _try_later,
+        "see_car_ready": _see_car_ready,
         "fetch": _fetch,
         "drive_away": _drive_away,
     }
