@@ -41,6 +41,8 @@ ANSWER_PERIOD_US = 250_000
 #: all others has answered all; then each has its own, as long as a question and the first answer at 125 kbit/s.
 FIRST_SLOT_US = 400_000
 SLOT_US = 5_000
+#: A slot is put off for an answer's period at most so often: five seconds, 15,000 words at 500 kbit/s.
+MOST_WAITS = 20
 #: From one question to who has not answered to the next, us: two shared answers.
 AGAIN_US = 500_000
 #: So many heartbeat periods after its start a machine has been compared with by all that live: the first word may be
@@ -96,6 +98,9 @@ class Witness:
     _quiet_until_us: int | None = None
     #: Whom to ask when, unless its answer to another is heard before.
     _slots: dict[int, int] = field(default_factory=dict)
+    #: Words about rights heard since a slot was put off last, and how often one was since the start.
+    _words: int = 0
+    _waits: int = 0
 
     def __post_init__(self) -> None:
         self.site, self.node_id = self.tokens.site, self.tokens.node_id
@@ -178,6 +183,7 @@ class Witness:
         self.tokens.is_synced = False
         self._since_us = now_us
         self._ask_at_us = now_us + self.site.timing.heartbeat_us
+        self._waits = 0
         self.tokens.asked = set(self._others)
         # Who comes back after a hold asks anew: what was answered before that is old.
         self.answered.clear()
@@ -269,12 +275,21 @@ class Witness:
                 effects += self.ask(node)
             for node in sorted(missing - live):
                 effects.append(Send(Halted(self.node_id, self.node_id, Reason.JOURNAL_LOST, node, False, self.boot)))
-        for node in sorted(node for node, due_us in self._slots.items() if due_us <= now_us):
+        for node in self._due(now_us):
             del self._slots[node]
             effects += [] if self._is_made_up(node, now_us) else self.ask(node)
         if self._answer_at_us is not None and self._answer_at_us <= now_us:
             effects += self._answer(now_us)
         return effects
+
+    def _due(self, now_us: int) -> list[int]:
+        """Whom to ask now. While answers to my start still come, who is silent may be waiting behind them."""
+        due = sorted(node for node, due_us in self._slots.items() if due_us <= now_us)
+        if not due or self.is_over or not self._words or self._waits >= MOST_WAITS:
+            return due
+        self._words, self._waits = 0, self._waits + 1
+        self._slots = {node: max(due_us, now_us + ANSWER_PERIOD_US) for node, due_us in self._slots.items()}
+        return []
 
     def next_wake(self) -> int | None:
         """When there is something to ask or to answer, bus time in us."""
@@ -379,6 +394,7 @@ class Witness:
         """Compare what a machine says of a token with the journal, before the word counts for anything else."""
         if word.sender not in self._others:
             return
+        self._words += 1
         key = TokenKey(word.token_kind, word.token)
         if isinstance(word, TokenHeld | TokenGrant | TokenGiven):
             self._said_again(word.sender, key, word.version)

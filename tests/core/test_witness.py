@@ -272,6 +272,24 @@ def test_who_is_new_is_asked_by_one_of_all_who_want_to_know() -> None:
     assert bob.witness.next_wake() is None, "what the steward told Alice, Bob has heard"
 
 
+def test_nobody_is_asked_again_while_answers_still_come() -> None:
+    """With hundreds of cars inside the answers of all take a second: who asks in between makes all be said again."""
+    alice = Machine(ALICE)
+    alice.knows(BOB)
+    alice.start()
+    beat = Heartbeat(STEWARD, 0, 0, 0, 1, KindCode.COMPARTMENT, MachineState.IDLE)
+    alice.mirror.on_heartbeat(beat, START_US)
+    alice.witness.on_heartbeat(beat, START_US, is_fresh=True)
+    due_us = alice.witness.next_wake()
+    for version in range(1, 4):
+        assert due_us is not None
+        alice.hear(TokenHeld(BOB, KEY.kind, KEY.number, version), due_us - 1)
+        assert alice.wake(due_us) == []
+        due_us = alice.witness.next_wake()
+    assert due_us is not None
+    assert alice.wake(due_us) == [SyncRequest(ALICE, STEWARD)], "nothing came for an answer's period"
+
+
 def differs(machine: Machine, digest: int, now_us: int) -> list[SyncRequest]:
     """What a machine asks soon after a peer's heartbeat with this digest."""
     beat = Heartbeat(STEWARD, 0, 0, digest, 1, KindCode.COMPARTMENT, MachineState.IDLE)
