@@ -108,6 +108,10 @@ class BusClock:
         self.offset_us += ahead_us
         return True
 
+    def is_far(self, bus_time_us: int, local_us: int) -> bool:
+        """Whether a time message is too far off to be slewed to; never the first."""
+        return self.is_set and abs(self._error_us(bus_time_us, local_us)) > FAR_US
+
     def said_us(self, local_us: int) -> int:
         """Bus time as it goes on the wire."""
         return self.bus_us(local_us) % BUS_TIME_MODULUS
