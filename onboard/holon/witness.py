@@ -41,7 +41,10 @@ ANSWER_PERIOD_US = 250_000
 #: all others has answered all; then each has its own, as long as a question and the first answer at 125 kbit/s.
 FIRST_SLOT_US = 400_000
 SLOT_US = 5_000
-#: A slot is put off for an answer's period at most so often: five seconds, 15,000 words at 500 kbit/s.
+#: So many words about rights since the start, or since something was put off, are no ordinary work: a tenth of what an
+#: answer's period at 500 kbit/s holds.
+FLOOD = 100
+#: A slot or an answer is put off for an answer's period at most so often: five seconds, 15,000 words at 500 kbit/s.
 MOST_WAITS = 20
 #: From one question to who has not answered to the next, us: two shared answers.
 AGAIN_US = 500_000
@@ -98,7 +101,7 @@ class Witness:
     _quiet_until_us: int | None = None
     #: Whom to ask when, unless its answer to another is heard before.
     _slots: dict[int, int] = field(default_factory=dict)
-    #: Words about rights heard since a slot was put off last, and how often one was since the start.
+    #: Words about rights heard since anything was put off last, and how often that was since the start.
     _words: int = 0
     _waits: int = 0
 
@@ -278,18 +281,33 @@ class Witness:
         for node in self._due(now_us):
             del self._slots[node]
             effects += [] if self._is_made_up(node, now_us) else self.ask(node)
-        if self._answer_at_us is not None and self._answer_at_us <= now_us:
+        if self._is_answering(now_us):
             effects += self._answer(now_us)
         return effects
 
     def _due(self, now_us: int) -> list[int]:
-        """Whom to ask now. While answers to my start still come, who is silent may be waiting behind them."""
+        """Whom to ask now."""
         due = sorted(node for node, due_us in self._slots.items() if due_us <= now_us)
-        if not due or self.is_over or not self._words or self._waits >= MOST_WAITS:
+        if not due or not self._is_flooded():
             return due
-        self._words, self._waits = 0, self._waits + 1
         self._slots = {node: max(due_us, now_us + ANSWER_PERIOD_US) for node, due_us in self._slots.items()}
         return []
+
+    def _is_answering(self, now_us: int) -> bool:
+        """Whether those who asked meanwhile are answered now."""
+        if self._answer_at_us is None or self._answer_at_us > now_us:
+            return False
+        if not self._is_flooded():
+            return True
+        self._answer_at_us = self._quiet_until_us = now_us + ANSWER_PERIOD_US
+        return False
+
+    def _is_flooded(self) -> bool:
+        """Whether answers to my start still come: who is silent may be waiting behind them, and so may who asks."""
+        if self.is_over or self._words < FLOOD or self._waits >= MOST_WAITS:
+            return False
+        self._words, self._waits = 0, self._waits + 1
+        return True
 
     def next_wake(self) -> int | None:
         """When there is something to ask or to answer, bus time in us."""
