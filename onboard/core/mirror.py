@@ -134,10 +134,7 @@ class Mirror:
         return {node for node, peer in self.peers.items() if peer.heard_at_us >= limit_us}
 
     def digest(self) -> int:
-        """16 bits over firm itineraries (node, version) and what else all are to believe.
-
-        CRC-16/CCITT-FALSE: short, and the same in any language.
-        """
+        """CRC-16/CCITT-FALSE over firm itineraries (node, version) and what else all are to believe."""
         if self._digest is None:
             plans = [node << 8 | itinerary.version for node, itinerary in sorted(self.itineraries.items())]
             self._digest = crc_hqx(digest_words(plans) + self._believed(), 0xFFFF)

@@ -47,7 +47,7 @@ class _StandingCars:
             numbers[car.number] = digest_words([car.origin << 16 | car.number, station])
 
     def joined(self) -> bytes:
-        """Of all cars."""
+        """Of all cars; nothing where there are none."""
         for origin in self.words.keys() - self._joined.keys():
             self._joined[origin] = b"".join(words for _, words in sorted(self.words[origin].items()))
         return b"".join(words for _, words in sorted(self._joined.items()))

@@ -227,7 +227,9 @@ class WayMirror(CarMirror):
 
     def _believed(self) -> bytes:
         """Blocked segments as well."""
-        return super()._believed() + digest_words([1 << 31 | one.number for one in sorted(self.obstacles.blocked)])
+        blocked = self.obstacles.blocked
+        said = super()._believed()
+        return said + digest_words([1 << 31 | one.number for one in sorted(blocked)]) if blocked else said
 
 
 @dataclass

@@ -107,6 +107,7 @@ def test_the_digest_is_what_it_says_it_is_of_whatever_cars_came_moved_and_left()
     places = [place.number for place in SITE.places]
     words = [(2, 7, 3), (1, 9, 4), (2, 1, 5), (1, 9, 6), (2, 7, None), (1, 2, 3), (2, 8, 0)]
     standing: dict[Reference, int] = {}
+    ordered: list[tuple[Reference, int]] = []
     for version, (origin, number, place) in enumerate(words, start=1):
         car, station = Reference(origin, number), OUTSIDE if place is None else places[place]
         assert mirror.on_car(CarAt(11, car, station, version, 2500))

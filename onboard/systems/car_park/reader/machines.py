@@ -77,11 +77,7 @@ def read_stewards(table: TomlTable, layout: Layout, fleet: FleetReader) -> dict[
     for number, track in layout.tracks.items():
         if not table.has(str(number)):
             if fixed:
-                hops = _hops(joined, number)
-                far = len(layout.tracks)
-                stewards[number] = min(
-                    (_distance(layout, one, track), hops.get(one.home.track, far), one.node_id) for one in fixed
-                )[-1]
+                stewards[number] = _nearest(layout, joined, fixed, track).node_id
             continue
         name = table.text(str(number))
         machine = fleet.by_name.get(name)
@@ -91,6 +87,14 @@ def read_stewards(table: TomlTable, layout: Layout, fleet: FleetReader) -> dict[
             known = ", ".join(one.name for one in fixed)
             table.bad(str(number), name, "no fixed machine of this name", f"fixed machines here: {known}")
     return stewards
+
+
+def _nearest(layout: Layout, joined: dict[int, set[int]], fixed: list[Machine], track: Track) -> Machine:
+    """Of the fixed machines the fewest floors away that with the fewest tracks on the way, then the lowest node-ID."""
+    floors = {one.node_id: _distance(layout, one, track) for one in fixed}
+    near = [one for one in fixed if floors[one.node_id] == min(floors.values())]
+    hops = _hops(joined, track.number) if len(near) > 1 else {}
+    return min(near, key=lambda one: (hops.get(one.home.track, len(joined)), one.node_id))
 
 
 def _distance(layout: Layout, machine: Machine, track: Track) -> int:
