@@ -49,6 +49,8 @@ FAST = "\n[carrier]\nspeed_mm_s = 2_080\n\n[shuttle]\nspeed_mm_s = 1_500\n\n[lif
 SECOND_US, HOUR_US = 1_000_000, 3_600_000_000
 #: Nobody comes in the first minute: the machines tell each other what they know.
 POWER_UP_US = 60 * SECOND_US
+#: A long part tells how it stands every half hour of its own time.
+TOLD_US = 1_800 * SECOND_US
 #: A part is not counted in its first minutes.
 LEAD_US = 600 * SECOND_US
 #: A car stays so long before it may be fetched.
@@ -140,7 +142,11 @@ async def turn_over(park: Park, what: str, per_hour: float, hours: float) -> Non
     await park.pass_us(LEAD_US)
     park.stage.measure_from(park.now_us)
     begin_us, before = park.now_us, park.waiting()
-    await park.pass_us(span_us - LEAD_US)
+    while (left_us := begin_us + span_us - LEAD_US - park.now_us) > 0:
+        await park.pass_us(min(left_us, TOLD_US))
+        so_far = park.stage.plant.street.summary(begin_us)
+        hours_so_far = (park.now_us - begin_us) / HOUR_US
+        _say(f"{what}: {hours_so_far:.1f} h: in {so_far.parked}, out {so_far.served}, waiting {park.waiting()}")
     found = park.summary(begin_us, time.monotonic() - wall_s)
     through = (found.cars_in + found.cars_out) / hours
     cpu_s = time.process_time() - cpu_s
