@@ -63,18 +63,15 @@ class BusClock:
 
         One that is far off loses the clock, and the next sets it if it says the same.
         """
-        error_us = self._error_us(bus_time_us, local_us)
-        confirmed = self.far_us is not None and abs(away(error_us, self.far_us, BUS_TIME_MODULUS)) <= SAME_US
+        error_us, far_us = self._error_us(bus_time_us, local_us), self.far_us
+        self.far_us = None
         if self.heard_at_us is None:
-            self.far_us = None
             self.offset_us += error_us
-        elif confirmed:
-            self.far_us = None
+        elif far_us is not None and abs(away(error_us, far_us, BUS_TIME_MODULUS)) <= SAME_US:
             self.offset_us += error_us % BUS_TIME_MODULUS
         elif abs(error_us) > FAR_US:
             self.far_us = error_us
         else:
-            self.far_us = None
             self.offset_us += max(-MAX_SLEW_US, min(MAX_SLEW_US, error_us))
         self.heard_at_us = local_us
 
@@ -103,10 +100,13 @@ class BusClock:
         """Take up the time of the bus, where this machine has just begun to send its own and that is behind."""
         ahead_us = self._error_us(bus_time_us, local_us)
         is_young = self.source_since_us is not None and local_us - self.source_since_us < YOUNG_US
-        if not (self.is_source and is_young and ahead_us > FAR_US):
-            return False
-        self.offset_us += ahead_us
-        return True
+        adopts = self.is_source and is_young and ahead_us > FAR_US
+        self.offset_us += ahead_us if adopts else 0
+        return adopts
+
+    def is_far(self, bus_time_us: int, local_us: int) -> bool:
+        """Whether a time message is too far off to be slewed to; never the first."""
+        return self.is_set and abs(self._error_us(bus_time_us, local_us)) > FAR_US
 
     def said_us(self, local_us: int) -> int:
         """Bus time as it goes on the wire."""
@@ -119,6 +119,5 @@ class BusClock:
         """Whether deadlines can no longer be trusted; such a machine does not bid."""
         if self.is_source:
             return False
-        if self.far_us is not None:
-            return True
-        return self.heard_at_us is None or local_us - self.heard_at_us > MISSED_LIMIT * self.period_us
+        is_far, heard_us = self.far_us is not None, self.heard_at_us
+        return is_far or heard_us is None or local_us - heard_us > MISSED_LIMIT * self.period_us

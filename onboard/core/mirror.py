@@ -7,8 +7,9 @@ costs time, never safety: what moves is guarded by tokens.
 
 from binascii import crc_hqx
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
+from struct import pack
 from typing import Any, ClassVar, NamedTuple
 
 from onboard.contract.codes import Grade, KindCode, MachineState, Reason
@@ -49,9 +50,9 @@ class Obstacle(NamedTuple):
     reason: Reason
 
 
-def _crc16(values: list[int]) -> int:
-    """CRC-16/CCITT-FALSE over the values as 32-bit big-endian words: short, and the same in any language."""
-    return crc_hqx(b"".join((value & 0xFFFFFFFF).to_bytes(4, "big") for value in values), 0xFFFF)
+def digest_words(values: Collection[int]) -> bytes:
+    """Values as the digest takes them: words of 32 bits, the high byte first."""
+    return pack(f">{len(values)}I", *values)
 
 
 @dataclass
@@ -133,17 +134,17 @@ class Mirror:
         return {node for node, peer in self.peers.items() if peer.heard_at_us >= limit_us}
 
     def digest(self) -> int:
-        """16 bits over firm itineraries (node, version) and what else all are to believe."""
+        """CRC-16/CCITT-FALSE over firm itineraries (node, version) and what else all are to believe."""
         if self._digest is None:
             plans = [node << 8 | itinerary.version for node, itinerary in sorted(self.itineraries.items())]
-            self._digest = _crc16([*plans, *self._believed()])
+            self._digest = crc_hqx(digest_words(plans) + self._believed(), 0xFFFF)
         return self._digest
 
     # --- what a system's own mirror adds ------------------------------------------------------------------------
 
-    def _believed(self) -> list[int]:
-        """More words for the digest, 32 bits each."""
-        return []
+    def _believed(self) -> bytes:
+        """More for the digest (``digest_words``); it is asked for after each word that changes it, however many."""
+        return b""
 
     def joins(self, tokens: TokenBook, drops: Counter[Reason]) -> None:
         """Whose rights decide which words count, and where those that do not are counted."""

@@ -40,6 +40,8 @@ class Timekeeper:
     due_us: int | None = None
     _steady_us: int = 0
     _behind_us: int = 0
+    #: The lowest node that has sent bus time within a heartbeat, and when it did last, loop time in us.
+    _source: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
         self.clock = BusClock(self.site.timing.bus_time_us)
@@ -89,6 +91,9 @@ class Timekeeper:
         if not is_mobile and message.sender > self.machine.node_id:
             # At power-up every fixed machine speaks until it hears a lower one: that is no mistake.
             return TimeHeard.SET_ANEW if self.clock.adopt(message.bus_time_us, local_us) else TimeHeard.NOTHING
+        if self._is_old(message, local_us):
+            self.drops[Reason.LATE] += 1
+            return TimeHeard.NOTHING
         if not is_mobile and self.clock.refutes(message.bus_time_us, local_us):
             return TimeHeard.REFUTED
         first, before_us = not self.clock.is_set, self.clock.bus_us(local_us)
@@ -96,3 +101,15 @@ class Timekeeper:
         if first:
             return TimeHeard.FIRST
         return TimeHeard.SET_ANEW if self.clock.bus_us(local_us) - before_us > MAX_SLEW_US else TimeHeard.FOLLOWED
+
+    def _is_old(self, message: BusTime, local_us: int) -> bool:
+        """Whether a machine that is the source no longer says a time that waited behind its other words.
+
+        At power-up every fixed machine sends bus time until it hears a lower one, and may have hundreds of words before
+        it on the bus: two such times that are as far off would set clocks wrong.
+        """
+        known = self._source
+        if known is None or message.sender <= known[0] or local_us - known[1] >= self.site.timing.heartbeat_us:
+            self._source = message.sender, local_us
+            return False
+        return self.clock.is_far(message.bus_time_us, local_us)

@@ -41,6 +41,11 @@ ANSWER_PERIOD_US = 250_000
 #: all others has answered all; then each has its own, as long as a question and the first answer at 125 kbit/s.
 FIRST_SLOT_US = 400_000
 SLOT_US = 5_000
+#: So many words about rights since the start, or since something was put off, are no ordinary work: a tenth of what an
+#: answer's period at 500 kbit/s holds.
+FLOOD = 100
+#: A slot or an answer is put off for an answer's period at most so often: five seconds, 15,000 words at 500 kbit/s.
+MOST_WAITS = 20
 #: From one question to who has not answered to the next, us: two shared answers.
 AGAIN_US = 500_000
 #: So many heartbeat periods after its start a machine has been compared with by all that live: the first word may be
@@ -96,6 +101,9 @@ class Witness:
     _quiet_until_us: int | None = None
     #: Whom to ask when, unless its answer to another is heard before.
     _slots: dict[int, int] = field(default_factory=dict)
+    #: Words about rights heard since anything was put off last, and how often that was since the start.
+    _words: int = 0
+    _waits: int = 0
 
     def __post_init__(self) -> None:
         self.site, self.node_id = self.tokens.site, self.tokens.node_id
@@ -156,10 +164,12 @@ class Witness:
         if digest == self.digest:
             return False
         if self.digest is not None:
-            old = [one for one, until_us in self.digests_before.items() if until_us < now_us - FRAMES_WAIT_US]
-            for one in old:
-                del self.digests_before[one]
-            self.digests_before[self.digest] = now_us
+            before = self.digests_before
+            # In the order of time: hundreds may come in one wait, and none of those is looked at for each.
+            before.pop(self.digest, None)
+            while before and next(iter(before.values())) < now_us - FRAMES_WAIT_US:
+                del before[next(iter(before))]
+            before[self.digest] = now_us
         self.digest = digest
         digested = self.mirror.digested
         if not any(isinstance(effect, Send) and isinstance(effect.message, digested) for effect in effects):
@@ -176,6 +186,7 @@ class Witness:
         self.tokens.is_synced = False
         self._since_us = now_us
         self._ask_at_us = now_us + self.site.timing.heartbeat_us
+        self._waits = 0
         self.tokens.asked = set(self._others)
         # Who comes back after a hold asks anew: what was answered before that is old.
         self.answered.clear()
@@ -267,12 +278,36 @@ class Witness:
                 effects += self.ask(node)
             for node in sorted(missing - live):
                 effects.append(Send(Halted(self.node_id, self.node_id, Reason.JOURNAL_LOST, node, False, self.boot)))
-        for node in sorted(node for node, due_us in self._slots.items() if due_us <= now_us):
+        for node in self._due(now_us):
             del self._slots[node]
             effects += [] if self._is_made_up(node, now_us) else self.ask(node)
-        if self._answer_at_us is not None and self._answer_at_us <= now_us:
+        if self._is_answering(now_us):
             effects += self._answer(now_us)
         return effects
+
+    def _due(self, now_us: int) -> list[int]:
+        """Whom to ask now."""
+        due = sorted(node for node, due_us in self._slots.items() if due_us <= now_us)
+        if not due or not self._is_flooded():
+            return due
+        self._slots = {node: max(due_us, now_us + ANSWER_PERIOD_US) for node, due_us in self._slots.items()}
+        return []
+
+    def _is_answering(self, now_us: int) -> bool:
+        """Whether those who asked meanwhile are answered now."""
+        if self._answer_at_us is None or self._answer_at_us > now_us:
+            return False
+        if not self._is_flooded():
+            return True
+        self._answer_at_us = self._quiet_until_us = now_us + ANSWER_PERIOD_US
+        return False
+
+    def _is_flooded(self) -> bool:
+        """Whether answers to my start still come: who is silent may be waiting behind them, and so may who asks."""
+        if self.is_over or self._words < FLOOD or self._waits >= MOST_WAITS:
+            return False
+        self._words, self._waits = 0, self._waits + 1
+        return True
 
     def next_wake(self) -> int | None:
         """When there is something to ask or to answer, bus time in us."""
@@ -377,6 +412,7 @@ class Witness:
         """Compare what a machine says of a token with the journal, before the word counts for anything else."""
         if word.sender not in self._others:
             return
+        self._words += 1
         key = TokenKey(word.token_kind, word.token)
         if isinstance(word, TokenHeld | TokenGrant | TokenGiven):
             self._said_again(word.sender, key, word.version)

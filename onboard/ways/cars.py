@@ -14,7 +14,7 @@ from onboard.contract.messages import CarAt, Message, Reference
 from onboard.core.authority import TokenBook
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect, Record
-from onboard.core.mirror import Mirror
+from onboard.core.mirror import Mirror, digest_words
 from onboard.core.records import RetiredRecord
 from onboard.core.serial import is_newer
 from onboard.core.site import Station
@@ -24,6 +24,33 @@ from onboard.ways.tokens import car_token
 
 #: Cars that have left and are still remembered; bounds the memory of a machine that runs for years.
 MAX_GONE_CARS = 64
+
+
+@dataclass
+class _StandingCars:
+    """Cars that have not left, as the digest takes them: number and station, in the order of the numbers.
+
+    With hundreds of cars each word about one would otherwise go through all of them. So what one origin's cars come to
+    is kept until one of them moves.
+    """
+
+    words: dict[int, dict[int, bytes]] = field(default_factory=dict)
+    _joined: dict[int, bytes] = field(default_factory=dict)
+
+    def put(self, car: Reference, station: int) -> None:
+        """A car stands there, or has left."""
+        self._joined.pop(car.origin, None)
+        numbers = self.words.setdefault(car.origin, {})
+        if station == OUTSIDE:
+            numbers.pop(car.number, None)
+        else:
+            numbers[car.number] = digest_words([car.origin << 16 | car.number, station])
+
+    def joined(self) -> bytes:
+        """Of all cars; nothing where there are none."""
+        for origin in self.words.keys() - self._joined.keys():
+            self._joined[origin] = b"".join(words for _, words in sorted(self.words[origin].items()))
+        return b"".join(words for _, words in sorted(self._joined.items()))
 
 
 @dataclass
@@ -43,6 +70,7 @@ class CarMirror(Mirror):
     words: CarWords | None = None
     _recalled: dict[Reference, CarAt] = field(default_factory=dict)
     _left: list[Reference] = field(default_factory=list)
+    _standing: _StandingCars = field(default_factory=_StandingCars)
 
     def joins(self, tokens: TokenBook, drops: Counter[Reason]) -> None:
         """From now on a word counts only from a custodian; cars that left long ago have no token any more."""
@@ -84,8 +112,10 @@ class CarMirror(Mirror):
             if not again:
                 return False
         self.cars[statement.car] = record
+        self._standing.put(statement.car, record.station)
         self._digest = None
-        self._prune_gone()
+        if record.station == OUTSIDE:
+            self._prune_gone()
         return True
 
     def _prune_gone(self) -> None:
@@ -105,13 +135,9 @@ class CarMirror(Mirror):
             return None
         return Station.from_number(record.station)
 
-    def _believed(self) -> list[int]:
+    def _believed(self) -> bytes:
         """Cars (number, station) that have not left."""
-        words = super()._believed()
-        for car, record in sorted(self.cars.items()):
-            if record.station != OUTSIDE:
-                words += [car.origin << 16 | car.number, record.station]
-        return words
+        return super()._believed() + self._standing.joined()
 
     def forgotten(self) -> list[Effect]:
         """Cars that left long ago, for the journal: what it has of them may go."""
@@ -160,6 +186,7 @@ class CarMirror(Mirror):
         """What I have said of cars came from a journal that is old: whoever knows better says so, or nobody does."""
         for car in [car for car, record in self.cars.items() if record.custodian == self.node_id]:
             del self.cars[car]
+            self._standing.put(car, OUTSIDE)
         self._digest = None
 
     def remembers(self, word: CarAt) -> None:

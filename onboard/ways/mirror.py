@@ -9,7 +9,7 @@ from onboard.contract.constants import MOBILE_KINDS, NOBODY
 from onboard.contract.messages import Blocked, Clear, Itinerary, Message, Progress
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect
-from onboard.core.mirror import Mirror
+from onboard.core.mirror import Mirror, digest_words
 from onboard.core.petitions import UNORDERED
 from onboard.core.site import Machine, Segment, Station
 from onboard.core.token_keys import TokenKey, segment_token
@@ -225,9 +225,11 @@ class WayMirror(CarMirror):
         """All tokens of segments and stations."""
         return tokens_of(self.site)
 
-    def _believed(self) -> list[int]:
+    def _believed(self) -> bytes:
         """Blocked segments as well."""
-        return [*super()._believed(), *(1 << 31 | segment.number for segment in sorted(self.obstacles.blocked))]
+        blocked = self.obstacles.blocked
+        said = super()._believed()
+        return said + digest_words([1 << 31 | one.number for one in sorted(blocked)]) if blocked else said
 
 
 @dataclass

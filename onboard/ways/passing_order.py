@@ -333,9 +333,9 @@ class PassingOrder:
     def _is_in_front(self, node: int, other: int, segment: Segment, mine: Turn, theirs: Turn) -> bool:
         """Whether ``other`` passes before ``node`` by where it is: in my next run, from where it goes on or leaves.
 
-        Whatever was agreed, no plan leads through a body. Who stands there for ever gives way. I come behind it with all
-        that I do in or after that run, and behind all that it does in a segment until it leaves: out of one before the
-        other, or through it again, that I came into behind it, would be a circle.
+        Whatever was agreed, no plan leads through a body. Who stands there for ever gives way. I come behind it with
+        all that I do in or after that run, and behind all that it does in a segment until it leaves: out of one before
+        it, or through it again, that I came into behind it, would be a circle.
         """
         there = self.place(other)
         number = self._run_through(node, there)

@@ -136,3 +136,19 @@ def test_bus_time_that_no_clock_shows_is_dropped() -> None:
     lift.receive(BusTime(BAY, BUS_TIME_MODULUS), 10)
     assert not lift.clock.heard_at_us
     assert lift.drops[Reason.VALUE_OUT_OF_RANGE] == 1
+
+
+def test_an_old_time_of_who_is_the_source_no_longer_sets_no_clock() -> None:
+    """At power-up a word of a higher node may have waited behind hundreds of its own: it says so twice."""
+    robot = fixed(11)
+    robot.start(0)
+    robot.receive(BusTime(BAY, 1_000_000), 0)
+    before_us = robot.clock.bus_us(0)
+    for late_us in (200_000, 201_000):
+        robot.receive(BusTime(LIFT, 1_000_000), late_us)
+    assert robot.clock.bus_us(0) == before_us and not robot.clock.is_lost(201_000)
+    assert robot.drops[Reason.LATE] == 2
+    quiet_us = 201_000 + SITE.timing.heartbeat_us
+    for later_us in (quiet_us, quiet_us + 1_000):
+        robot.receive(BusTime(LIFT, later_us + HOURS_US), later_us)
+    assert robot.clock.bus_us(0) == HOURS_US, "it is the source once the lower one was silent for a heartbeat"

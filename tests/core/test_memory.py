@@ -1,5 +1,8 @@
 """A machine that has lost its journal, and statements that only one node may make."""
 
+from binascii import crc_hqx
+from struct import pack
+
 import pytest
 
 from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, Reason, TokenKind
@@ -96,6 +99,26 @@ def test_one_version_of_a_cars_token_has_one_custodian() -> None:
     assert mirror.on_car(CarAt(1, car, other, 3, 2500)), "the custodian itself may move it"
     assert mirror.on_car(CarAt(11, car, place, 4, 2500))
     assert mirror.cars[car].custodian == 11
+
+
+def test_the_digest_is_what_it_says_it_is_of_whatever_cars_came_moved_and_left() -> None:
+    """Kept from word to word, and the same as one over all cars in the order of their numbers (docs/protocol.md)."""
+    mirror = WayMirror(SITE, 1)
+    places = [place.number for place in SITE.places]
+    words = [(2, 7, 3), (1, 9, 4), (2, 1, 5), (1, 9, 6), (2, 7, None), (1, 2, 3), (2, 8, 0)]
+    standing: dict[Reference, int] = {}
+    ordered: list[tuple[Reference, int]] = []
+    for version, (origin, number, place) in enumerate(words, start=1):
+        car, station = Reference(origin, number), OUTSIDE if place is None else places[place]
+        assert mirror.on_car(CarAt(11, car, station, version, 2500))
+        standing[car] = station
+        ordered = [(car, at) for car, at in sorted(standing.items()) if at != OUTSIDE]
+        told = b"".join(pack(">BBHI", 0, car.origin, car.number, at) for car, at in ordered)
+        assert mirror.digest() == crc_hqx(told, 0xFFFF)
+    mirror.on_car(CarAt(1, Reference(2, 8), places[0], 9, 2500))
+    mirror.disown()
+    told = b"".join(pack(">BBHI", 0, car.origin, car.number, at) for car, at in ordered if car != (2, 8))
+    assert mirror.digest() == crc_hqx(told, 0xFFFF)
 
 
 def test_cars_that_left_long_ago_leave_nothing_behind() -> None:

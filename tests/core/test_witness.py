@@ -24,7 +24,7 @@ from onboard.core.authority import TokenBook, segment_token
 from onboard.core.effects import Effect
 from onboard.core.mirror import Mirror, Peer
 from onboard.core.site import Segment
-from onboard.holon.witness import ANSWER_PERIOD_US, Witness
+from onboard.holon.witness import ANSWER_PERIOD_US, FLOOD, Witness
 from tests.core.token_words import said
 from tests.sites import one_floor
 
@@ -270,6 +270,25 @@ def test_who_is_new_is_asked_by_one_of_all_who_want_to_know() -> None:
     assert alice.wake(first_us) == [SyncRequest(ALICE, STEWARD)]
     bob.hear(done(STEWARD, ALICE), first_us + 1)
     assert bob.witness.next_wake() is None, "what the steward told Alice, Bob has heard"
+
+
+def test_nobody_is_asked_again_while_answers_still_come() -> None:
+    """With hundreds of cars inside the answers of all take a second: who asks in between makes all be said again."""
+    alice = Machine(ALICE)
+    alice.knows(BOB)
+    alice.start()
+    beat = Heartbeat(STEWARD, 0, 0, 0, 1, KindCode.COMPARTMENT, MachineState.IDLE)
+    alice.mirror.on_heartbeat(beat, START_US)
+    alice.witness.on_heartbeat(beat, START_US, is_fresh=True)
+    due_us = alice.witness.next_wake()
+    for version in range(1, 4):
+        assert due_us is not None
+        for _ in range(FLOOD):
+            alice.hear(TokenHeld(BOB, KEY.kind, KEY.number, version), due_us - 1)
+        assert alice.wake(due_us) == []
+        due_us = alice.witness.next_wake()
+    assert due_us is not None
+    assert alice.wake(due_us) == [SyncRequest(ALICE, STEWARD)], "nothing came for an answer's period"
 
 
 def differs(machine: Machine, digest: int, now_us: int) -> list[SyncRequest]:

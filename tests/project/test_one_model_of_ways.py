@@ -13,6 +13,7 @@ TOOLS = frozenset({"heapq", "bisect"})
 #: Files that do it themselves, and why.
 ELSEWHERE = {
     "car_park/generation.py": "who of those held back gives way to a plan; no places",
+    "car_park/reader/machines.py": "which fixed machine is how many tracks from a track, for its steward; nobody moves",
     "car_park/reader/joints.py": "which way alleys lie, from those they go off; nobody moves",
     "cell/geometry.py": "motions of an arm in the plane, around corners of what stands there",
     "terminal/routes.py": "several ways each without a circle, through entities with gates (row M25)",

@@ -1,11 +1,16 @@
 """Cars over buildings of every form, published ones and designs with one feature each; more seeds: docs/layouts.md."""
 
+from collections import Counter
 from collections.abc import Callable
 
 import pytest
 
+from bus_sim.options import RunOptions
+from bus_sim.session import play as run_to_its_end
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.day import ParkingDay
 from bus_sim.systems.car_park.demand import Demand
+from bus_sim.systems.car_park.stage import CarParkStage
 from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import car_park
@@ -83,7 +88,13 @@ def test_robots_of_the_tower_start_beside_its_compartments() -> None:
 
 
 #: Published figures (docs/layouts.md): floors, places, compartments, lifts.
-PUBLISHED = {"changi": (5, 195, 4, 4), "hoboken": (7, 304, 4, 2), "vtc": (12, 440, 2, 6), "crescent": (4, 21, 1, 1)}
+PUBLISHED = {
+    "changi": (5, 195, 4, 4),
+    "hoboken": (7, 304, 4, 2),
+    "vtc": (12, 440, 2, 6),
+    "crescent": (4, 21, 1, 1),
+    "harbour": (3, 972, 20, 10),
+}
 
 
 @pytest.mark.parametrize(("name", "figures"), PUBLISHED.items())
@@ -91,3 +102,23 @@ def test_a_published_layout_has_the_figures_that_are_published(name: str, figure
     site = car_park(find_site(name))
     levels = {site.level(number) for number, track in site.tracks.items() if track.kind is TrackKind.ALLEY}
     assert (len(levels), len(site.places), len(site.compartments), len(site.lifts)) == figures
+
+
+def test_the_harbour_wakes_with_cars_inside_and_serves_who_comes_and_who_goes() -> None:
+    """The largest site: 50 machines. Who is fetched never drove in, and its car comes to its own desk."""
+    day = ParkingDay(random_s=(10, 1), cars=1, inside=20)
+    stage = run_to_its_end(find_site("harbour"), RunOptions(seed=1, demand=day))
+    assert isinstance(stage, CarParkStage)
+    assert (stage.violations(), stage.halted, stage.tally().served) == ([], [], 1)
+    gone = next(one for one in stage.customers if one.visit.gone_us is not None)
+    assert gone.visit.arrived_us is None and gone.ticket is not None and gone.compartment is not None
+    assert gone.ticket.car.origin == gone.compartment.node_id
+    assert gone.visit.ready_us is not None
+    assert (gone.visit.asked_us or 0) < gone.visit.ready_us < (gone.visit.gone_us or 0)
+
+
+def test_on_the_harbour_no_machine_keeps_more_than_a_hundred_places() -> None:
+    site = car_park(find_site("harbour"))
+    kept = Counter(site.stewards[place.track] for place in site.places)
+    assert sum(kept.values()) == 972 and max(kept.values()) <= 98
+    assert all(site.stewards[bay.track] in site.compartments for bay in site.compartments.values())

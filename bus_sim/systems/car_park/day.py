@@ -8,9 +8,9 @@ from pathlib import Path
 
 from bus_sim.demand import DemandError
 from bus_sim.systems.car_park.csv_rows import CsvForm, at_most
-from bus_sim.systems.car_park.demand import LEVEL1_DAY, WHOLE_DAY, Demand, with_more_inside
+from bus_sim.systems.car_park.demand import LEVEL1_DAY, WHOLE_DAY, Demand, Stay, with_more_inside
 from bus_sim.systems.car_park.mapping import table_form
-from bus_sim.systems.car_park.sizes import misfits
+from bus_sim.systems.car_park.sizes import broken_limits, misfits
 from bus_sim.systems.car_park.window import with_eve
 from onboard.core.site import Site
 from onboard.systems.car_park.site import CarPark
@@ -58,7 +58,7 @@ def choose_demand(day: ParkingDay, site: Site | None = None, seed: int = 1) -> D
     if day.one_car_s is not None:
         return Demand.one_car(stay_s=day.one_car_s, seed=seed)
     if day.random_s is not None:
-        return Demand.by_mean(*day.random_s, seed, count=day.cars, out=day.random_out_s)
+        return Demand.by_mean(*day.random_s, seed, count=day.cars, inside=day.inside, out=day.random_out_s)
     first, last = _days(day.day)
     if day.counts is not None:
         return Demand.from_counts(day.counts, day=first, until=last, seed=seed, form=day.form, inside=day.inside)
@@ -82,12 +82,26 @@ def brought_in(demand: Demand, site: CarPark) -> Demand:
 
     Raises ``DemandError`` for more cars inside than there are places.
     """
-    if len(demand.inside) > len(site.places):
-        cars = f"{len(demand.inside)} cars inside at the start"
-        raise DemandError(f"{cars}: {site.name} has {len(site.places)} places; name a larger site, or fewer cars")
+    _check_room(demand, site)
     refused = misfits([stay.car for stay in (*demand.inside, *demand.stays)], site)
     played = with_eve(demand, len(site.fronts(BayUse.ENTRY, BayUse.BOTH)))
     return replace(played, remarks=(*played.remarks, *at_most(refused)))
+
+
+def standing_in(demand: Demand, site: CarPark) -> tuple[Stay, ...]:
+    """The cars that stand inside as the power comes on. Raises ``DemandError`` where one does not fit everywhere."""
+    _check_room(demand, site)
+    if demand.inside and (site.place_class or any(broken_limits(one.car, site) for one in demand.inside)):
+        raise DemandError(
+            f"--inside {len(demand.inside)}: {site.name} has places that not every car fits; leave it out"
+        )
+    return demand.inside
+
+
+def _check_room(demand: Demand, site: CarPark) -> None:
+    if len(demand.inside) > len(site.places):
+        cars = f"{len(demand.inside)} cars inside at the start"
+        raise DemandError(f"{cars}: {site.name} has {len(site.places)} places; name a larger site, or fewer cars")
 
 
 def _days(text: str | None) -> tuple[date | None, date | None]:
@@ -159,8 +173,9 @@ def check_together(args: Namespace, others: Sequence[str] = ()) -> None:
     drawn = [f"--{name.replace('_', '-')}" for name in others if getattr(args, name) not in (None, False)]
     if args.counts is not None and (args.sessions is not None or drawn):
         raise DemandError(f"{['--sessions', *drawn][args.sessions is None]}: does not go with --counts; leave one out")
-    if args.inside is not None and drawn:
-        raise DemandError(f"--inside {args.inside}: does not go with {drawn[0]}; leave one of them out")
+    counted = [name for name in drawn if name != "--random" or args.inside == RECORDED]
+    if args.inside is not None and counted:
+        raise DemandError(f"--inside {args.inside}: does not go with {counted[0]}; leave one of them out")
 
 
 def _check_numbers(args: Namespace) -> None:

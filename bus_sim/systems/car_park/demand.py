@@ -136,11 +136,13 @@ class Demand:
         count: int = 100,
         out: tuple[float, float] | None = None,
         min_stay_s: float = 300.0,
+        inside: int = 0,
     ) -> "Demand":
         """Automatic piloting (row P53): ``count`` cars come at normal intervals and are fetched at normal intervals.
 
         ``mean_s`` and ``sigma_s`` are those of the input, ``out`` those of the output (the same unless given). Each
         output fetches one of the cars that came at least ``min_stay_s`` before, by chance, or none where none did.
+        With ``inside`` so many cars are there when it begins, may be fetched at once, and as many go as come.
         The law is cut off at 0 by drawing again: with a deviation above about a third of the mean the true mean is
         larger than ``mean_s``. Raises ``DemandError`` for a mean not above 0, a negative deviation or count.
         """
@@ -150,13 +152,14 @@ class Demand:
         if count < 0:
             raise DemandError(f"count {count}: must be 0 or more")
         times = list(_running(arriving, random.Random(f"input:{seed}"), count))
-        departures = _departures(times, leaving, round(min_stay_s * 1e6), random.Random(f"output:{seed}"))
-        return cls(
-            tuple(
-                Stay(arrival_us, departures.get(number), random_car(f"car {number + 1}", seed))
-                for number, arrival_us in enumerate(times)
-            )
+        chance = random.Random(f"output:{seed}")
+        departures = _departures(times, leaving, round(min_stay_s * 1e6), chance, inside)
+        stays = tuple(
+            Stay(arrival_us, departures.get(number), random_car(f"car {number + 1}", seed))
+            for number, arrival_us in enumerate(times)
         )
+        held = (Stay(0, departures.get(-one), random_car(f"inside {one}", seed)) for one in range(1, inside + 1))
+        return cls(stays, inside=tuple(held))
 
     @classmethod
     def one_car(cls, car: CarBody | None = None, *, stay_s: float | None = None, seed: int = 0) -> "Demand":
@@ -228,10 +231,12 @@ def _running(law: Law, chance: random.Random, count: int) -> Iterator[int]:
         yield moment_us
 
 
-def _departures(arrivals_us: list[int], law: Law, min_stay_us: int, chance: random.Random) -> dict[int, int]:
-    """Departure of each car by its number. Outputs go on until the last car is fetched."""
+def _departures(
+    arrivals_us: list[int], law: Law, min_stay_us: int, chance: random.Random, inside: int = 0
+) -> dict[int, int]:
+    """Departure of each car by its number, -1, -2 ... of those inside. Outputs go on until as many went as came."""
     departures: dict[int, int] = {}
-    present: list[int] = []
+    present = [-number for number in range(1, inside + 1)]
     coming = 0
     moment_us = 0
     while len(departures) < len(arrivals_us):

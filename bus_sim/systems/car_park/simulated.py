@@ -10,7 +10,7 @@ from bus_sim.demand import DemandError
 from bus_sim.faults import operators
 from bus_sim.options import RunOptions
 from bus_sim.systems.car_park import drives, people, power
-from bus_sim.systems.car_park.day import ParkingDay, asked_day, brought_in, choose_demand
+from bus_sim.systems.car_park.day import ParkingDay, asked_day, brought_in, choose_demand, standing_in
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.car_park.forged import ForgedRetrievals
 from bus_sim.systems.car_park.plant.plant import Plant
@@ -152,13 +152,14 @@ def _coming(site: CarPark, options: RunOptions) -> ComingCustomers:
         return ComingCustomers((wanted or Arrivals()).demand(options.seed))
     demand = choose_demand(wanted, site, options.seed)
     window = choose_window(demand, wanted.window) if wanted.window is not None else None
-    demand = brought_in(demand, site)
+    standing = standing_in(demand, site) if wanted.random_s is not None else ()
+    demand = replace(demand, inside=()) if standing else brought_in(demand, site)
     if window is not None and wanted.short_eve:
         demand = with_short_eve(demand, window, len(site.fronts(BayUse.ENTRY, BayUse.BOTH)))
     # The first to come, or what is shown, is so long after power-up.
     first_us = min((stay.arrival_us for stay in demand.stays), default=0)
     first_us = first_us if window is None else min(first_us, window.begin_us)
-    return ComingCustomers(demand, ORIGIN_US - first_us, window, wanted.by_hand)
+    return ComingCustomers(demand, ORIGIN_US - first_us, window, wanted.by_hand, standing)
 
 
 SIMULATED = CarParkSystem()

@@ -19,6 +19,7 @@ from bus_sim.systems.car_park.plant.plant import Plant, is_told_off, looks_for_t
 from bus_sim.systems.car_park.promised import PromiseFigures, seen_of
 from bus_sim.systems.car_park.show import ConsoleShow, DayClock
 from bus_sim.systems.car_park.simulation import Simulation
+from bus_sim.systems.car_park.standing_cars import stand
 from bus_sim.systems.car_park.summary import BurstFigures, RunSummary, bus_figures, unserved
 from bus_sim.systems.car_park.window import BURST_US, DayWindow, densest
 from bus_sim.systems.stage import EndedRun, PersonAtKeys, Show, SystemStage, Tally
@@ -45,12 +46,16 @@ _TOLD_WHY = (VisitOutcome.FULL, VisitOutcome.TOO_LARGE, VisitOutcome.NO_CHARGING
 
 @dataclass(frozen=True)
 class ComingCustomers:
-    """Who comes when: ``origin_us`` is the loop time of the demand's time zero; ``window`` is what is shown of it."""
+    """Who comes when: ``origin_us`` is the loop time of the demand's time zero; ``window`` is what is shown of it.
+
+    The cars of ``standing`` are inside when the power comes on.
+    """
 
     demand: Demand
     origin_us: int = ORIGIN_US
     window: DayWindow | None = None
     by_hand: bool = False
+    standing: tuple[Stay, ...] = ()
 
     @property
     def zero(self) -> datetime:
@@ -75,6 +80,8 @@ class CarParkStage(SystemStage[Plant]):
         super().__init__(run)
         self._coming = coming
         self._street = run.plant.street
+        if coming.standing:
+            stand(run, coming.standing, coming.origin_us)
         self._street.add_all(coming.demand, coming.origin_us)
         self._clock = DayClock(coming.zero)
         self._indicators = Indicators(run.site)
@@ -141,7 +148,8 @@ class CarParkStage(SystemStage[Plant]):
     @property
     def limit_us(self) -> int:
         """``PATIENCE_US`` after the last arrival or departure of the demand, us of loop time."""
-        last_us = max((stay.departure_us or stay.arrival_us for stay in self._coming.demand.stays), default=0)
+        stays = (*self._coming.standing, *self._coming.demand.stays)
+        last_us = max((stay.departure_us or stay.arrival_us for stay in stays), default=0)
         return last_us + self._coming.origin_us + PATIENCE_US
 
     @property
@@ -230,6 +238,7 @@ class CarParkStage(SystemStage[Plant]):
             wait_in=Durations.of(street.in_wait_us),
             wait_out=Durations.of(street.out_wait_us),
             bounds=self._bounds(ended),
+            wait_ready=Durations.of(street.ready_wait_us),
             burst=self._burst(ended),
             fleet=fleet,
             bays=self._bays.figures(),

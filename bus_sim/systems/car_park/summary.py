@@ -49,6 +49,7 @@ class RunSummary:
     wait_in: Durations
     wait_out: Durations
     bounds: WaitBounds
+    wait_ready: Durations
     burst: BurstFigures | None
     fleet: FleetIndicators
     bays: tuple[BayFigures, ...]
@@ -109,6 +110,7 @@ class RunSummary:
             f"{self.refused_full}, too large {self.refused_too_large}{unchargeable}   waiting now {self.unserved}",
             f"waiting in   {self.wait_in}",
             f"waiting out  {self.wait_out}",
+            f"car ready    {self.wait_ready}",
         ]
         if self.bounds.visits:
             text.append(f"all waiting  {self.bounds.line()}")

@@ -276,10 +276,10 @@ class GoingAround:
 
         Others plan anew then as well, and what they gave up would be waited for to its planned end.
         """
+        if self._heard == self._plans_seen or not self._looked_us + LOOK_US <= now_us < self._sooner_until_us:
+            return []
         step, works = self.program.step, self.program.works()
         if step is None or step.action is not LegAction.STAND or step.end_us - now_us < SOONER_US or not works:
-            return []
-        if self._heard == self._plans_seen or not self._looked_us + LOOK_US <= now_us < self._sooner_until_us:
             return []
         self._plans_seen, self._looked_us = self._heard, now_us
         kept, origin, start_us = self.turning((), now_us)

@@ -16,7 +16,7 @@ from bus_sim.systems.car_park.design.fleet import FleetModel, ServedCall
 from bus_sim.systems.car_park.plant.customer import REACTION_US
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.pipeline import MOST_OUT, QUEUED_US
-from onboard.systems.car_park.site import CallAt, CarPark
+from onboard.systems.car_park.site import CallAt, CarPark, DeskPolicy
 from onboard.ways.site import BayUse
 
 #: From a call until its winner's plan is known, us: the call's window, and what is said after it.
@@ -31,6 +31,7 @@ class _Person:
     acts: Acts
     arrived_us: int
     place: Station | None = None
+    bay: "_BayModel | None" = None
     stored_us: int = 0
     asked_us: int = 0
 
@@ -39,7 +40,8 @@ class _Person:
 class Modelled:
     """What came of a modelled day: waits, and when people were through, in us in this order; and who was busy.
 
-    ``busy`` are shares of the time from first to last event, 0 to 1: of robots, of lifts, of bays, means of each kind.
+    ``ready_us`` are waits until the car is ready; ``busy`` are shares of the time from first to last event, 0 to 1: of
+    robots, of lifts, of bays, means of each kind.
     """
 
     in_us: list[int] = field(default_factory=list)
@@ -47,6 +49,7 @@ class Modelled:
     refused: int = 0
     parked_us: list[int] = field(default_factory=list)
     gone_us: list[int] = field(default_factory=list)
+    ready_us: list[int] = field(default_factory=list)
     busy: dict[str, float] = field(default_factory=dict)
 
 
@@ -69,6 +72,8 @@ class _BayModel:
     #: From when on, and for when, the next car may be called for; None while it may not.
     ahead_ready_us: int | None = None
     busy_us: int = 0
+    #: Counts up whenever an arriving car is shown here.
+    shown: int = 0
 
 
 class DayModel:
@@ -113,18 +118,30 @@ class DayModel:
         heappush(self._events, (time_us, self._number, act))
 
     def _choose(self, closed: BayUse) -> _BayModel:
-        return min((one for one in self._bays if one.use is not closed), key=lambda one: (one.people, one.node))
+        is_shown = closed is BayUse.EXIT and self._site.desk is not DeskPolicy.ANY
+        open_to = [one for one in self._bays if one.use is not closed]
+        if not is_shown:
+            return min(open_to, key=lambda one: (one.people, one.node))
+        bay = min(open_to, key=lambda one: (one.people, not one.is_free, one.shown, one.node))
+        self._number += 1
+        bay.shown = self._number
+        return bay
+
+    def _desk(self, person: _Person) -> _BayModel:
+        """Where a car comes: its own bay where the site says so; of policy ``nearest`` nothing is known here."""
+        is_own = self._site.desk is DeskPolicy.OWN and person.bay is not None and person.bay.use is not BayUse.ENTRY
+        return person.bay if is_own and person.bay is not None else self._choose(BayUse.ENTRY)
 
     # --- people ------------------------------------------------------------------------------------------------
 
     def _arrive(self, person: _Person, now_us: int) -> None:
-        bay = self._choose(BayUse.EXIT)
+        bay = person.bay = self._choose(BayUse.EXIT)
         bay.people += 1
         bay.drivers.append(person)
         self._look(bay, now_us)
 
     def _ask(self, person: _Person, now_us: int) -> None:
-        bay = self._choose(BayUse.ENTRY)
+        bay = self._desk(person)
         bay.people += 1
         person.asked_us = now_us
         bay.askers.append(person)
@@ -234,6 +251,7 @@ class DayModel:
         handed_us = max(served.at_bay_us, locked_us) + self._close_us
         gone_us = handed_us + self._open_us + REACTION_US + person.acts.drive_out_us
         bay.busy_us += gone_us - since_us
+        self._found.ready_us.append(handed_us - person.asked_us)
         self._at(handed_us, lambda then_us: self._hand_over(bay, gone_us + self._close_us, then_us))
         self._at(gone_us, lambda then_us: self._drive_away(bay, person, then_us))
 

@@ -131,14 +131,19 @@ class CustomerVisit:
     arrived_us: int | None = None
     parked_us: int | None = None
     asked_us: int | None = None
+    ready_us: int | None = None
     gone_us: int | None = None
     promised: WordAtDesk | None = None
-    ready_us: int | None = None
 
     @property
     def in_wait_us(self) -> int | None:
         """From arrival in the queue to walking away with a ticket."""
         return _span(self.arrived_us, self.parked_us)
+
+    @property
+    def ready_wait_us(self) -> int | None:
+        """From the ticket in the desk to reading that the car is ready: without the driver's own time."""
+        return _span(self.asked_us, self.ready_us)
 
     @property
     def out_wait_us(self) -> int | None:
@@ -194,6 +199,12 @@ class Customer:
             self._leave_us = origin_us + self.stay.departure_us
         if self.stay.cancel_us is not None:
             self._timers.call_at(origin_us + self.stay.cancel_us, lambda: self.on(CustomerEvent.CANCEL))
+
+    def begin_parked(self, ticket: Ticket, origin_us: int) -> None:
+        """The car stands inside since before loop time 0, which no figure counts."""
+        self.state, self.ticket, self.visit.parked_us = CustomerState.PARKED, ticket, -1
+        if self.stay.departure_us is not None:
+            self._timers.call_at(origin_us + self.stay.departure_us, self.leave_now)
 
     @property
     def is_leaving(self) -> bool:

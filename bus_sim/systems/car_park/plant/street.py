@@ -54,10 +54,15 @@ class StreetSummary:
     cancelled: int
     in_wait_us: tuple[int, ...] = field(repr=False)
     out_wait_us: tuple[int, ...] = field(repr=False)
+    ready_wait_us: tuple[int, ...] = field(repr=False)
 
 
 class Street:
-    """All customers of a run. Each goes to the compartment with the fewest before, of equals to the lowest node-ID."""
+    """All customers of a run. Each goes to the compartment with the fewest before, of equals to the lowest node-ID.
+
+    Where a site's desks tell to which compartment a car comes, a sign shows arriving cars their lane as well: of those
+    with as few before one whose bay is free, and of these the one to which nobody was shown for longest.
+    """
 
     def __init__(
         self, compartments: dict[int, CompartmentPlant], world: CarParkWorld, oracle: Oracle, timers: Timers, seed: int
@@ -71,6 +76,8 @@ class Street:
         self._seed = seed
         self._by_ticket: dict[Reference, Customer] = {}
         self._watchers: list[Callable[[Customer], None]] = []
+        #: When an arriving car was shown to a compartment last, us, where a sign shows them.
+        self._shown_us: dict[int, int] = {}
         #: Customers at each compartment in the order of their coming, with a car to park and with a ticket.
         self._waiting: dict[int, list[Customer]] = {node: [] for node in compartments}
         for node_id, compartment in compartments.items():
@@ -98,6 +105,14 @@ class Street:
         for stay in demand.stays:
             self.add(stay, origin_us)
 
+    def add_parked(self, stay: Stay, ticket: Ticket, origin_us: int = 0) -> Customer:
+        """A customer whose car stands inside already, with its ticket; nothing of how it came in is counted."""
+        customer = Customer(stay, self._world, self._oracle, self._timers, self._seed, self._choose, self._after_step)
+        self.customers.append(customer)
+        self._by_ticket[ticket.car] = customer
+        customer.begin_parked(ticket, origin_us)
+        return customer
+
     @property
     def is_over(self) -> bool:
         """Whether everybody who had a time to leave has left, and nobody waits for anything."""
@@ -107,6 +122,7 @@ class Street:
         """What happened so far, or since a loop time; waiting of those who came, or asked, since then."""
         visits = [customer.visit for customer in self.customers]
         outcomes = [visit.outcome for visit in visits if _is_since(visit.gone_us, since_us)]
+        fetched = [one for one in visits if one.outcome is VisitOutcome.SERVED and _is_since(one.asked_us, since_us)]
         states = [customer.state for customer in self.customers]
         return StreetSummary(
             arrived=sum(_is_since(visit.arrived_us, since_us) for visit in visits),
@@ -120,13 +136,8 @@ class Street:
             refused_no_charging=outcomes.count(VisitOutcome.NO_CHARGING),
             cancelled=outcomes.count(VisitOutcome.CANCELLED),
             in_wait_us=self.in_waits_us(since_us),
-            out_wait_us=tuple(
-                visit.out_wait_us
-                for visit in visits
-                if visit.out_wait_us is not None
-                and visit.outcome is VisitOutcome.SERVED
-                and _is_since(visit.asked_us, since_us)
-            ),
+            out_wait_us=tuple(one.out_wait_us for one in fetched if one.out_wait_us is not None),
+            ready_wait_us=tuple(one.ready_wait_us for one in fetched if one.ready_wait_us is not None),
         )
 
     def in_waits_us(self, since_us: int, until_us: int | None = None) -> tuple[int, ...]:
@@ -150,8 +161,15 @@ class Street:
         closed = BayUse.EXIT if customer.ticket is None else BayUse.ENTRY
         uses = self._world.site.bay_uses
         open_to = [node for node in self._waiting if uses.get(node, BayUse.BOTH) is not closed]
-        node_id = min(open_to, key=lambda node: (self._before(node), node))
+        is_shown = customer.ticket is None and car_park(self._world.site).desk is not DeskPolicy.ANY
+        node_id = min(open_to, key=lambda node: (self._before(node), *(self._lane(node) if is_shown else ()), node))
+        if is_shown:
+            self._shown_us[node_id] = self._timers.now_us()
         return self._compartments[node_id]
+
+    def _lane(self, node: int) -> tuple[bool, int]:
+        """What the sign goes by between lanes of one length: whether the bay is taken, and when it was shown last."""
+        return not self._compartments[node].invites, self._shown_us.get(node, -1)
 
     def _before(self, node: int) -> int:
         """Who has to do with a bay; who was not told yet to which the car comes stands aside, where desks tell that."""

@@ -393,6 +393,11 @@ class CarParkWorld:
         self.where[car.name] = self.bays[node_id].station
         self._tell(WorldChange.CAR, node_id)
 
+    def stands_in(self, place: Station, car: CarBody) -> None:
+        """A car stands in a place from the beginning; nobody is told."""
+        self.cars[car.name] = car
+        self.where[car.name] = place
+
     def car_leaves(self, node_id: int, car: CarBody) -> None:
         """A car has left the compartment for the street."""
         self.bays[node_id].crossing = False

@@ -1,5 +1,6 @@
 """The machines of a car park's site file, and who is steward of what."""
 
+from collections import deque
 from typing import NamedTuple
 
 from onboard.config.fleet import FleetReader
@@ -7,6 +8,7 @@ from onboard.config.reader import TomlTable
 from onboard.config.toml_lines import path_text
 from onboard.contract.codes import KindCode
 from onboard.core.site import Machine, Segment, Station
+from onboard.systems.car_park.reader.built import beside
 from onboard.systems.car_park.reader.layout import FIRST_LIFT, SIDES, Layout
 from onboard.ways.site import BayUse, Track
 
@@ -64,16 +66,18 @@ def _read_home(table: TomlTable, layout: Layout, fleet: FleetReader) -> Segment:
 def read_stewards(table: TomlTable, layout: Layout, fleet: FleetReader) -> dict[int, int]:
     """Node-ID of the steward of each track: the one named, else the nearest fixed machine.
 
-    Nearest is the lift for its own shaft, and otherwise by floors away, then by node-ID.
+    Nearest is the lift for its own shaft, and otherwise by floors away, then by tracks on the way, then by node-ID: of
+    a floor with many alleys no single machine keeps all cars.
     """
     fixed = fleet.fixed()
     stewards = {}
+    joined = _joined(layout)
     if not layout.known or layout.shifted:
         table.pass_over(str.isdecimal)
     for number, track in layout.tracks.items():
         if not table.has(str(number)):
             if fixed:
-                stewards[number] = min((_distance(layout, one, track), one.node_id) for one in fixed)[1]
+                stewards[number] = _nearest(layout, joined, fixed, track).node_id
             continue
         name = table.text(str(number))
         machine = fleet.by_name.get(name)
@@ -85,6 +89,14 @@ def read_stewards(table: TomlTable, layout: Layout, fleet: FleetReader) -> dict[
     return stewards
 
 
+def _nearest(layout: Layout, joined: dict[int, set[int]], fixed: list[Machine], track: Track) -> Machine:
+    """Of the fixed machines the fewest floors away that with the fewest tracks on the way, then the lowest node-ID."""
+    floors = {one.node_id: _distance(layout, one, track) for one in fixed}
+    near = [one for one in fixed if floors[one.node_id] == min(floors.values())]
+    hops = _hops(joined, track.number) if len(near) > 1 else {}
+    return min(near, key=lambda one: (hops.get(one.home.track, len(joined)), one.node_id))
+
+
 def _distance(layout: Layout, machine: Machine, track: Track) -> int:
     """Floors between a fixed machine and a track; -1 between a lift and its own shaft."""
     if machine.home.track == track.number:
@@ -92,6 +104,27 @@ def _distance(layout: Layout, machine: Machine, track: Track) -> int:
     return min(
         abs(one - other) for one in _floors(layout, machine.home.track) for other in _floors(layout, track.number)
     )
+
+
+def _joined(layout: Layout) -> dict[int, set[int]]:
+    """The tracks that each track touches."""
+    joined: dict[int, set[int]] = {number: set() for number in layout.tracks}
+    for number, track in layout.tracks.items():
+        for other in beside(track) & joined.keys():
+            joined[number].add(other)
+            joined[other].add(number)
+    return joined
+
+
+def _hops(joined: dict[int, set[int]], number: int) -> dict[int, int]:
+    """How many tracks further each track is than this one, of those that hang together with it."""
+    hops, queue = {number: 0}, deque([number])
+    while queue:
+        one = queue.popleft()
+        for other in sorted(joined[one] - hops.keys()):
+            hops[other] = hops[one] + 1
+            queue.append(other)
+    return hops
 
 
 def _floors(layout: Layout, number: int) -> list[int]:
