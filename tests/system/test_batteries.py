@@ -108,6 +108,14 @@ def test_who_had_to_charge_first_bids_again_once_it_is_ready() -> None:
     assert bids_us and min(bids_us) > ready_us
 
 
+def test_where_all_have_to_charge_first_customers_do_not_wait_for_that() -> None:
+    # Both below the floor: as they stand, MR1 would be ready after 270 s.
+    low = one_car(0.2, 0.15)
+    assert not any(one.bids for node in (MR1, MR2) for one in levels(low, node)), "what each says of itself stays"
+    served_us, _ = low.first(TaskReport, lambda one: one.phase is TaskPhase.DONE)
+    assert served_us < 120_000_000
+
+
 def test_a_bid_that_the_battery_cannot_pay_for_is_not_made() -> None:
     # Above the floor of 1 %, and less than a task takes.
     park = site("floor_percent = 1\nready_percent = 2")

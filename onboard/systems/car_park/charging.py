@@ -3,7 +3,8 @@
 With nothing to do and less than ``seek_percent`` it goes to a charger as it goes to rest: by an itinerary without work,
 which others see, and which yields to whoever carries or fetches. On the way and at the charger it bids as ever: so
 charging gives way to customers, down to ``floor_percent``. Below that it charges first, and bids again from
-``ready_percent`` on. A bid whose work the battery cannot pay for, with the way to a charger behind it, is not made.
+``ready_percent`` on; where no other robot says that it may bid, it bids as before, or customers would wait for all of
+them. A bid whose work the battery cannot pay for, with the way to a charger behind it, is not made.
 
 Chargers are as many as robots, and all robots can stand at them together (``reader/battery.py``): so whoever wants one
 finds one where nobody stands or said that it will, and nobody has to drive another away.
@@ -27,6 +28,8 @@ from onboard.ways.roads import roads_of
 
 #: The level is told again after this, us, and when it is another by so much (dbc/battery.dbc).
 TELL_US, TELL_PERMILLE = 60_000_000, 10
+#: Who was not heard to say for so long that it may bid does not, us: two of its words may be lost.
+BIDS_FOR_US = 3 * TELL_US
 #: So many times what a plan costs by the site's constants must be there: runs are stopped and begun again, and others
 #: waited for. A choice: what a trip needs is some hundredths of a battery.
 RESERVE = 1.25
@@ -48,6 +51,8 @@ class Charging:
     #: Whether it charges first: from ``floor_percent`` down until it has ``ready_percent`` again.
     is_low: bool = False
     _told: tuple[BatteryLevel, int] | None = None
+    #: Until when another robot counts as one that bids, by its last word.
+    _bid_until_us: dict[int, int] = field(default_factory=dict)
     _dead_until_us: dict[Segment, int] = field(default_factory=dict)
 
     @property
@@ -56,9 +61,21 @@ class Charging:
         return self.permille == 0
 
     @property
-    def bids(self) -> bool:
-        """Whether its charge allows it to take on tasks; not before the gauge has told it."""
-        return self.park.battery is None or (self.permille is not None and not self.is_low)
+    def _is_ready(self) -> bool:
+        return self.permille is not None and not self.is_low
+
+    def bids(self, now_us: int) -> bool:
+        """Whether it takes on tasks now, by what all robots have; not before the gauge has told it."""
+        if self.park.battery is None or self._is_ready:
+            return True
+        aside = self.mirror.obstacles.machines
+        others = (node for node, until_us in self._bid_until_us.items() if node not in aside and now_us < until_us)
+        return self.permille is not None and next(others, None) is None
+
+    def hear(self, word: BatteryLevel, now_us: int) -> None:
+        """Another robot tells whether it bids."""
+        if word.sender != self.node_id:
+            self._bid_until_us[word.sender] = now_us + BIDS_FOR_US if word.bids else now_us
 
     def sense(self, state: BatteryState, now_us: int) -> list[Effect]:
         """Take up what the gauge tells, and tell the others where it is news, or is told again."""
@@ -70,7 +87,7 @@ class Charging:
             self.is_low = True
         elif self.permille >= 10 * battery.ready_percent:
             self.is_low = False
-        word = BatteryLevel(self.node_id, self.permille, self.is_charging, self.bids)
+        word = BatteryLevel(self.node_id, self.permille, self.is_charging, self._is_ready)
         if self._told is not None and now_us < self._told[1] + TELL_US and not _is_news(word, self._told[0]):
             return []
         self._told = word, now_us

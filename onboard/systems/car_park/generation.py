@@ -97,7 +97,7 @@ class CarParkGeneration:
         """Least finishing time (bus ms) for me if nobody were in my way; None where I cannot do it at all."""
         if call.criterion is not Criterion.FINISH_TIME or call.operation not in (Operation.PARK, Operation.RETRIEVE):
             return None
-        if not self._is_able:
+        if not self._is_able(now_us):
             return None
         limits = self.site.cars
         # On the bus a wheelbase is rounded down to 10 mm; the desk has measured it to the millimetre.
@@ -110,12 +110,12 @@ class CarParkGeneration:
         least_us = min(bounds.values(), default=FOREVER)
         return to_bus_ms(least_us) if least_us < FOREVER else None
 
-    @property
-    def _is_able(self) -> bool:
+    def _is_able(self, now_us: int) -> bool:
         """Whether this robot can take on any task."""
         program = self.program
         is_planned = program.standing is not None and not program.unplanned
-        return is_planned and not self.is_held and self.charging.bids and len(program.remaining) + 4 <= MAX_STEPS
+        is_free = not self.is_held and len(program.remaining) + 4 <= MAX_STEPS
+        return is_planned and is_free and self.charging.bids(now_us)
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
         """First request: the best solution as a bid, or None: silence (row P45).
@@ -170,7 +170,7 @@ class CarParkGeneration:
         is_free = self.clearance.still_free(plan, seen, now_us)
 
         def stands(then_us: int) -> bool:
-            if not self._is_able or solution.place not in self._candidates(call, then_us):
+            if not self._is_able(then_us) or solution.place not in self._candidates(call, then_us):
                 return False
             _, origin, start_us = self._free_from(then_us, behind_bids=behind_bids)
             return origin == solution.origin and start_us <= solution.start_us and is_free()

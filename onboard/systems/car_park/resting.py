@@ -15,6 +15,7 @@ from collections import Counter, deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from onboard.contract.battery import BatteryLevel
 from onboard.contract.codes import Grade, KindCode, LegAction, Operation, Reason
 from onboard.contract.messages import BatteryState, CallForProposals, Itinerary, Message, Stamp
 from onboard.core.effects import Effect
@@ -78,9 +79,11 @@ class Resting:
         return self.generation.program
 
     def hear(self, message: Message, now_us: int) -> None:
-        """A call tells where robots are needed, a plan where one will stand."""
+        """A call tells where robots are needed, a plan where one will stand, a level whether others bid."""
         if not self.is_on:
             return
+        if isinstance(message, BatteryLevel):
+            self.generation.charging.hear(message, now_us)
         if isinstance(message, CallForProposals) and message.operation in (Operation.PARK, Operation.RETRIEVE):
             self._due_us = now_us + self._rest_us
             if message.attempt == 1 and class_of_end(message.from_station) is None:
