@@ -22,8 +22,9 @@ from onboard.seal.tags import following, tag_of, tag_over
 _NODE_MASK = 0xFF
 #: A node whose seals do not fit is challenged again after so long, and after twice as long each time, us.
 _ASK_US, _ASK_MOST_US = 250_000, 8_000_000
-#: So many seals in a row that do not fit make a node one that is challenged: one may be anybody's.
-_MISFITS = 2
+#: Seals in a row that do not fit make a node one that is challenged: so many of numbers that could come next, behind
+#: which a frame may have been lost, or two of others, as of a life that I do not know. One may be anybody's.
+_MISFITS, _NEAR = 8, 256
 #: Challenges of one node that wait for an answer.
 _ASKED = 4
 #: At most one word about faults in this time, us: a heartbeat's period.
@@ -72,7 +73,7 @@ class Gate:
         self._asked: deque[tuple[int, int]] = deque()
         self._answer_even_us = 0
         self._open_us = 0
-        self._ask_all_us: int | None = None
+        self._ask_again_us = 0
         self._told: dict[tuple[int, SealWord], int] = {}
         self._tell_us = 0
 
@@ -94,21 +95,20 @@ class Gate:
     def begin(self, now_us: int) -> list[Frame]:
         """Challenge all: ``is_open`` once they have answered, or their time is over."""
         whole_us = _START_US + 2 * len(self._settings.others) * self._settings.answer_us
-        self._open_us, self._ask_all_us = now_us + whole_us, now_us + whole_us // 2
+        self._open_us, self._ask_again_us = now_us + whole_us, now_us + whole_us // 2
         self.is_open = not self._settings.others
-        said = self._challenge(NOBODY, now_us)
+        # Twice the same: whoever misses it has to be asked alone, and answers behind all others.
+        said = 2 * self._challenge(NOBODY, now_us)
         self._set_next(now_us)
         return said
 
     def wake(self, now_us: int) -> list[Frame]:
         """What is due: answers, challenges again, and words about faults."""
         said: list[Frame] = []
-        if self._ask_all_us is not None and now_us >= self._ask_all_us:
-            self._ask_all_us = None
-            if not self.is_open:
-                said += self._challenge(NOBODY, now_us)
         if now_us >= self._open_us:
             self.is_open = True
+        if not self.is_open and now_us >= self._ask_again_us:
+            said += self._challenge_again(now_us)
         for node, heard in (*self._nodes.items(), (self._keys.node, self._own)):
             while heard.waiting and now_us - heard.waiting[0].since_us >= WAITS_US:
                 self._pass_over(node, (heard.waiting.popleft(),))
@@ -134,6 +134,12 @@ class Gate:
             heard.ask_us = now_us + (heard.patience_us or _ASK_US)
         return [frame_of(SealChallenge(self._keys.node, whom, nonce))]
 
+    def _challenge_again(self, now_us: int) -> list[Frame]:
+        """One by one those who have not answered by now: asked together, all would answer once more."""
+        missing = [node for node in sorted(self._settings.others) if self._nodes[node].last is None]
+        self._ask_again_us = now_us + _START_US + len(missing) * self._settings.answer_us
+        return [frame for node in missing for frame in self._challenge(node, now_us)]
+
     def _tell(self, now_us: int) -> list[Frame]:
         """One word about what has been counted since it was told, if it is time."""
         if now_us < self._tell_us:
@@ -153,7 +159,7 @@ class Gate:
         """When ``wake`` is due: the earliest of all that waits."""
         due = [heard.waiting[0].since_us + WAITS_US for heard in (*self._nodes.values(), self._own) if heard.waiting]
         if not self.is_open:
-            due.append(self._open_us if self._ask_all_us is None else self._ask_all_us)
+            due.append(min(self._open_us, self._ask_again_us))
         if self._asked:
             due.append(self._answer_us)
         if any(self._told.get(key) != min(count, _MOST_COUNTED) for key, count in self.faults.items()):
@@ -181,7 +187,8 @@ class Gate:
                 said = self._on_challenge(word, now_us)
             case SealAnswer():
                 if word.sender in self._nodes:
-                    self._nodes[word.sender].answer = frame
+                    heard = self._nodes[word.sender]
+                    heard.answer, heard.claim = frame, word.life << 32 | word.number
             case SealFault():
                 self._keep(word, frame, now_us, is_done=True)
             case _:
@@ -270,6 +277,10 @@ class Gate:
         if heard is None:
             return []
         key = self._keys.pairs[seal.sender]
+        if heard.answer is None and heard.last is None and heard.claim is not None:
+            # It may be behind an answer that was lost, whose number follows those told to others.
+            number = following(heard.claim, seal.counter)
+            heard.answer = frame_of(SealAnswer(seal.sender, number & 0xFFFFFFFF, number >> 32))
         if heard.answer is not None:
             self._on_answer(seal, heard, key, now_us)
             return []
@@ -315,6 +326,9 @@ class Gate:
     def _on_challenge(self, word: SealChallenge, now_us: int) -> list[Frame]:
         if word.whom not in (NOBODY, self._keys.node) or word.sender not in self._keys.pairs:
             return []
+        if word.nonce == self._nodes[word.sender].asked:
+            return []
+        self._nodes[word.sender].asked = word.nonce
         mine = [one for one in self._asked if one[0] == word.sender]
         if len(mine) >= _ASKED:
             self._asked.remove(mine[0])
@@ -340,7 +354,7 @@ class Gate:
             self._count(seal.sender, SealWord.REPLAYED, old)
             return []
         self.faults[seal.sender, SealWord.FALSE_SEAL] += 1
-        heard.misfits += 1
+        heard.misfits += 1 if number + 0x10000 - heard.last <= _NEAR else _MISFITS // 2
         return self._ask(seal.sender, heard, now_us) if heard.misfits >= _MISFITS else []
 
     def _on_own_seal(self, seal: Seal) -> list[Frame]:

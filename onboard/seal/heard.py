@@ -48,6 +48,10 @@ class HeardNode:
     waiting: deque[WaitingFrame] = field(default_factory=deque)
     nonces: deque[int] = field(default_factory=lambda: deque(maxlen=_NONCES))
     answer: Frame | None = None
+    #: The number that it told somebody last, proved or not; None before the first.
+    claim: int | None = None
+    #: With which nonce it challenged me last, or all; None before the first.
+    asked: int | None = None
     #: Its last sign of life that counted without a seal.
     free: WaitingFrame | None = None
     places: CarPlaces = field(default_factory=CarPlaces)
