@@ -112,8 +112,8 @@ def measure_floors(site: CarPark, busy: int, queries: int, fleets: int, seed: in
     took_us.sort()
     figures = (statistics.median(took_us), took_us[len(took_us) * 99 // 100], took_us[-1])
     row = [busy, *(f"{figure:.0f}" for figure in figures)]
-    figures = (*row, statistics.median(expansions), max(expansions), found, delayed, f"{statistics.mean(pops):.0f}")
-    return [str(cell) for cell in figures]
+    cells = (*row, statistics.median(expansions), max(expansions), found, delayed, f"{statistics.mean(pops):.0f}")
+    return [str(cell) for cell in cells]
 
 
 def measure_bound(length: int, calls: int) -> float:

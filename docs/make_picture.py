@@ -19,6 +19,7 @@ from bus_sim.systems.car_park.simulation import build
 from bus_sim.systems.car_park.stage import ORIGIN_US
 from bus_sim.systems.car_park.window import two_way_hour, with_short_eve
 from bus_sim.virtual_time import VirtualTimeLoop
+from onboard.systems.car_park.site import car_park
 
 #: 15:38:25 local time: one car comes in, another goes out, robots share the street's alley.
 MOMENT_S = 15 * 3600 + 38 * 60 + 25
@@ -29,7 +30,7 @@ COLUMNS, LINES = 112, 30
 async def _picture() -> str:
     loop = asyncio.get_running_loop()
     assert isinstance(loop, VirtualTimeLoop)
-    site = find_site("standard")
+    site = car_park(find_site("standard"))
     demand = choose_demand(ParkingDay(), site)
     demand = with_short_eve(demand, two_way_hour(demand), len(site.compartments))
     first_us = demand.stays[0].arrival_us
