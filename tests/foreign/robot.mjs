@@ -1,0 +1,353 @@
+// A robot written from docs/protocol.md, docs/site-file.md and the DBC files alone: what it does with drive and shuttle.
+// One process: a line in is a time with a frame or a wake, the lines out are frames, what is to be kept, and the next wake.
+import { readSync, writeSync } from "node:fs";
+import { Calls } from "./calls.mjs";
+import { ABOARD, GATE, frontOf } from "./site.mjs";
+import { carKey, stationKey } from "./tokens.mjs";
+
+const [S, MS] = [1_000_000, 1_000];
+const ACTIONS = { true: ["REACH", "GRIP", "RETRACT"], false: ["REACH", "RELEASE", "RETRACT"] };
+const AFTER = { REACH: "REACHED", GRIP: "REACHED", RELEASE: "REACHED", RETRACT: "HOME" };
+const gateOf = (platform) => platform | GATE;
+
+export class Robot extends Calls {
+  constructor(setup, journal) {
+    super(setup, journal);
+    this.hand = journal.hand; // the work in hand: { which, place, takes, actions }
+    const [home] = [...this.site.homes].find(([, node]) => node === this.node);
+    const [held] = [...this.tokens.held.keys()].filter((key) => key < 128 << 8);
+    this.track = journal.track ?? (held ?? home) >> 8;
+    const { speed_mm_s: v, acceleration_mm_s2: a } = this.site.carrier;
+    this.soon = Math.ceil((Math.floor((v * v) / (2 * a)) + 3 * v) / this.site.pitch) + 4;
+    this.said = { index: 0, isMoving: false, us: 0 };
+    this.retryUs = 0;
+    this.tell("StateRequest", {});
+  }
+
+  journal() {
+    return { ...super.journal(), hand: this.hand, track: this.track };
+  }
+
+  get state() {
+    if (!this.version) return "STARTING";
+    if (this.isAway) return "OBSTACLE";
+    return this.steps.length ? "WORKING" : "IDLE";
+  }
+
+  get place() {
+    if (!this.drive) return undefined;
+    const index = Math.min(this.site.length.get(this.track) + 1, Math.max(0, Math.round(this.drive.position_mm / this.site.pitch) + 1));
+    return { track: this.track, index, key: this.site.at(this.track, index) };
+  }
+
+  get isRunning() {
+    return this.orderUs !== undefined || this.drive?.mode !== "STANDING";
+  }
+
+  onDevice(word) {
+    if (word.name === "DriveState") {
+      this.driveOrder ??= { sequence: word.sequence, target_mm: word.position_mm };
+      this.drive = word;
+      if (this.offset !== undefined && this.version) this.#tellPlace();
+    } else if (word.name === "ShuttleState") {
+      this.shuttleOrder ??= { sequence: word.sequence };
+      this.shuttle = word;
+    }
+  }
+
+  // --- all that is due, in an order in which nothing waits for what comes behind it
+
+  goOn() {
+    this.wakeCalls();
+    if (!this.version && this.place && this.shuttle && (this.synced || !this.isAgain)) this.#start();
+    if (this.isAway || !this.synced) this.tokens.wanted.clear(), (this.orderUs = undefined);
+    else if (this.version && !this.frozen) {
+      if (this.meets && this.isDue(this.retryUs)) this.#giveWay();
+      this.#work();
+    }
+    this.wakeFleet();
+  }
+
+  #start() {
+    this.sayPlace();
+    if (this.hand || this.tasks.size) {
+      const { call } = this.tasks.get(this.hand?.which) ?? [...this.tasks.values()].at(-1);
+      this.stamp = [call.deadline_ms, call.initiator, call.number & 0xff];
+      if (this.remake()) return;
+    }
+    this.publish();
+  }
+
+  #giveWay() {
+    this.retryUs = this.now + S;
+    if (!this.tasks.size && this.meets.stamp) this.stamp = this.meets.stamp;
+    if (this.remake()) this.meets = undefined;
+  }
+
+  /** What of the plan cannot be changed any more. */
+  inHand() {
+    const [step] = this.steps;
+    const { which, place, takes } = this.hand ?? {};
+    if (this.hand && step?.action !== "WORK" && this.hand.actions.length < 3) {
+      const [index, end] = [place & 0x7f, this.now + this.site.handling(place)];
+      return [{ action: "WORK", track: place >> 8, from: index, to: index, begin: this.now, end, place, takes, call: this.tasks.get(which).call }];
+    }
+    const isFixed = { TRAVEL: step === this.begun && this.isRunning, RIDE: true, WORK: this.hand?.actions.length < 3 };
+    let count = Number(Boolean(step && isFixed[step.action]));
+    if (step && this.site.liftOf(this.place.key)) count = Math.max(count, 1);
+    const onLift = ({ action, track, to }) => action === "RIDE" || this.site.liftOf(this.site.at(track, to));
+    while (count && count < this.steps.length && onLift(this.steps[count - 1])) count += 1;
+    return this.steps.slice(0, count);
+  }
+
+  #work() {
+    for (let n = 0; n < 40; n++) {
+      const [step] = this.steps;
+      if (!step) return this.#stand();
+      if (step.begin > this.now + 10 * MS && this.begun !== step) {
+        this.#stand();
+        return this.isDue(step.begin);
+      }
+      if (this.begun !== step) this.#beginStep(step);
+      const isOver = step.action === "TRAVEL" ? this.#travel(step) : step.action === "RIDE" ? this.#ride(step) : this.#handle(step);
+      if (!isOver) {
+        if (this.isDue(step.end + 2 * S)) this.#late(step, this.now + 2 * S - step.end);
+        return undefined;
+      }
+      this.steps.shift();
+      const by = this.steps.length ? this.now - this.steps[0].begin : 0;
+      if (by > 500 * MS) {
+        this.steps = this.steps.map((one) => ({ ...one, begin: one.begin + by, end: one.end + by }));
+        this.publish();
+      }
+    }
+    return undefined;
+  }
+
+  #beginStep(step) {
+    this.begun = step;
+    if (step.action !== "WORK") return;
+    const which = step.call.task;
+    if (this.hand?.which !== which || this.hand.takes !== step.takes) this.hand = { which, place: step.place, takes: step.takes, actions: [...ACTIONS[step.takes]] };
+    if (step.takes) this.report(which, "STARTED", step.place);
+  }
+
+  /** P9: it lasts longer, and what follows comes later. */
+  #late(step, by) {
+    const later = this.steps.map((one) => ({ ...one, begin: one.begin + by, end: one.end + by }));
+    later[0].begin = step.begin;
+    this.steps = later;
+    [this.begun] = later;
+    this.publish();
+  }
+
+  // --- driving
+
+  #segment(index) {
+    return this.site.at(this.track, index);
+  }
+
+  #body() {
+    const half = this.site.carrier.length_mm / 2;
+    const [low, high] = [-half, half].map((one) => Math.round((this.drive.position_mm + one) / this.site.pitch) + 1);
+    return Array.from({ length: high - low + 1 }, (_, n) => this.#segment(low + n));
+  }
+
+  #stand(needed = []) {
+    this.orderUs = undefined;
+    this.#giveBack([...this.#body(), ...needed]);
+  }
+
+  /** L1, L4, L5: whether the sill of a lift may be crossed here. */
+  #mayCross(platform) {
+    const lift = this.site.liftOf(platform);
+    const { stop } = this.peers.get(lift.node);
+    const gate = gateOf(platform);
+    if (!this.tokens.holds(platform) || !this.tokens.holds(gate)) return false;
+    const isSaid = stop?.mark === (this.tokens.version(gate) & 0x1fff);
+    if (!isSaid && this.isDue(this.sillUs ?? 0)) {
+      this.sillUs = this.now + S;
+      if (this.sillGate === gate) this.say("SyncRequest", { whom: lift.node, boot_before: 0 });
+      this.sillGate = gate;
+      this.isDue(this.sillUs);
+    }
+    return isSaid && stop.isStill && stop.index === lift.floors.indexOf(this.track) + 1;
+  }
+
+  /** K2, K14, K15: as far as an unbroken line of held segments leads. */
+  #travel(step) {
+    const { pitch } = this.site;
+    const goal = (step.to - 1) * pitch;
+    const isThere = this.drive.mode === "STANDING" && Math.abs(this.drive.position_mm - goal) <= 5;
+    if (isThere && this.drive.sequence === this.driveOrder.sequence) {
+      this.#stand();
+      return true;
+    }
+    const { index } = this.place;
+    const way = step.to >= index ? 1 : -1;
+    const ahead = Array.from({ length: Math.abs(step.to - index) + 1 }, (_, n) => this.#segment(index + n * way));
+    const soon = ahead.slice(0, this.soon);
+    const front = soon.findIndex((key, n) => n > 0 && this.site.fronts.has(key));
+    const wanted = [...this.#body(), ...(front < 0 ? soon : soon.slice(0, front + 1))];
+    const platform = ahead.find((key) => this.site.liftOf(key));
+    if (platform !== undefined && wanted.includes(platform)) wanted.push(gateOf(platform));
+    for (const key of new Set(wanted)) this.tokens.want(key);
+    const isHome = this.shuttle.mode === "HOME" && this.#body().every((key) => this.tokens.holds(key));
+    let reach = 0;
+    while (reach + 1 < ahead.length && this.tokens.holds(ahead[reach + 1])) reach += 1;
+    if (platform !== undefined && !this.#mayCross(platform)) reach = platform === ahead[0] ? 0 : Math.min(reach, ahead.length - 2);
+    if (isHome) this.#driveTo((index + reach * way - 1) * pitch);
+    else this.orderUs = undefined;
+    this.#giveBack([...this.#body(), ...ahead, ...(platform === undefined ? [] : [gateOf(platform)])]);
+    return false;
+  }
+
+  #driveTo(target_mm) {
+    const isNew = target_mm !== this.driveOrder.target_mm;
+    if (isNew) this.driveOrder = { sequence: (this.driveOrder.sequence % 255) + 1, target_mm };
+    if (!isNew && this.orderUs !== undefined && !this.isDue(this.orderUs)) return;
+    this.orderUs = this.now + this.site.us.drive_refresh;
+    this.isDue(this.orderUs);
+    this.tell("DriveOrder", { ...this.driveOrder, speed_limit_mm_s: this.site.carrier.speed_mm_s, across: 0 });
+  }
+
+  /** K14: what is not needed goes back to its steward, in lines of one version. */
+  #giveBack(needed) {
+    const home = [...this.site.homes].find(([, node]) => node === this.node)[0];
+    const held = [...this.tokens.held.keys()].filter((key) => key < 1 << 24);
+    if (this.tokens.holds(home) && !held.includes(home)) held.push(home);
+    const left = held.filter((key) => !needed.includes(key)).sort((a, b) => a - b);
+    if (left.length) this.sayPlace();
+    for (const track of new Set(left.map((key) => (key & 0xff) === GATE ? key : key >> 8))) {
+      const keys = left.filter((key) => ((key & 0xff) === GATE ? key : key >> 8) === track);
+      this.tokens.give(keys, this.site.stewards.get(keys[0] >> 8));
+    }
+    for (const key of this.tokens.wanted.keys()) if (key < 1 << 24 && !needed.includes(key)) this.tokens.wanted.delete(key);
+  }
+
+  /** L3: it rides while the gate is away, and is there when that comes back with the lift's word. */
+  #ride(step) {
+    const [platform, lift] = [step.track << 8, this.site.lifts[step.track - 128]];
+    const gate = gateOf(platform);
+    const isRidden = this.ridden === step;
+    if (!isRidden) this.#stand();
+    this.ridden = step;
+    this.tokens.want(gate);
+    const before = this.track;
+    this.track = lift.floors[step.to - 1];
+    if (this.#mayCross(platform)) {
+      this.save();
+      this.sayPlace();
+      return true;
+    }
+    this.track = before;
+    if (this.tokens.holds(gate) && this.peers.get(lift.node).stop?.mark === (this.tokens.version(gate) & 0x1fff)) this.#stand();
+    return false;
+  }
+
+  // --- the shuttle
+
+  /** C1, C3, U2. */
+  #handle(step) {
+    const { call, place, takes } = step;
+    const keys = [stationKey(place), carKey(call.car)];
+    this.#stand();
+    for (const key of keys) this.tokens.want(key);
+    if (!keys.every((key) => this.tokens.holds(key))) return false;
+    const isFull = [...this.cars].some(([car, one]) => one.station === place && car !== call.car);
+    if (!takes && isFull) return false;
+    const { action, sequence } = this.shuttleOrder;
+    if (action && (this.shuttle.sequence !== sequence || this.shuttle.mode !== AFTER[action])) return false;
+    if (this.hand.actions.length) {
+      const side = place & 0x80 ? "FAR" : "NEAR";
+      this.shuttleOrder = { sequence: (sequence % 255) + 1, action: this.hand.actions[0], side, wheelbase_mm: this.wheelbase(call) };
+      this.hand.actions = this.hand.actions.slice(1);
+      if (takes) this.tasks.get(call.task).phase = "BEGUN";
+      this.save();
+      this.tell("ShuttleOrder", this.shuttleOrder);
+      return false;
+    }
+    this.shuttleOrder = { sequence };
+    this.#handled(step, keys);
+    return true;
+  }
+
+  wheelbase(call) {
+    return this.cars.get(call.car)?.wheelbase ?? call.wheelbase;
+  }
+
+  #handled({ call, place, takes }, [station, car]) {
+    const one = { station: takes ? ABOARD : place, by: this.node, version: this.tokens.version(car) & 0xffff, wheelbase: this.wheelbase(call) };
+    const keeper = this.tokens.keeper(place);
+    this.cars.set(call.car, one);
+    this.hand = undefined;
+    if (takes) this.tasks.get(call.task).phase = "LOADED";
+    else {
+      this.tasks.delete(call.task);
+      this.done.set(call.task, place);
+    }
+    this.save();
+    const said = this.sayCar(call.car, one);
+    if (!takes) {
+      this.tokens.carAt.set(car, said);
+      this.tokens.give([car], keeper);
+    }
+    this.tokens.give([station], keeper);
+    this.report(call.task, takes ? "LOADED" : "DONE", place);
+  }
+
+  // --- where it is
+
+  get leg() {
+    return Math.max(0, this.told - Math.max(1, this.steps.length));
+  }
+
+  sayPlace() {
+    const { track, index } = this.place;
+    const where = { track, index, offset_mm: this.drive.position_mm - (index - 1) * this.site.pitch, speed_mm_s: this.drive.speed_mm_s };
+    this.say("Progress", { itinerary_version: this.version, leg: this.version ? this.leg : 0, ...where });
+    this.said = { index, isMoving: this.drive.mode !== "STANDING", us: this.now };
+  }
+
+  /** P10. */
+  #tellPlace() {
+    const { index, isMoving, us } = this.said;
+    const stops = this.drive.mode === "STANDING" && isMoving;
+    if (stops || (this.place.index !== index && (!isMoving || this.now - us >= 8 * S))) this.sayPlace();
+  }
+
+  /** P11. */
+  waits(key, blocker, reason) {
+    this.say("Waiting", { track: key >> 8, index: key & 0xff, blocker, reason });
+  }
+}
+
+// --- lines in and out
+
+function* lines() {
+  const chunk = Buffer.alloc(65_536);
+  let rest = "";
+  for (;;) {
+    const count = readSync(0, chunk);
+    if (!count) return;
+    const parts = (rest + chunk.toString("utf8", 0, count)).split("\n");
+    rest = parts.pop();
+    yield* parts;
+  }
+}
+
+let robot;
+for (const line of lines()) {
+  const [local, kind, number, data] = line.split(" ", 4);
+  if (kind === "start") {
+    const [setup, journal] = JSON.parse(line.slice(line.indexOf("[")));
+    robot = new Robot(setup, journal);
+  }
+  const bus = { fleet: "fleet", device: "device" }[kind];
+  const frames = robot.step(Number(local), bus, Number(number), data && bus ? Buffer.from(data.slice(1), "hex") : undefined);
+  const out = frames.map(([name, id, bytes]) => `${name} ${id} ${bytes.toString("hex")}`);
+  if (robot.isDirty) out.unshift(`keep ${JSON.stringify(robot.journal())}`);
+  robot.isDirty = false;
+  const due = robot.offset === undefined ? Infinity : robot.next - robot.offset;
+  writeSync(1, `${[...out, `wake ${due === Infinity ? -1 : due}`].join("\n")}\n`);
+}
