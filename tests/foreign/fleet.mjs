@@ -285,6 +285,7 @@ export class Fleet {
     }
     if (word.state !== "OBSTACLE" && word.state !== "STOPPED") peer.halted = false;
     Object.assign(peer, { beat: word, boot: word.boot });
+    if (word.state !== "STARTING") peer.known = word.boot;
     if (this.isStranger(word)) return;
     const isSame = [this.digest(), ...this.digests.map(([, one]) => one)].includes(word.mirror_digest);
     peer.apart = isSame || !this.version ? 0 : peer.apart + 1;
@@ -300,7 +301,7 @@ export class Fleet {
     } else if (whom === 0 || whom === this.node) {
       if (boot_before > this.boot && !this.isAgain && this.now < this.started + 8 * S) this.isOutdated();
       this.askers.add(sender);
-      if (whom === 0 && peer?.boot && !(this.now < peer.asked + 250 * MS)) this.ask(sender, peer.boot, this.now);
+      if (whom === 0 && peer?.known && !(this.now < peer.asked + 250 * MS)) this.ask(sender, peer.known, this.now);
       if (whom === 0 && peer) peer.isStarted = true;
     }
   }

@@ -198,7 +198,8 @@ export class Robot extends Calls {
     if (platform !== undefined && !this.#mayCross(platform)) reach = platform === ahead[0] ? 0 : Math.min(reach, ahead.length - 2);
     if (isHome) this.#driveTo((index + reach * way - 1) * pitch);
     else this.orderUs = undefined;
-    this.#giveBack([...this.#body(), ...ahead, ...(platform === undefined ? [] : [gateOf(platform)])]);
+    const needed = [...this.#body(), ...ahead];
+    this.#giveBack([...needed, ...needed.filter((key) => this.site.liftOf(key)).map(gateOf)]);
     return false;
   }
 
