@@ -56,10 +56,11 @@ export class Calls extends Fleet {
     if (head.grade === "TENTATIVE" || (peer.plan && !newer(head.version, peer.plan.version, 8))) return;
     const award = this.near(head.stamp_award_ms);
     let begin = award;
-    const steps = legs.map(({ action, track, from_index: from, to_index: to, end_ms }) => {
+    const steps = legs.map(({ action, track, side, from_index: from, to_index: to, end_ms }) => {
       const end = award + end_ms * MS;
       const mouth = action === "TRAVEL" && from === to ? this.#mouthOf(track, peer) : undefined;
-      const step = { action, track, from, to, begin, end, mouth };
+      const place = (track << 8) | (Number(side === "FAR") << 7) | to;
+      const step = { action, track, from, to, begin, end, mouth, place };
       begin = end;
       return step;
     });

@@ -2,7 +2,7 @@
 // One process: a line in is a time with a frame or a wake, the lines out are frames, what is to be kept, and the next wake.
 import { readSync, writeSync } from "node:fs";
 import { Calls } from "./calls.mjs";
-import { ABOARD, GATE, frontOf } from "./site.mjs";
+import { ABOARD, ANY, GATE } from "./site.mjs";
 import { carKey, stationKey } from "./tokens.mjs";
 
 const [S, MS] = [1_000_000, 1_000];
@@ -128,7 +128,7 @@ export class Robot extends Calls {
     this.begun = step;
     if (step.action !== "WORK") return;
     const which = step.call.task;
-    if (this.hand?.which !== which || this.hand.takes !== step.takes) this.hand = { which, place: step.place, takes: step.takes, actions: [...ACTIONS[step.takes]] };
+    if (this.hand?.which !== which || this.hand.place !== step.place) this.hand = { which, place: step.place, takes: step.takes, actions: [...ACTIONS[step.takes]] };
     if (step.takes) this.report(which, "STARTED", step.place);
   }
 
@@ -256,7 +256,7 @@ export class Robot extends Calls {
     for (const key of keys) this.tokens.want(key);
     if (!keys.every((key) => this.tokens.holds(key))) return false;
     const isFull = [...this.cars].some(([car, one]) => one.station === place && car !== call.car);
-    if (!takes && isFull) return false;
+    if (!takes && isFull && this.hand.actions.length === 3) return this.#leaveElsewhere(step);
     const { action, sequence } = this.shuttleOrder;
     if (action && (this.shuttle.sequence !== sequence || this.shuttle.mode !== AFTER[action])) return false;
     if (this.hand.actions.length) {
@@ -271,6 +271,19 @@ export class Robot extends Calls {
     this.shuttleOrder = { sequence };
     this.#handled(step, keys);
     return true;
+  }
+
+  /** C7: another car is where this one is to be left. */
+  #leaveElsewhere({ call, place }) {
+    const fetches = this.robots.some((one) => one.plan?.steps.slice(one.plan.leg).some((step) => step.action === "WORK" && step.place === place));
+    this.fullUs ??= this.now;
+    const waitUs = !this.site.bays.has(place) ? 0 : fetches ? 10 * S : 60 * S;
+    if (this.isDue(this.fullUs + waitUs) && this.isDue(this.retryUs)) {
+      this.retryUs = this.now + S;
+      this.tasks.get(call.task).call.to = ANY;
+      if (this.remake()) [this.hand, this.fullUs] = [undefined, undefined];
+    }
+    return false;
   }
 
   wheelbase(call) {
