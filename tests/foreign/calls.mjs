@@ -12,7 +12,7 @@ const task = (word) => reference(word.task_origin, word.task_number);
 export class Calls extends Fleet {
   constructor(setup, journal) {
     super(setup, journal);
-    Object.assign(this, { version: 0, stamp: [0, this.node, 0], steps: [], calls: new Map(), leftOut: new Map(), order: new Map() });
+    Object.assign(this, { version: 0, stamp: [0, this.node, 0], steps: [], calls: new Map(), leftOut: new Map(), sets: new Map(), order: new Map() });
     this.tasks = new Map(journal.tasks); // task: { call, phase }, what was won
     this.done = new Map(journal.done); // task: where the car was left
     this.forfeits = new Map(); // task: [reason, times, due]
@@ -195,15 +195,14 @@ export class Calls extends Fleet {
       const nodes = ["a", "b", "c", "d", "e", "f"].map((one) => word[`node_${one}`]);
       return this.leftOut.set(key, [...(this.leftOut.get(key) ?? []), ...nodes.filter(Boolean)]);
     }
-    if (word.name === "Call") this.sets ??= new Map();
-    if (word.name === "Call" && !this.sets.has(key)) this.sets.set(key, { said: this.now });
-    const set = this.sets?.get(key);
-    if (!set || this.calls.has(key)) return undefined;
+    if (this.calls.has(key)) return undefined;
+    if (!this.sets.has(key)) this.sets.set(key, { said: this.now });
+    const set = this.sets.get(key);
     const isOther = set[word.name] && Object.keys(word).some((one) => one !== "senders" && set[word.name][one] !== word[one]);
     if (isOther) return this.sets.delete(key);
     Object.assign(set, { [word.name]: word, said: this.now });
     const { Call: head, CallTerms: terms, CallLoad: load, CallParent: parent } = set;
-    if (!terms || !load || (head.depth && !parent)) return undefined;
+    if (!head || !terms || !load || (head.depth && !parent)) return undefined;
     this.sets.delete(key);
     return this.#opened(key, head, terms, load, parent);
   }
@@ -284,14 +283,14 @@ export class Calls extends Fleet {
       if (call.isMine && this.isDue(call.deadline + 10 * S)) call.isMine = false;
       if (this.now > call.deadline + 60 * S) this.calls.delete(call.key);
     }
-    for (const [key, set] of this.sets ?? []) {
+    for (const [key, set] of this.sets) {
       if (!this.isDue(set.said + S)) continue;
       this.sets.delete(key);
       this.drop("INCOMPLETE_SET");
     }
     for (const [which, one] of this.forfeits) {
       if (!this.isDue(one.due)) continue;
-      Object.assign(one, { times: one.times + 1, due: this.now + S });
+      Object.assign(one, { times: one.times + 1, due: this.at(this.now + S) });
       this.report(which, "FORFEITED", 0, one.reason);
       if (one.times >= 20) this.forfeits.delete(which);
     }
@@ -362,7 +361,7 @@ export class Calls extends Fleet {
   /** All that is left is planned anew, behind the run or the work in hand; whether there is a way. */
   remake() {
     const planner = this.planner();
-    const kept = this.inHand();
+    const kept = this.cut(this.inHand());
     let begin = endOf(kept) ?? [this.place.track, this.place.index, this.now];
     let steps = kept;
     const tasks = [...this.tasks.values()].filter((one) => one.phase !== "LOADED" || !kept.some((step) => step.call?.task === one.call.task));

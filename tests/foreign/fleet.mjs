@@ -41,6 +41,12 @@ export class Fleet {
     return us <= this.now;
   }
 
+  /** Be woken then. */
+  at(us) {
+    this.isDue(us);
+    return us;
+  }
+
   say(name, signals) {
     this.words.push([name, signals]);
     if (name === "ItineraryHead" || name === "CarAt") this.beatSoon();
@@ -93,7 +99,7 @@ export class Fleet {
     if (this.offset === undefined) return undefined;
     this.now = this.local + this.offset;
     const peer = this.peers.get(word.sender);
-    if (peer) this.#isHeard(peer);
+    if (peer && word.name !== "BusTime") this.#isHeard(peer);
     if (isStop || word.name === "Go") return this.#onStop(word);
     if (peer?.beat && word.name !== "Heartbeat" && this.isStranger(peer.beat)) return undefined;
     return singles(word).forEach((one) => this.hear(one, peer));

@@ -41,7 +41,8 @@ export class Robot extends Calls {
   }
 
   get isRunning() {
-    return this.orderUs !== undefined || this.drive?.mode !== "STANDING";
+    const isOrdered = this.orderUs !== undefined && Math.abs(this.driveOrder.target_mm - this.drive.position_mm) > 5;
+    return isOrdered || this.drive.mode !== "STANDING";
   }
 
   onDevice(word) {
@@ -100,6 +101,14 @@ export class Robot extends Calls {
     return this.steps.slice(0, count);
   }
 
+  /** A run that may end sooner ends where its order of now does. */
+  cut([step, ...more]) {
+    const to = step?.action === "TRAVEL" && !this.site.liftOf(this.place.key) && Math.round(this.driveOrder.target_mm / this.site.pitch) + 1;
+    if (!to || to === step.to || step.from === step.to) return step ? [step, ...more] : [];
+    this.begun = { ...step, to, end: Math.max(this.now, step.begin + this.site.run(Math.abs(to - step.from) * this.site.pitch)) };
+    return [this.begun];
+  }
+
   #work() {
     for (let n = 0; n < 40; n++) {
       const [step] = this.steps;
@@ -110,9 +119,11 @@ export class Robot extends Calls {
       }
       if (this.begun !== step) this.#beginStep(step);
       const isOver = step.action === "TRAVEL" ? this.#travel(step) : step.action === "RIDE" ? this.#ride(step) : this.#handle(step);
+      if (this.steps[0] !== step) continue;
       if (!isOver) {
-        if (this.isDue(step.end + 2 * S)) this.#late(step, this.now + 2 * S - step.end);
-        return undefined;
+        const by = this.#over(step) - step.end;
+        if (by > 2 * S) this.#late(step, by);
+        return this.isDue(this.now + Math.max(100 * MS, 2 * S - by));
       }
       this.steps.shift();
       const by = this.steps.length ? this.now - this.steps[0].begin : 0;
@@ -130,6 +141,17 @@ export class Robot extends Calls {
     const which = step.call.task;
     if (this.hand?.which !== which || this.hand.place !== step.place) this.hand = { which, place: step.place, takes: step.takes, actions: [...ACTIONS[step.takes]] };
     if (step.takes) this.report(which, "STARTED", step.place);
+  }
+
+  /** When a step that is in hand will be over, as far as can be seen. */
+  #over({ action, to, place, end }) {
+    if (action === "WORK") return this.hand.actions.length === 3 ? this.now + this.site.handling(place) : Math.max(end, this.now);
+    if (action !== "TRAVEL") return Math.max(end, this.now);
+    const { speed_mm_s: v, acceleration_mm_s2: a } = this.site.carrier;
+    const [mm, speed] = [Math.abs((to - 1) * this.site.pitch - this.drive.position_mm), Math.abs(this.drive.speed_mm_s)];
+    const top = Math.min(v, Math.sqrt(a * mm + (speed * speed) / 2)) || 1;
+    const ramps = (2 * top * top - speed * speed) / (2 * a);
+    return this.now + Math.ceil(1e6 * ((2 * top - speed) / a + Math.max(0, mm - ramps) / top));
   }
 
   /** P9: it lasts longer, and what follows comes later. */
@@ -196,7 +218,7 @@ export class Robot extends Calls {
     let reach = 0;
     while (reach + 1 < ahead.length && this.tokens.holds(ahead[reach + 1])) reach += 1;
     if (platform !== undefined && !this.#mayCross(platform)) reach = platform === ahead[0] ? 0 : Math.min(reach, ahead.length - 2);
-    if (isHome) this.#driveTo((index + reach * way - 1) * pitch);
+    if (isHome && (reach || this.isRunning)) this.#driveTo((index + reach * way - 1) * pitch);
     else this.orderUs = undefined;
     const needed = [...this.#body(), ...ahead];
     this.#giveBack([...needed, ...needed.filter((key) => this.site.liftOf(key)).map(gateOf)]);
@@ -254,9 +276,9 @@ export class Robot extends Calls {
     const keys = [stationKey(place), carKey(call.car)];
     this.#stand();
     for (const key of keys) this.tokens.want(key);
-    if (!keys.every((key) => this.tokens.holds(key))) return false;
     const isFull = [...this.cars].some(([car, one]) => one.station === place && car !== call.car);
     if (!takes && isFull && this.hand.actions.length === 3) return this.#leaveElsewhere(step);
+    if (!keys.every((key) => this.tokens.holds(key))) return false;
     const { action, sequence } = this.shuttleOrder;
     if (action && (this.shuttle.sequence !== sequence || this.shuttle.mode !== AFTER[action])) return false;
     if (this.hand.actions.length) {

@@ -64,17 +64,22 @@ export class Tokens {
     const pause = (times) => (times <= 3 ? robot.site.us.token_repeat : Math.min(25 * robot.site.us.token_repeat, robot.site.us.token_repeat << Math.min(times - 3, 10)));
     for (const [key, one] of this.wanted) {
       if (!robot.isDue(one.due) || (one.times > 3 && !robot.isDue(this.paceUs))) continue;
-      Object.assign(one, { times: one.times + 1, due: robot.now + pause(one.times + 1) });
+      Object.assign(one, { times: one.times + 1, due: robot.at(robot.now + pause(one.times + 1)) });
       if (one.times > 3) this.paceUs = robot.now + 100_000;
       const claim = isSegment(key) ? robot.claim(key) : { itinerary_version: robot.version, predecessor: 0 };
       robot.say("TokenRequest", { ...of(key), version_seen: Math.max(this.version(key), this.belief(key)[0]) & LOW, ...claim });
     }
     for (const [key, one] of this.leaving) {
       if (!robot.isDue(one.due)) continue;
-      Object.assign(one, { times: one.times + 1, due: robot.now + pause(one.times + 1) });
-      if (this.carAt.has(key)) robot.say("CarAt", this.carAt.get(key));
-      robot.say("TokenGrant", { ...of(key), version: one.version, holder: one.to });
+      Object.assign(one, { times: one.times + 1, due: robot.at(robot.now + pause(one.times + 1)) });
+      this.#grant(key, one);
     }
+  }
+
+  #grant(key, one) {
+    one.said = this.robot.now;
+    if (this.carAt.has(key)) this.robot.say("CarAt", this.carAt.get(key));
+    this.robot.say("TokenGrant", { ...of(key), version: one.version, holder: one.to });
   }
 
   /** K3, K4: several at once, so that what goes together has one version. */
@@ -86,7 +91,7 @@ export class Tokens {
       this.seen.set(key, version);
       this.given.set(key, [version, to]);
       this.believed.set(key, [version, to]);
-      this.leaving.set(key, { version, to, times: 1, due });
+      this.leaving.set(key, { version, to, times: 1, due, said: this.robot.now });
     }
     for (const key of keys) this.robot.say("TokenGrant", { ...of(key), version, holder: to });
     this.robot.save();
@@ -188,7 +193,7 @@ export class Tokens {
   /** K11, K12: what is not needed goes back by itself, so whatever is still here is needed. */
   #requested(key, { sender }) {
     const leaving = this.leaving.get(key);
-    if (leaving?.to === sender && leaving.due < this.robot.now + this.robot.site.us.token_repeat - 20_000) leaving.due = 0;
+    if (leaving?.to === sender && this.robot.now > leaving.said + 20_000) this.#grant(key, leaving);
     if (!this.holds(key) || !this.robot.mayGive) return;
     const signals = { version: this.version(key) & LOW, requester: sender };
     this.robot.say("TokenRefusal", { ...of(key), ...signals, reason: "TOKEN_NOT_GRANTABLE_YET" });
