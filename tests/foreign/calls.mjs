@@ -211,7 +211,7 @@ export class Calls extends Fleet {
     const { sender: initiator, call: number } = head;
     const deadline = this.near(terms.deadline_ms);
     const known = ["PARK", "RETRIEVE"].includes(head.operation) && head.criterion === "FINISH_TIME" && !head.depth;
-    const [window, guard] = [this.site.us.call_window, this.site.us.deadline_guard];
+    const { call_window: window, deadline_guard: guard } = this.site.us;
     for (const [other, one] of this.calls) {
       if (one.initiator !== initiator || one.task !== task(head)) continue;
       if (deadline < one.deadline && !newer(number, one.number, 16)) return;
@@ -220,7 +220,8 @@ export class Calls extends Fleet {
     this.forfeits.delete(task(head));
     const inTime = this.now < deadline - 2 * guard && deadline <= this.now + 60 * window;
     if (!known || !inTime || !["ANY", "ROBOT"].includes(head.kind)) return;
-    const ready = parent?.ready_ms ? deadline + parent.ready_ms * MS : 0;
+    const soonest = this.site.bays.has(terms.from_station) ? deadline - window + 9_500 * MS + this.site.us.door : 0;
+    const ready = parent?.ready_ms ? deadline + parent.ready_ms * MS : soonest;
     const car = reference(load.car_origin, load.car_number);
     const ends = { source: terms.from_station, to: load.to_station };
     const call = { key, initiator, number, task: task(head), deadline, deadline_ms: terms.deadline_ms, ...ends, ready, car, wheelbase: load.wheelbase_mm, heard: this.now };

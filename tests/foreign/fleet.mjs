@@ -1,7 +1,7 @@
 // What a machine is among the others: time, presence, holds, questions and answers (chapters 2, 3, 12, 13, 14).
 import { crc32 } from "node:zlib";
 import { OUTSIDE, Site } from "./site.mjs";
-import { Tokens } from "./tokens.mjs";
+import { Tokens, carKey } from "./tokens.mjs";
 import { CONTRACT, crc16, decode, encode, joined, singles } from "./words.mjs";
 
 const [S, MS] = [1_000_000, 1_000];
@@ -62,7 +62,7 @@ export class Fleet {
 
   journal() {
     const { boot, epoch, person, frozen } = this;
-    const cars = [...this.cars].filter(([, one]) => one.by === this.node);
+    const cars = [...this.cars].filter(([car, one]) => one.by === this.node || this.tokens.held.has(carKey(car)));
     return { boot, epoch, person, frozen: frozen?.isRead ? frozen : undefined, cars, ...this.tokens.journal() };
   }
 
@@ -286,7 +286,8 @@ export class Fleet {
   onHeartbeat(word, peer) {
     const again = peer.boot !== undefined && (peer.boot !== word.boot || (word.state === "STARTING" && peer.beat.state !== "STARTING"));
     if (again) {
-      Object.assign(peer, { plan: undefined, open: undefined });
+      Object.assign(peer, { plan: undefined, open: undefined, isStarted: true });
+      this.tokens.startsAnew(peer.node);
       this.ask(peer.node, peer.boot, this.now);
     }
     if (word.state !== "OBSTACLE" && word.state !== "STOPPED") peer.halted = false;
@@ -308,7 +309,6 @@ export class Fleet {
       if (boot_before > this.boot && !this.isAgain && this.now < this.started + 8 * S) this.isOutdated();
       this.askers.add(sender);
       if (whom === 0 && peer?.known && !(this.now < peer.asked + 250 * MS)) this.ask(sender, peer.known, this.now);
-      if (whom === 0 && peer) peer.isStarted = true;
     }
   }
 
@@ -345,7 +345,7 @@ export class Fleet {
 
   // --- rights made anew
 
-  onRegeneration({ regeneration_phase: phase, epoch, lost, tokens, digest }) {
+  onRegeneration({ regeneration_phase: phase, epoch, lost, absent, tokens, digest }) {
     const answer = (state, reason = "NONE", of = this.frozen?.list ?? []) => {
       const rows = of.map(([key, version, holder]) => [key >> 24, key & 0xffffff, version, holder]).sort((a, b) => a[0] - b[0] || a[1] - b[1]);
       const bytes = Buffer.alloc(16 * rows.length);
@@ -356,14 +356,15 @@ export class Fleet {
     };
     if (phase === "FREEZE") {
       if (epoch !== next(this.epoch)) return answer("REFUSED", "OTHER_EPOCH", []);
-      if (lost === this.node) return answer("REFUSED", "NOT_AUTHORISED", []);
+      const isHelpless = /JOURNAL/.test(this.person);
+      if (absent === this.node || (lost === this.node && !isHelpless)) return answer("REFUSED", "NOT_AUTHORISED", []);
       if (!this.frozen) this.frozen = { epoch, lost, list: [], told: -Infinity };
       this.frozen.said = this.now;
       answer("FREEZE", "NONE", []);
       if (this.now >= this.frozen.told + 4 * S) {
         this.frozen.told = this.now;
         this.tokens.state();
-        for (const [car, one] of this.cars) if (one.by === lost) this.sayCar(car, one);
+        for (const [car, one] of this.cars) if (one.by === lost && one.station !== OUTSIDE) this.sayCar(car, one);
         this.tokens.seenOf(() => true);
       }
     } else if (this.frozen?.epoch === epoch && phase === "READ_BACK") {
@@ -372,7 +373,7 @@ export class Fleet {
       this.save();
     } else if (this.frozen?.epoch === epoch && phase === "COMMIT" && this.frozen.isRead) {
       const { list } = this.frozen;
-      Object.assign(this, { epoch, frozen: undefined, beatAt: this.now, person: this.person });
+      Object.assign(this, { epoch, frozen: undefined, beatAt: this.now, person: undefined });
       this.tokens.assign(list);
       answer("COMMIT", "NONE", list);
     } else if (phase === "COMMIT" && epoch === this.epoch) answer("COMMIT", "NONE", []);

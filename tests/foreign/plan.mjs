@@ -155,11 +155,10 @@ export class Planner {
 
 /** B3: the least end of a task, of a robot before the car when the call ends, all ways free. */
 export function floorOf(site, call) {
-  const opened = call.deadline - site.us.call_window + 9_500_000 + site.us.door;
   const free = new Planner(site, new Map(), []);
   free.refuges = [...site.length].flatMap(([track, length]) => Array.from({ length }, (_, n) => (track << 8) | (n + 1)));
   const before = [call.source >> 8, call.source & 0x7f, call.deadline];
-  return free.task({ ...call, ready: call.ready || opened }, before, site.places).over;
+  return free.task(call, before, site.places).over;
 }
 
 function hopUs(site, hop) {

@@ -30,7 +30,7 @@ export class Robot extends Calls {
 
   get state() {
     if (!this.version) return "STARTING";
-    if (this.isAway) return "OBSTACLE";
+    if (this.isAway || this.frozen) return "OBSTACLE";
     return this.steps.length ? "WORKING" : "IDLE";
   }
 
@@ -49,6 +49,7 @@ export class Robot extends Calls {
     if (word.name === "DriveState") {
       this.driveOrder ??= { sequence: word.sequence, target_mm: word.position_mm };
       this.drive = word;
+      this.driveUs = this.now;
       if (this.offset !== undefined && this.version) this.#tellPlace();
     } else if (word.name === "ShuttleState") {
       this.shuttleOrder ??= { sequence: word.sequence };
@@ -151,7 +152,7 @@ export class Robot extends Calls {
     const [mm, speed] = [Math.abs((to - 1) * this.site.pitch - this.drive.position_mm), Math.abs(this.drive.speed_mm_s)];
     const top = Math.min(v, Math.sqrt(a * mm + (speed * speed) / 2)) || 1;
     const ramps = (2 * top * top - speed * speed) / (2 * a);
-    return this.now + Math.ceil(1e6 * ((2 * top - speed) / a + Math.max(0, mm - ramps) / top));
+    return Math.max(this.now, (speed ? this.driveUs : this.now) + Math.ceil(1e6 * ((2 * top - speed) / a + Math.max(0, mm - ramps) / top)));
   }
 
   /** P9: it lasts longer, and what follows comes later. */

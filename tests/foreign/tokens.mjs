@@ -19,6 +19,7 @@ export class Tokens {
     this.disputed = new Map(); // key: the grant that waits for a chain
     this.unproved = new Map(); // key: [giver, version, holder], given away by word and not confirmed
     this.stated = new Map(); // node: key: version, what it said itself that it holds
+    this.before = new Map(); // the same, in its life before
     this.asked = new Set(); // whom I asked for all
     this.carAt = new Map(); // C3: what goes before each repeat of a car's grant
     this.paceUs = 0;
@@ -69,7 +70,7 @@ export class Tokens {
       const claim = isSegment(key) ? robot.claim(key) : { itinerary_version: robot.version, predecessor: 0 };
       robot.say("TokenRequest", { ...of(key), version_seen: Math.max(this.version(key), this.belief(key)[0]) & LOW, ...claim });
     }
-    for (const [key, one] of this.leaving) {
+    for (const [key, one] of robot.synced ? this.leaving : []) {
       if (!robot.isDue(one.due)) continue;
       Object.assign(one, { times: one.times + 1, due: robot.at(robot.now + pause(one.times + 1)) });
       this.#grant(key, one);
@@ -119,10 +120,10 @@ export class Tokens {
     const key = (KINDS.indexOf(word.token_kind) << 24) | word.token;
     const { robot } = this;
     const { sender, version } = word;
+    if (this.robot.isComparing(sender) && this.holds(key) && /Held|Given|Seen/.test(word.name) && version > this.version(key)) this.robot.isOutdated();
     if (word.name === "TokenGrant" && word.holder === robot.node) this.#offered(key, word);
     else if (word.name === "TokenGrant" || word.name === "TokenGiven") this.#passed(key, sender, version, word.holder);
     else if (word.name === "TokenHeld") this.#stated(key, sender, version);
-    else if (word.name === "TokenSeen") this.#reminded(key, sender, version);
     else if (word.name === "TokenDispute" && word.believed === robot.node) this.#answer(key);
     else if (word.name === "TokenRequest") this.#requested(key, word);
     else if (word.name === "TokenRefusal" && word.requester === robot.node && this.wanted.has(key)) this.#refused(key, word);
@@ -161,11 +162,6 @@ export class Tokens {
     this.stated.get(holder).set(key, version);
     this.unproved.delete(key);
     return this.#verified(key, version, holder);
-  }
-
-  /** R7. */
-  #reminded(key, sender, version) {
-    if (this.robot.isComparing(sender) && this.holds(key) && version > this.version(key)) this.robot.isOutdated();
   }
 
   #claimed(key) {
@@ -217,9 +213,14 @@ export class Tokens {
   }
 
   /** R4: to who was restarted, and said itself what it held and gave. */
+  startsAnew(node) {
+    this.before.set(node, this.stated.get(node) ?? new Map());
+    this.stated.delete(node);
+  }
+
   remind(node) {
-    for (const [key, version] of this.stated.get(node) ?? []) {
-      if (this.belief(key)[1] === node) this.robot.say("TokenSeen", { ...of(key), version, holder: node });
+    for (const [key, version] of this.before.get(node) ?? []) {
+      if (this.belief(key)[1] === node && !this.stated.get(node)?.has(key)) this.robot.say("TokenSeen", { ...of(key), version, holder: node });
     }
     for (const [key, [giver, version, holder]] of this.unproved) {
       if (giver === node) this.robot.say("TokenSeen", { ...of(key), version, holder });
