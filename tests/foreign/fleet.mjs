@@ -246,7 +246,7 @@ export class Fleet {
   }
 
   #comeBack() {
-    Object.assign(this, { ownUntil: 0, person: undefined, boot: next(this.boot), isAgain: true, listenUntil: this.now + 2 * S });
+    Object.assign(this, { ownUntil: 0, person: undefined, boot: next(this.boot), isAgain: true, version: 0, listenUntil: this.now + 2 * S });
     this.begin();
   }
 

@@ -152,7 +152,7 @@ export class Robot extends Calls {
     const [mm, speed] = [Math.abs((to - 1) * this.site.pitch - this.drive.position_mm), Math.abs(this.drive.speed_mm_s)];
     const top = Math.min(v, Math.sqrt(a * mm + (speed * speed) / 2)) || 1;
     const ramps = (2 * top * top - speed * speed) / (2 * a);
-    return Math.max(this.now, (speed ? this.driveUs : this.now) + Math.ceil(1e6 * ((2 * top - speed) / a + Math.max(0, mm - ramps) / top)));
+    return Math.max(this.now, (this.drive.mode === "STANDING" ? this.now : this.driveUs) + Math.ceil(1e6 * ((2 * top - speed) / a + Math.max(0, mm - ramps) / top)));
   }
 
   /** P9: it lasts longer, and what follows comes later. */
