@@ -55,13 +55,13 @@ export class Calls extends Fleet {
     peer.open = undefined;
     if (head.grade === "TENTATIVE" || (peer.plan && !newer(head.version, peer.plan.version, 8))) return;
     const award = this.near(head.stamp_award_ms);
-    let begin = award;
+    let [begin, here] = [award, peer.place?.track];
     const steps = legs.map(({ action, track, side, from_index: from, to_index: to, end_ms }) => {
       const end = award + end_ms * MS;
-      const mouth = action === "TRAVEL" && from === to ? this.#mouthOf(track, peer) : undefined;
+      const mouth = action === "TRAVEL" && from === to ? this.#beyond(track, to, here) : undefined;
       const place = (track << 8) | (Number(side === "FAR") << 7) | to;
       const step = { action, track, from, to, begin, end, mouth, place };
-      begin = end;
+      [begin, here] = [end, track];
       return step;
     });
     const stamp = [head.stamp_award_ms, head.stamp_initiator, head.stamp_call];
@@ -71,9 +71,10 @@ export class Calls extends Fleet {
   }
 
   /** The other side of a linked end that a leg goes over. */
-  #mouthOf(track) {
-    const spur = this.site.spurs.find((one) => one.track === track);
-    return spur ? spur.mouth : undefined;
+  #beyond(track, index, before) {
+    const isHere = (one) => one.track === before && one.mouth === ((track << 8) | index);
+    const spur = this.site.spurs.find((one) => one.track === track) ?? this.site.spurs.find(isHere);
+    return spur && (spur.track === track ? spur.mouth : (spur.track << 8) | 1);
   }
 
   #onPlace({ itinerary_version, leg, track, index, offset_mm, speed_mm_s, sender }, peer) {

@@ -18,7 +18,7 @@ export class Robot extends Calls {
     const [held] = [...this.tokens.held.keys()].filter((key) => key < 128 << 8);
     this.track = journal.track ?? (held ?? home) >> 8;
     const { speed_mm_s: v, acceleration_mm_s2: a } = this.site.carrier;
-    this.soon = Math.ceil((Math.floor((v * v) / (2 * a)) + 3 * v) / this.site.pitch) + 4;
+    this.soon = Math.ceil((Math.floor((v * v) / (2 * a)) + 3 * v) / this.site.pitch) + 1;
     this.said = { index: 0, isMoving: false, us: 0 };
     this.retryUs = 0;
     this.tell("StateRequest", {});
@@ -37,7 +37,9 @@ export class Robot extends Calls {
   get place() {
     if (!this.drive) return undefined;
     const index = Math.min(this.site.length.get(this.track) + 1, Math.max(0, Math.round(this.drive.position_mm / this.site.pitch) + 1));
-    return { track: this.track, index, key: this.site.at(this.track, index) };
+    const key = this.site.at(this.track, index);
+    if (this.track >= 192 && index === 0) return { track: key >> 8, index: key & 0xff, key };
+    return { track: this.track, index, key };
   }
 
   get isRunning() {
@@ -47,7 +49,11 @@ export class Robot extends Calls {
 
   onDevice(word) {
     if (word.name === "DriveState") {
-      this.driveOrder ??= { sequence: word.sequence, target_mm: word.position_mm };
+      this.driveOrder ??= { sequence: word.sequence, target_mm: word.position_mm, across: word.across };
+      const [across, spur] = [this.track >= 192, this.steps[0]?.track];
+      if (this.drive && word.across && !across) this.track = spur;
+      if (!word.across && across) this.track = this.site.spurs[this.track - 192].mouth >> 8;
+      if (across !== this.track >= 192) this.save();
       this.drive = word;
       this.driveUs = this.now;
       if (this.offset !== undefined && this.version) this.#tellPlace();
@@ -173,7 +179,8 @@ export class Robot extends Calls {
   #body() {
     const half = this.site.carrier.length_mm / 2;
     const [low, high] = [-half, half].map((one) => Math.round((this.drive.position_mm + one) / this.site.pitch) + 1);
-    return Array.from({ length: high - low + 1 }, (_, n) => this.#segment(low + n));
+    const least = this.track >= 192 ? Math.max(0, low) : low;
+    return Array.from({ length: high - least + 1 }, (_, n) => this.#segment(least + n));
   }
 
   #stand(needed = []) {
@@ -197,21 +204,33 @@ export class Robot extends Calls {
     return isSaid && stop.isStill && stop.index === lift.floors.indexOf(this.track) + 1;
   }
 
+  /** What lies ahead of a leg, from where it is: { key, mm, across }. */
+  #line({ track, from, to, mouth }) {
+    const { pitch } = this.site;
+    const { index, key } = this.place;
+    const across = Number(track >= 192);
+    if (mouth !== undefined && across !== this.drive.across) {
+      const end = { key: this.site.at(track, to), mm: (to - 1) * pitch, across };
+      const isOut = !across && key !== end.key;
+      return [{ key }, isOut ? { key: end.key, mm: -pitch, across: 1 } : end];
+    }
+    const way = to >= index ? 1 : -1;
+    const at = (n) => ({ key: this.site.at(track, index + n * way), mm: (index + n * way - 1) * pitch, across });
+    return Array.from({ length: Math.abs(to - index) + 1 }, (_, n) => at(n));
+  }
+
   /** K2, K14, K15: as far as an unbroken line of held segments leads. */
   #travel(step) {
-    const { pitch } = this.site;
-    const goal = (step.to - 1) * pitch;
-    const isThere = this.drive.mode === "STANDING" && Math.abs(this.drive.position_mm - goal) <= 5;
-    if (isThere && this.drive.sequence === this.driveOrder.sequence) {
+    const [goal, across] = [(step.to - 1) * this.site.pitch, Number(step.track >= 192)];
+    const isStill = this.drive.mode === "STANDING" && this.drive.sequence === this.driveOrder.sequence;
+    if (isStill && this.drive.across === across && Math.abs(this.drive.position_mm - goal) <= 5) {
       this.#stand();
       return true;
     }
-    const { index } = this.place;
-    const way = step.to >= index ? 1 : -1;
-    const ahead = Array.from({ length: Math.abs(step.to - index) + 1 }, (_, n) => this.#segment(index + n * way));
-    const soon = ahead.slice(0, this.soon);
-    const front = soon.findIndex((key, n) => n > 0 && this.site.fronts.has(key));
-    const wanted = [...this.#body(), ...(front < 0 ? soon : soon.slice(0, front + 1))];
+    const line = this.#line(step);
+    const ahead = line.map(({ key }) => key);
+    const front = ahead.findIndex((key, n) => n >= this.soon && this.site.fronts.has(key));
+    const wanted = [...this.#body(), ...ahead.slice(0, front < 0 ? this.soon + 4 : Math.min(this.soon + 4, front + 1))];
     const platform = ahead.find((key) => this.site.liftOf(key));
     if (platform !== undefined && wanted.includes(platform)) wanted.push(gateOf(platform));
     for (const key of new Set(wanted)) this.tokens.want(key);
@@ -219,20 +238,20 @@ export class Robot extends Calls {
     let reach = 0;
     while (reach + 1 < ahead.length && this.tokens.holds(ahead[reach + 1])) reach += 1;
     if (platform !== undefined && !this.#mayCross(platform)) reach = platform === ahead[0] ? 0 : Math.min(reach, ahead.length - 2);
-    if (isHome && (reach || this.isRunning)) this.#driveTo((index + reach * way - 1) * pitch);
+    if (isHome && line[reach].mm !== undefined && (reach || this.isRunning)) this.#driveTo(line[reach]);
     else this.orderUs = undefined;
     const needed = [...this.#body(), ...ahead];
     this.#giveBack([...needed, ...needed.filter((key) => this.site.liftOf(key)).map(gateOf)]);
     return false;
   }
 
-  #driveTo(target_mm) {
-    const isNew = target_mm !== this.driveOrder.target_mm;
-    if (isNew) this.driveOrder = { sequence: (this.driveOrder.sequence % 255) + 1, target_mm };
+  #driveTo({ mm: target_mm, across }) {
+    const isNew = target_mm !== this.driveOrder.target_mm || across !== this.driveOrder.across;
+    if (isNew) this.driveOrder = { sequence: (this.driveOrder.sequence % 255) + 1, target_mm, across };
     if (!isNew && this.orderUs !== undefined && !this.isDue(this.orderUs)) return;
     this.orderUs = this.now + this.site.us.drive_refresh;
     this.isDue(this.orderUs);
-    this.tell("DriveOrder", { ...this.driveOrder, speed_limit_mm_s: this.site.carrier.speed_mm_s, across: 0 });
+    this.tell("DriveOrder", { ...this.driveOrder, speed_limit_mm_s: this.site.carrier.speed_mm_s });
   }
 
   /** K14: what is not needed goes back to its steward, in lines of one version. */
@@ -341,7 +360,9 @@ export class Robot extends Calls {
 
   sayPlace() {
     const { track, index } = this.place;
-    const where = { track, index, offset_mm: this.drive.position_mm - (index - 1) * this.site.pitch, speed_mm_s: this.drive.speed_mm_s };
+    const isMouth = this.track >= 192 && track < 192;
+    const offset_mm = isMouth ? 0 : this.drive.position_mm - (index - 1) * this.site.pitch;
+    const where = { track, index, offset_mm, speed_mm_s: this.drive.speed_mm_s };
     this.say("Progress", { itinerary_version: this.version, leg: this.version ? this.leg : 0, ...where });
     this.said = { index, isMoving: this.drive.mode !== "STANDING", us: this.now };
   }

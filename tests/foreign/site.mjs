@@ -57,6 +57,7 @@ export class Site {
   /** The segment at an index of a track: beyond an end of an alley the platform of the lift there. */
   at(track, index) {
     const end = index === 0 ? "left" : index === this.length.get(track) + 1 ? "right" : "";
+    if (track >= 192 && index === 0) return this.spurs[track - 192].mouth;
     const lift = end && this.lifts.find((one) => one.end === end && one.floors.includes(track));
     return lift ? lift.track << 8 : (track << 8) | index;
   }
