@@ -412,7 +412,7 @@ export class Calls extends Fleet {
     if (!this.steps.length) this.stamp = [Math.ceil(this.now / MS) % 2 ** 32, this.node, 0];
     const [award, initiator, call] = this.stamp;
     const legs = legsOf(steps, this.near(award));
-    this.told = legs.length;
+    this.legs = legs;
     const head = { version: this.version, grade: "FIRM", legs: legs.length, stamp_award_ms: award, stamp_initiator: initiator, stamp_call: call };
     this.plan = [["ItineraryHead", head]];
     legs.forEach((one, leg) => {

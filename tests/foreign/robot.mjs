@@ -355,7 +355,8 @@ export class Robot extends Calls {
   // --- where it is
 
   get leg() {
-    return Math.max(0, this.told - Math.max(1, this.steps.length));
+    const n = this.legs.indexOf(this.steps[0] ?? this.legs.at(-1));
+    return n > 0 && this.begun !== this.steps[0] && this.legs[n - 1].action === "STAND" ? n - 1 : Math.max(0, n);
   }
 
   sayPlace() {
