@@ -36,10 +36,16 @@ export class Robot extends Calls {
 
   get place() {
     if (!this.drive) return undefined;
-    const index = Math.min(this.site.length.get(this.track) + 1, Math.max(0, Math.round(this.drive.position_mm / this.site.pitch) + 1));
+    const index = this.axisIndex;
     const key = this.site.at(this.track, index);
     if (this.track >= 192 && index === 0) return { track: key >> 8, index: key & 0xff, key };
     return { track: this.track, index, key };
+  }
+
+  /** On the axis that the drive speaks of: 0 is a platform, or the mouth of a spur. */
+  get axisIndex() {
+    const index = Math.round(this.drive.position_mm / this.site.pitch) + 1;
+    return Math.min(this.site.length.get(this.track) + 1, Math.max(0, index));
   }
 
   get isRunning() {
@@ -151,9 +157,10 @@ export class Robot extends Calls {
   }
 
   /** When a step that is in hand will be over, as far as can be seen. */
-  #over({ action, to, place, end }) {
+  #over({ action, from, to, place, begin, end }) {
     if (action === "WORK") return this.hand.actions.length === 3 ? this.now + this.site.handling(place) : Math.max(end, this.now);
-    if (action !== "TRAVEL") return Math.max(end, this.now);
+    if (action === "TRAVEL" && from === to && !this.isRunning) return this.now + end - begin;
+    if (action !== "TRAVEL" || from === to) return Math.max(end, this.now);
     const { speed_mm_s: v, acceleration_mm_s2: a } = this.site.carrier;
     const [mm, speed] = [Math.abs((to - 1) * this.site.pitch - this.drive.position_mm), Math.abs(this.drive.speed_mm_s)];
     const top = Math.min(v, Math.sqrt(a * mm + (speed * speed) / 2)) || 1;
@@ -207,7 +214,8 @@ export class Robot extends Calls {
   /** What lies ahead of a leg, from where it is: { key, mm, across }. */
   #line({ track, from, to, mouth }) {
     const { pitch } = this.site;
-    const { index, key } = this.place;
+    const { key } = this.place;
+    const index = track === this.track ? this.axisIndex : this.place.index;
     const across = Number(track >= 192);
     if (mouth !== undefined && across !== this.drive.across) {
       const end = { key: this.site.at(track, to), mm: (to - 1) * pitch, across };
