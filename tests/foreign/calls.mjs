@@ -12,7 +12,7 @@ const task = (word) => reference(word.task_origin, word.task_number);
 export class Calls extends Fleet {
   constructor(setup, journal) {
     super(setup, journal);
-    Object.assign(this, { version: 0, stamp: [0, this.node, 0], steps: [], calls: new Map(), leftOut: new Map(), sets: new Map(), order: new Map() });
+    Object.assign(this, { version: 0, stamp: [0, this.node, 0], steps: [], calls: new Map(), leftOut: new Map(), sets: new Map(), order: new Map(), needed: [] });
     this.tasks = new Map(journal.tasks); // task: { call, phase }, what was won
     this.done = new Map(journal.done); // task: where the car was left
     this.forfeits = new Map(); // task: [reason, times, due]
@@ -94,7 +94,7 @@ export class Calls extends Fleet {
   hasLeft(peer) {
     const here = peer.plan.windows.some((one) => one.key === peer.place?.key && one.b > this.now - 20 * S);
     const since = Math.max(peer.movedUs ?? 0, peer.plan.windows.filter((one) => one.key === peer.place?.key).at(-1)?.b ?? 0);
-    return Boolean(peer.place) && !here && this.now > Math.max(since + 20 * S, (peer.waitsUs ?? -Infinity) + 600 * S);
+    return Boolean(peer.place) && !here && this.now > since + (peer.waitsUs > since ? 600 : 20) * S;
   }
 
   #onBlocked({ name, sender, track, index }) {
@@ -132,18 +132,44 @@ export class Calls extends Fleet {
     return new Planner(this.site, busy, ends);
   }
 
-  /** K12: who passes right before me, by the plans that I know. */
-  claim(key) {
-    const mine = this.windows.find((one) => one.key === key);
-    const before = this.robots
-      .filter((one) => one.plan && !this.isObstacle(one))
-      .flatMap(({ node, plan }) => plan.windows.filter((one) => mine && one.key === key && this.#isBefore(node, one, mine)).map(({ b }) => [b, node]));
-    return { itinerary_version: this.version, predecessor: before.sort((a, b) => b[0] - a[0])[0]?.[1] ?? 0 };
+  /** K12: who passes a segment right before a robot, by the plans that I know; me too. */
+  before(key, node) {
+    const windows = (one) => (one === this.node ? this.windows : (this.peers.get(one).plan?.windows ?? []));
+    const own = windows(node).find((one) => one.key === key);
+    const others = [this.node, ...this.robots.filter((one) => !this.isObstacle(one)).map((one) => one.node)].filter((one) => one !== node);
+    const found = others.flatMap((other) => windows(other).filter((one) => own && one.key === key && this.#isBefore(other, one, own, node)).map(({ a }) => [a, other]));
+    return found.sort((a, b) => b[0] - a[0])[0]?.[1] ?? 0;
   }
 
-  #isBefore(node, theirs, mine) {
+  /** K13 asks for all or none without a plan. */
+  claim(key) {
+    return this.all ? { itinerary_version: 0, predecessor: 0 } : { itinerary_version: this.version, predecessor: this.before(key, this.node) };
+  }
+
+  /** K12, K14: why a request is not served now; empty where it is. */
+  objection(key, node, { plan, predecessor }) {
+    const peer = this.peers.get(node);
+    const body = this.body();
+    if (key >= 1 << 24 || body.includes(key) || !peer || this.now - peer.heard > 1.25 * this.site.us.heartbeat) return "TOKEN_NOT_GRANTABLE_YET";
+    const needs = this.needed.includes(key) && (this.isRunning || this.before(key, node) === this.node);
+    if (needs) return "TOKEN_NOT_GRANTABLE_YET";
+    if (plan === 0) return "";
+    const sees = this.before(key, node);
+    const isOther = predecessor !== sees && predecessor !== this.node;
+    if (peer.plan && !newer(plan, peer.plan.version, 8) && !isOther) return sees && sees !== this.node ? "TOKEN_NOT_GRANTABLE_YET" : "";
+    for (const one of [node, predecessor]) {
+      const of = this.peers.get(one);
+      if (!of || this.now < (of.viewUs ?? -S) + S || this.site.kinds.get(one) !== "Robot") continue;
+      of.viewUs = this.now;
+      this.ask(one, 0, this.now);
+    }
+    return "MIRROR_BEHIND";
+  }
+
+  #isBefore(other, theirs, mine, node) {
     const overlap = theirs.a < mine.b - 10 * MS && mine.a < theirs.b - 10 * MS;
-    return overlap && this.order.has(`${node} ${mine.key}`) ? this.order.get(`${node} ${mine.key}`) : theirs.a < mine.a;
+    const known = this.order.get(`${other === this.node ? node : other} ${mine.key}`);
+    return overlap && known !== undefined ? known !== (other === this.node) : theirs.a < mine.a;
   }
 
   get windows() {
@@ -159,15 +185,19 @@ export class Calls extends Fleet {
   compare() {
     if (!this.version || !this.place) return;
     const mine = this.windows;
+    const order = new Map();
     this.meets = mine.find((one) => this.blocked.has(one.key)) && { node: 0 };
     for (const { node, plan } of this.robots.filter((one) => one.plan && !this.isObstacle(one))) {
       const pair = meeting(mine, plan.windows);
       if (pair && this.#yields(node, plan, ...pair)) this.meets = { node, stamp: plan.stamp };
       for (const one of mine) {
         const theirs = plan.windows.find((other) => other.key === one.key);
-        if (theirs && !(theirs.a < one.b - 10 * MS && one.a < theirs.b - 10 * MS)) this.order.set(`${node} ${one.key}`, theirs.a < one.a);
+        const [name, meet] = [`${node} ${one.key}`, theirs && theirs.a < one.b - 10 * MS && one.a < theirs.b - 10 * MS];
+        if (theirs && !meet) order.set(name, theirs.a < one.a);
+        else if (theirs && this.order.has(name)) order.set(name, this.order.get(name));
       }
     }
+    this.order = order;
   }
 
   #yields(node, plan, mine, theirs) {

@@ -77,6 +77,7 @@ export class Robot extends Calls {
     if (this.isAway || !this.synced) this.tokens.wanted.clear(), (this.orderUs = undefined);
     else if (this.version && !this.frozen) {
       if (this.meets && this.isDue(this.retryUs)) this.#giveWay();
+      this.#wakeAll();
       this.#work();
     }
     this.wakeFleet();
@@ -183,7 +184,7 @@ export class Robot extends Calls {
     return this.site.at(this.track, index);
   }
 
-  #body() {
+  body() {
     const half = this.site.carrier.length_mm / 2;
     const [low, high] = [-half, half].map((one) => Math.round((this.drive.position_mm + one) / this.site.pitch) + 1);
     const least = this.track >= 192 ? Math.max(0, low) : low;
@@ -192,7 +193,7 @@ export class Robot extends Calls {
 
   #stand(needed = []) {
     this.orderUs = undefined;
-    this.#giveBack([...this.#body(), ...needed]);
+    this.#giveBack([...this.body(), ...needed]);
   }
 
   /** L1, L4, L5: whether the sill of a lift may be crossed here. */
@@ -238,18 +239,18 @@ export class Robot extends Calls {
     const line = this.#line(step);
     const ahead = line.map(({ key }) => key);
     const front = ahead.findIndex((key, n) => n >= this.soon && this.site.fronts.has(key));
-    const wanted = [...this.#body(), ...ahead.slice(0, front < 0 ? this.soon + 4 : Math.min(this.soon + 4, front + 1))];
+    const wanted = this.all ?? [...this.body(), ...ahead.slice(0, front < 0 ? this.soon + 4 : Math.min(this.soon + 4, front + 1))];
     const platform = ahead.find((key) => this.site.liftOf(key));
     if (platform !== undefined && wanted.includes(platform)) wanted.push(gateOf(platform));
     for (const key of new Set(wanted)) this.tokens.want(key);
-    const isHome = this.shuttle.mode === "HOME" && this.#body().every((key) => this.tokens.holds(key));
+    const isHome = this.shuttle.mode === "HOME" && !this.all && this.body().every((key) => this.tokens.holds(key));
     let reach = 0;
     while (reach + 1 < ahead.length && this.tokens.holds(ahead[reach + 1])) reach += 1;
     if (platform !== undefined && !this.#mayCross(platform)) reach = platform === ahead[0] ? 0 : Math.min(reach, ahead.length - 2);
     if (isHome && line[reach].mm !== undefined && (reach || this.isRunning)) this.#driveTo(line[reach]);
     else this.orderUs = undefined;
-    const needed = [...this.#body(), ...ahead];
-    this.#giveBack([...needed, ...needed.filter((key) => this.site.liftOf(key)).map(gateOf)]);
+    const needed = [...this.body(), ...ahead, ...(this.all ?? [])];
+    this.#giveBack([...needed, ...needed.filter((key) => this.site.liftOf(key)).map(gateOf)], reach > 0);
     return false;
   }
 
@@ -262,18 +263,48 @@ export class Robot extends Calls {
     this.tell("DriveOrder", { ...this.driveOrder, speed_limit_mm_s: this.site.carrier.speed_mm_s });
   }
 
-  /** K14: what is not needed goes back to its steward, in lines of one version. */
-  #giveBack(needed) {
+  /** K14: what is not needed goes to whose turn it is, else to its steward, in lines of one version. */
+  #giveBack(needed, isSoon = false) {
+    this.needed = needed;
     const home = [...this.site.homes].find(([, node]) => node === this.node)[0];
     const held = [...this.tokens.held.keys()].filter((key) => key < 1 << 24);
     if (this.tokens.holds(home) && !held.includes(home)) held.push(home);
     const left = held.filter((key) => !needed.includes(key)).sort((a, b) => a - b);
-    if (left.length) this.sayPlace();
-    for (const track of new Set(left.map((key) => (key & 0xff) === GATE ? key : key >> 8))) {
-      const keys = left.filter((key) => ((key & 0xff) === GATE ? key : key >> 8) === track);
-      this.tokens.give(keys, this.site.stewards.get(keys[0] >> 8));
-    }
     for (const key of this.tokens.wanted.keys()) if (key < 1 << 24 && !needed.includes(key)) this.tokens.wanted.delete(key);
+    this.leftUs = left.length ? (this.leftUs ?? this.now) : undefined;
+    const isUrgent = left.some((key) => this.site.fronts.has(key) || this.site.liftOf(key) || this.tokens.nextOf(key));
+    if (!left.length || (isSoon && !isUrgent && left.length < 8 && !this.isDue(this.leftUs + 8 * S))) return;
+    this.sayPlace();
+    this.leftUs = undefined;
+    const lines = new Map();
+    for (const key of left) {
+      const to = this.tokens.nextOf(key) || this.site.stewards.get(key >> 8);
+      const line = `${to} ${(key & 0xff) === GATE ? key : key >> 8}`;
+      lines.set(line, [...(lines.get(line) ?? []), key]);
+    }
+    for (const [line, keys] of lines) this.tokens.give(keys, parseInt(line, 10));
+  }
+
+  /** K13: whether an order of passing has come about; all or none where none has for long. */
+  seesOrder(isSeen) {
+    if (isSeen && !this.all) this.noOrderUs = undefined;
+    else this.noOrderUs ??= this.now;
+  }
+
+  /** What is asked for all or none: all to the end of the plan, but for lifts. */
+  #wakeAll() {
+    if (this.all && this.all.every((key) => this.tokens.holds(key))) [this.all, this.noOrderUs] = [undefined, undefined];
+    if (this.noOrderUs === undefined || !this.isDue(this.noOrderUs + 5 * S)) return;
+    const isPart = this.all?.some((key) => this.tokens.holds(key) && !this.body().includes(key));
+    if (!this.all) {
+      this.all = [...new Set(this.windows.map(({ key }) => key))].filter((key) => !this.site.liftOf(key));
+      this.tokens.wanted.clear();
+      this.allUs = undefined;
+    } else if (isPart && this.isDue((this.allUs ??= this.now) + 2 * S)) {
+      [this.all, this.allUs, this.noOrderUs] = [undefined, undefined, this.now];
+      this.tokens.wanted.clear();
+      this.#giveBack(this.body());
+    }
   }
 
   /** L3: it rides while the gate is away, and is there when that comes back with the lift's word. */

@@ -22,6 +22,7 @@ export class Tokens {
     this.before = new Map(); // the same, in its life before
     this.asked = new Set(); // whom I asked for all
     this.carAt = new Map(); // C3: what goes before each repeat of a car's grant
+    this.requests = new Map(); // key: node: { us, plan, predecessor }
     this.paceUs = 0;
   }
 
@@ -93,6 +94,7 @@ export class Tokens {
       this.given.set(key, [version, to]);
       this.believed.set(key, [version, to]);
       this.leaving.set(key, { version, to, times: 1, due, said: this.robot.now });
+      this.requests.get(key)?.delete(to);
     }
     for (const key of keys) this.robot.say("TokenGrant", { ...of(key), version, holder: to });
     this.robot.save();
@@ -107,6 +109,7 @@ export class Tokens {
   }
 
   #hold(key, version) {
+    if (isSegment(key)) this.robot.seesOrder(true);
     this.held.set(key, version);
     this.seen.set(key, version);
     this.believed.set(key, [version, this.robot.node]);
@@ -186,13 +189,23 @@ export class Tokens {
     else if (this.given.has(key)) this.robot.say("TokenGiven", { ...of(key), version: this.given.get(key)[0], holder: this.given.get(key)[1] });
   }
 
-  /** K11, K12: what is not needed goes back by itself, so whatever is still here is needed. */
-  #requested(key, { sender }) {
+  /** K10, K11: every request is remembered, whoever holds the token. */
+  #requested(key, { sender, itinerary_version: plan, predecessor }) {
     const leaving = this.leaving.get(key);
     if (leaving?.to === sender && this.robot.now > leaving.said + 20_000) this.#grant(key, leaving);
+    if (!this.requests.has(key)) this.requests.set(key, new Map());
+    this.requests.get(key).set(sender, { us: this.robot.now, plan, predecessor });
     if (!this.holds(key) || !this.robot.mayGive) return;
-    const signals = { version: this.version(key) & LOW, requester: sender };
-    this.robot.say("TokenRefusal", { ...of(key), ...signals, reason: "TOKEN_NOT_GRANTABLE_YET" });
+    const reason = this.robot.objection(key, sender, this.requests.get(key).get(sender));
+    if (!reason) this.give([key], sender);
+    else this.robot.say("TokenRefusal", { ...of(key), version: this.version(key) & LOW, requester: sender, reason });
+  }
+
+  /** Whose turn it is by its request, the oldest first; 0 for nobody's. */
+  nextOf(key) {
+    const lapsed = this.robot.now - 62.5 * this.robot.site.us.token_repeat;
+    const open = [...(this.requests.get(key) ?? [])].filter(([, one]) => one.us > lapsed);
+    return open.find(([node, one]) => !this.robot.objection(key, node, one))?.[0] ?? 0;
   }
 
   #refused(key, { sender, reason }) {
@@ -200,6 +213,7 @@ export class Tokens {
     if (sender !== this.belief(key)[1]) return;
     const isSoon = reason === "MIRROR_BEHIND" || !isSegment(key);
     one.due = this.robot.now + this.robot.site.us.token_repeat * (isSoon ? 5 : 25);
+    if (isSegment(key)) this.robot.seesOrder(reason !== "MIRROR_BEHIND");
     if (isSegment(key) && !one.isTold) this.robot.waits(key, sender, reason);
     one.isTold = true;
   }
