@@ -161,7 +161,7 @@ export function floorOf(site, call) {
   return free.task(call, before, site.places).over;
 }
 
-function hopUs(site, hop) {
+export function hopUs(site, hop) {
   if (hop.action === "RIDE") return site.ride(hop.from, hop.to);
   return isLink(hop) ? site.run(site.pitch) + site.carrier.turn_ms * 1_000 : site.run(Math.abs(hop.to - hop.from) * site.pitch);
 }

@@ -2,6 +2,7 @@
 // One process: a line in is a time with a frame or a wake, the lines out are frames, what is to be kept, and the next wake.
 import { readSync, writeSync } from "node:fs";
 import { Calls } from "./calls.mjs";
+import { hopUs } from "./plan.mjs";
 import { ABOARD, ANY, GATE } from "./site.mjs";
 import { carKey, stationKey } from "./tokens.mjs";
 
@@ -73,7 +74,7 @@ export class Robot extends Calls {
 
   goOn() {
     this.wakeCalls();
-    if (!this.version && this.place && this.shuttle && (this.synced || !this.isAgain)) this.#start();
+    if (!this.version && !this.person && this.place && this.shuttle && (this.synced || !this.isAgain)) this.#start();
     if (this.isAway || !this.synced) this.tokens.wanted.clear(), (this.orderUs = undefined);
     else if (this.version && !this.frozen) {
       if (this.meets && this.isDue(this.retryUs)) this.#giveWay();
@@ -158,9 +159,10 @@ export class Robot extends Calls {
   }
 
   /** When a step that is in hand will be over, as far as can be seen. */
-  #over({ action, from, to, place, begin, end }) {
+  #over(step) {
+    const { action, from, to, place, end } = step;
     if (action === "WORK") return this.hand.actions.length === 3 ? this.now + this.site.handling(place) : Math.max(end, this.now);
-    if (action === "TRAVEL" && from === to && !this.isRunning) return this.now + end - begin;
+    if (action === "TRAVEL" && from === to && !this.isRunning) return this.now + hopUs(this.site, step);
     if (action !== "TRAVEL" || from === to) return Math.max(end, this.now);
     const { speed_mm_s: v, acceleration_mm_s2: a } = this.site.carrier;
     const [mm, speed] = [Math.abs((to - 1) * this.site.pitch - this.drive.position_mm), Math.abs(this.drive.speed_mm_s)];
@@ -239,7 +241,7 @@ export class Robot extends Calls {
     const line = this.#line(step);
     const ahead = line.map(({ key }) => key);
     const front = ahead.findIndex((key, n) => n >= this.soon && this.site.fronts.has(key));
-    const wanted = this.all ?? [...this.body(), ...ahead.slice(0, front < 0 ? this.soon + 4 : Math.min(this.soon + 4, front + 1))];
+    const wanted = this.pauseUs ? [] : this.all ?? [...this.body(), ...ahead.slice(0, front < 0 ? this.soon + 4 : Math.min(this.soon + 4, front + 1))];
     const platform = ahead.find((key) => this.site.liftOf(key));
     if (platform !== undefined && wanted.includes(platform)) wanted.push(gateOf(platform));
     for (const key of new Set(wanted)) this.tokens.want(key);
@@ -249,7 +251,7 @@ export class Robot extends Calls {
     if (platform !== undefined && !this.#mayCross(platform)) reach = platform === ahead[0] ? 0 : Math.min(reach, ahead.length - 2);
     if (isHome && line[reach].mm !== undefined && (reach || this.isRunning)) this.#driveTo(line[reach]);
     else this.orderUs = undefined;
-    const needed = [...this.body(), ...ahead, ...(this.all ?? [])];
+    const needed = [...this.body(), ...ahead, ...((!this.pauseUs && this.all) || [])];
     this.#giveBack([...needed, ...needed.filter((key) => this.site.liftOf(key)).map(gateOf)], reach > 0);
     return false;
   }
@@ -291,19 +293,17 @@ export class Robot extends Calls {
     else this.noOrderUs ??= this.now;
   }
 
-  /** What is asked for all or none: all to the end of the plan, but for lifts. */
+  /** All to the end of the plan, but for lifts; what is a part of it goes back, and is asked for again later. */
   #wakeAll() {
-    if (this.all && this.all.every((key) => this.tokens.holds(key))) [this.all, this.noOrderUs] = [undefined, undefined];
-    if (this.noOrderUs === undefined || !this.isDue(this.noOrderUs + 5 * S)) return;
-    const isPart = this.all?.some((key) => this.tokens.holds(key) && !this.body().includes(key));
-    if (!this.all) {
+    const body = this.body();
+    if (this.all?.every((key) => this.tokens.holds(key)) && !this.pauseUs) [this.all, this.noOrderUs] = [undefined, undefined];
+    else if (this.pauseUs && this.isDue(this.pauseUs)) this.pauseUs = 0;
+    else if (!this.all && this.noOrderUs !== undefined && this.isDue(this.noOrderUs + 5 * S)) {
       this.all = [...new Set(this.windows.map(({ key }) => key))].filter((key) => !this.site.liftOf(key));
       this.tokens.wanted.clear();
-      this.allUs = undefined;
-    } else if (isPart && this.isDue((this.allUs ??= this.now) + 2 * S)) {
-      [this.all, this.allUs, this.noOrderUs] = [undefined, undefined, this.now];
-      this.tokens.wanted.clear();
-      this.#giveBack(this.body());
+    } else if (this.all?.some((key) => this.tokens.holds(key) && !body.includes(key)) && this.isDue((this.partUs ??= this.now) + 2 * S)) {
+      [this.pauseUs, this.partUs] = [this.now + 5 * S, undefined];
+      this.#giveBack(body);
     }
   }
 
