@@ -6,7 +6,7 @@ import { CONTRACT, crc16, decode, encode, joined, singles } from "./words.mjs";
 
 const [S, MS] = [1_000_000, 1_000];
 const LETTING = ["STARTING", "IDLE", "WORKING", "WAITING"];
-export const newer = (a, b, bits) => a !== b && ((a - b) & (2 ** bits - 1)) < 2 ** (bits - 1);
+export const newer = (a, b, bits) => a !== b && (a - b + 2 ** bits) % 2 ** bits < 2 ** (bits - 1);
 const next = (n) => (n % 255) + 1;
 
 export class Fleet {
