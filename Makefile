@@ -61,6 +61,7 @@ bench: $(VENV)/.test ## all figures of bench/, one table each
 
 docs: $(VENV)/.test ## write onboard/contract and docs/network.md anew from the DBC files, docs/systems.md from docs/systems/, charts and times of docs/protocol.md
 	$(BIN)/python -m onboard.contract.generate
+	$(BIN)/python -m tests.foreign.table
 	$(BIN)/python -m onboard.wire.network_doc
 	$(BIN)/python -m tests.systems_page
 	$(BIN)/python -m tests.protocol

@@ -14,6 +14,7 @@ PACKAGES = {
     "mosquitto": "mosquitto",
     "mosquitto_pub": "mosquitto-clients",
     "mosquitto_sub": "mosquitto-clients",
+    "node": "nodejs",
     "openssl": "openssl",
     "spin": "spin",
     "canplayer": "can-utils",

@@ -21,8 +21,8 @@ from onboard.contract.messages import Heartbeat
 from onboard.core.negotiation.participant import Participant
 from onboard.holon.holding import HoldResponse, MachineHolds
 from onboard.wire.codec import fleet_codec
-from tests.conform import foreign
 from tests.conform.bench import ALL, SITE, SITES, play
+from tests.foreign.life import Foreign
 from tests.project.rows import ROOT
 from tests.tools import DEADLINE_S
 
@@ -106,14 +106,13 @@ def test_without_a_switch_and_a_car_it_is_judged_as_far_as_it_can_be() -> None:
 
 
 def test_the_robot_of_the_page_keeps_to_much_and_not_to_all() -> None:
-    """It parks, stops and tells what was wrong; it does not notice a second node of its number (docs/conform.md)."""
-    scenes = ("questions", "bids", "emergency stop", "short frames", "parking", "its own number")
-    findings = play(scenes, joins=foreign.joins).findings
-    kept = [one.scene for one in findings.of(Verdict.PASSED)]
-    assert {"joining", *scenes[:4]} <= set(kept)
+    """Written from the page in another language (docs/conform.md says what it does not keep to)."""
+    scenes = ("questions", "bids", "emergency stop", "short frames", "its own number")
+    with Foreign() as robot:
+        findings = play(scenes, joins=robot.joins).findings
+    assert {"joining", *scenes} <= {one.scene for one in findings.of(Verdict.PASSED)}
     broken = {one.scene for one in findings.of(Verdict.FAILED)}
-    assert not broken & {"joining", *scenes[:4]}
-    assert "own-number-holds-it" in names(findings, Verdict.FAILED)
+    assert not broken & {"joining", *scenes}
 
 
 def test_who_is_not_there_does_not_conform() -> None:
