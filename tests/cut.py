@@ -6,10 +6,18 @@ import pytest
 
 from onboard.contract.messages import Message
 
+#: A message, and when its last frame ended, us.
+Timed = tuple[int, Message]
+
 
 def shown(check: Callable[[Sequence[Message]], None], messages: Sequence[Message], *kinds: type[Message]) -> None:
     """``check`` passes on all that travelled, and raises ``AssertionError`` with all frames of any one kind cut."""
+    shown_at(lambda timed: check([one for _, one in timed]), [(0, one) for one in messages], *kinds)
+
+
+def shown_at(check: Callable[[Sequence[Timed]], None], messages: Sequence[Timed], *kinds: type[Message]) -> None:
+    """``shown`` for a check that looks at times as well."""
     check(messages)
     for kind in kinds:
         with pytest.raises(AssertionError):
-            check([one for one in messages if not isinstance(one, kind)])
+            check([one for one in messages if not isinstance(one[1], kind)])
