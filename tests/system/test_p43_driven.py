@@ -29,7 +29,7 @@ from onboard.contract.messages import (
 from onboard.core.serial import from_bus_ms
 from onboard.systems.car_park.site import CarPark
 from onboard.wire.codec import fleet_codec
-from tests.cut import Timed, shown_at
+from tests.cut import Timed, first_of, shown_at
 from tests.sites import at_the_key
 from tests.system.scene import Scene, play, stays
 
@@ -120,10 +120,7 @@ class Story:
         self.call_us, self.call = self.first(CallForProposals, lambda one: one.sender == 2)
 
     def first(self, kind: type[M], where: Callable[[M], bool], after_us: int = 0) -> tuple[int, M]:
-        for at_us, one in self.said:
-            if at_us >= after_us and isinstance(one, kind) and where(one):
-                return at_us, one
-        raise AssertionError(f"no {kind.__name__} as expected")
+        return first_of(self.said, kind, where, after_us)
 
     def at(self, node: int, track: int, index: int, after_us: int = 0) -> int:
         """When a robot says that it stands at a position."""
