@@ -1,8 +1,9 @@
 """``python -m tests.drawn ROW ...``: a second mutation of a row, drawn from the function of its first.
 
 The draw is that of ``tests.conform.mutants``, with a seed that was fixed before any was played: the issue's number and
-the row's name. It is printed as the row's table in ``docs/systems/*.toml`` has it (``drawn``). Where no test can find
-one, as it changes nothing, ``--skip N`` passes over the first N of the row's draw; that is said beside the table.
+the row's name. Where nothing can be done to that function it is from the whole file. It is printed as the row's table
+in ``docs/systems/*.toml`` has it (``drawn``). Where no test can find one, as it changes nothing, ``--skip N`` passes
+over the first N of the row's draw; that is said beside the table.
 """
 
 import argparse
@@ -27,7 +28,8 @@ def draw(row: str, skip: int = 0) -> Mutation:
     if not around:
         raise ValueError(f"{row}: {made.file}, line {line} is in no function")
     function = max(around, key=lambda one: one.lineno)
-    every = list(mutations(made.file, set(range(function.lineno, (function.end_lineno or 0) + 1))))
+    inside = set(range(function.lineno, (function.end_lineno or 0) + 1))
+    every = list(mutations(made.file, inside)) or list(mutations(made.file, set(range(1, whole.count("\n") + 2))))
     chosen = random.Random(f"{SEED} {row}").sample(every, len(every))[skip]
     node = list(ast.walk(tree))[chosen.node]
     return _as_text(made.file, whole, node)
