@@ -120,6 +120,11 @@ class PassingOrder:
     _ways: dict[int, _Way] = field(default_factory=dict)
     #: Turns of both under which two machines last agreed, lower node-ID first.
     _agreed: dict[tuple[int, int], tuple[Turns, Turns]] = field(default_factory=dict)
+    #: How many segments beyond its own a body touches, by track.
+    _reach: dict[int, int] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._reach = {track: reach_segments(self.site, track) for track in self.site.tracks}
 
     # --- what is heard -----------------------------------------------------------------------------------------
 
@@ -421,7 +426,7 @@ class PassingOrder:
         rear_mm = progress.index * pitch_mm + progress.offset_mm - step * body_mm(self.site) // 2
         return {
             Segment(leg.track, index)
-            for index in range(leg.from_index - step * reach_segments(self.site, leg.track), leg.to_index, step)
+            for index in range(leg.from_index - step * self._reach[leg.track], leg.to_index, step)
             if (rear_mm - index * pitch_mm) * step >= pitch_mm // 2
         }
 
