@@ -1,4 +1,4 @@
-"""``python -m tests.mutate [ROW ...]``: break the product once for each row, and see the row's test fail.
+"""``python -m tests.mutate [ROW ...]``: break the product once or twice for each row, and see the row's test fail.
 
 All tests run once as things are: one that fails anyway finds nothing. Then each mutation of ``docs/systems/*.toml`` is
 made alone in a copy of the tree, and the row's test runs there. A mutation that its test does not find ends the command
@@ -15,7 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import Queue
 
-from tests.project.rows import ROOT, Row, all_names, read_rows
+from tests.project.rows import ROOT, Mutation, Row, all_names, read_rows
 
 #: A mutation that makes a test run for ever is found as well.
 LIMIT_S = 300
@@ -45,8 +45,9 @@ def main() -> int:
             print(f"without any mutation: {broken}")
             return 1
         with ThreadPoolExecutor(copies.qsize()) as pool:
-            survived = [told for told in pool.map(lambda row: _judge(row, copies), wanted) if told]
-    print(f"{len(wanted) - len(survived)} of {len(wanted)} mutations were found by their rows' tests")
+            made = [(row, mutation) for row in wanted for mutation in row.mutations]
+            survived = [told for told in pool.map(lambda one: _judge(one[0], one[1], copies), made) if told]
+    print(f"{len(made) - len(survived)} of {len(made)} mutations were found by their rows' tests")
     for line in survived:
         print(line)
     return 1 if survived else 0
@@ -78,22 +79,22 @@ def _already_broken(rows: list[Row], copies: Queue[Path]) -> str | None:
     return None if status == 0 else f"pytest's status {status}: {why}"
 
 
-def _judge(row: Row, copies: Queue[Path]) -> str | None:
+def _judge(row: Row, mutation: Mutation, copies: Queue[Path]) -> str | None:
     """None where the test failed with the mutation; else one line."""
-    assert row.mutation is not None and row.test is not None
-    if row.mutation.mistake is not None:
-        return f"{row.name}: {row.mutation.mistake}"
+    assert row.test is not None
+    if mutation.mistake is not None:
+        return f"{row.name}: {mutation.mistake}"
     copy = copies.get()
-    file = copy / row.mutation.file
+    file = copy / mutation.file
     whole = file.read_text(encoding="utf-8")
     try:
-        file.write_text(whole.replace(row.mutation.old, row.mutation.new), encoding="utf-8")
+        file.write_text(whole.replace(mutation.old, mutation.new), encoding="utf-8")
         status, why = _run([row.test], copy)
     finally:
         file.write_text(whole, encoding="utf-8")
         copies.put(copy)
     verdict = "found" if status in (_FAILED, None) else f"SURVIVED (pytest's status {status})"
-    print(f"{row.name}  {verdict:8}  {row.mutation.file}  {row.test}\n     {why}", flush=True)
+    print(f"{row.name}  {verdict:8}  {mutation.file}  {row.test}\n     {why}", flush=True)
     return (
         None if status in (_FAILED, None) else f"{row.name}: {row.test} does not fail with the mutation of {file.name}"
     )

@@ -20,7 +20,7 @@ from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Itinerary, Leg, Progress, Stamp
 from onboard.core.serial import is_newer, ranks_before
 from onboard.core.site import Segment
-from onboard.ways.occupancy import body_mm, leg_windows
+from onboard.ways.occupancy import body_mm, leg_windows, reach_segments
 from onboard.ways.passing import TOLERANCE_US, BegunItinerary
 from onboard.ways.reservations import FOREVER
 from onboard.ways.retreats import has_work, is_aged, moves, retreat_moves
@@ -120,6 +120,11 @@ class PassingOrder:
     _ways: dict[int, _Way] = field(default_factory=dict)
     #: Turns of both under which two machines last agreed, lower node-ID first.
     _agreed: dict[tuple[int, int], tuple[Turns, Turns]] = field(default_factory=dict)
+    #: How many segments beyond its own a body touches, by track.
+    _reach: dict[int, int] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._reach = {track: reach_segments(self.site, track) for track in self.site.tracks}
 
     # --- what is heard -----------------------------------------------------------------------------------------
 
@@ -413,7 +418,7 @@ class PassingOrder:
         return segment in way.left or sum(1 for _ in way.open_turns(segment)) < len(way.turns.get(segment, ()))
 
     def _behind(self, leg: Leg, progress: Progress) -> set[Segment]:
-        """Segments of a moving leg that the body, clearance included, has left."""
+        """Segments of a moving leg that the body, clearance included, has left; its rear begins behind its start."""
         if leg.action is not LegAction.TRAVEL or leg.track != progress.track or leg.track not in self.site.tracks:
             return set()
         step = 1 if leg.to_index > leg.from_index else -1
@@ -421,7 +426,7 @@ class PassingOrder:
         rear_mm = progress.index * pitch_mm + progress.offset_mm - step * body_mm(self.site) // 2
         return {
             Segment(leg.track, index)
-            for index in range(leg.from_index, leg.to_index, step)
+            for index in range(leg.from_index - step * self._reach[leg.track], leg.to_index, step)
             if (rear_mm - index * pitch_mm) * step >= pitch_mm // 2
         }
 

@@ -90,11 +90,8 @@ def _kind(node: ast.AST) -> str:
     return ""
 
 
-def mutated(mutation: Mutation) -> CodeType:
-    """The file's code with it."""
-    path = ROOT / mutation.file
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    node: Any = list(ast.walk(tree))[mutation.node]
+def change(node: Any) -> None:
+    """Break one node of a tree, which ``mutations`` has named."""
     match node:
         case ast.Compare():
             node.ops = [_CONTRARY[type(node.ops[0])]()]
@@ -108,6 +105,14 @@ def mutated(mutation: Mutation) -> CodeType:
             node.value = value + 1
         case ast.Expr():
             node.value = ast.Constant(value=None)
+
+
+def mutated(mutation: Mutation) -> CodeType:
+    """The file's code with it."""
+    path = ROOT / mutation.file
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    node: Any = list(ast.walk(tree))[mutation.node]
+    change(node)
     return compile(ast.fix_missing_locations(tree), str(path), "exec")
 
 

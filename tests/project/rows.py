@@ -8,8 +8,10 @@ moves in each system. Each has a table in one of ``docs/systems/*.toml``::
     check = "what was checked"
     test = "tests/terminal/test_x.py::test_m22_..."
     mutation = { file = "onboard/...", old = "text that is there once", new = "text that breaks the row" }
+    drawn = { file = "onboard/...", old = "...", new = "..." }
 
-or, where a row is not done on purpose, ``not_done = "why"``.
+``drawn``, which not every row has, was drawn by ``tests.drawn`` from the function in which ``mutation`` stands. Where a
+row is not done on purpose its table is ``not_done = "why"``.
 """
 
 import ast
@@ -61,6 +63,12 @@ class Row:
     test: str | None
     mutation: Mutation | None
     not_done: str | None
+    drawn: Mutation | None = None
+
+    @property
+    def mutations(self) -> tuple[Mutation, ...]:
+        """Both, those that there are."""
+        return tuple(one for one in (self.mutation, self.drawn) if one is not None)
 
 
 def all_names() -> list[str]:
@@ -75,11 +83,12 @@ def read_rows() -> dict[str, Row]:
     found: dict[str, Row] = {}
     for path in sorted((ROOT / "docs" / "systems").glob("*.toml")):
         for name, table in tomllib.loads(path.read_text(encoding="utf-8")).items():
-            unknown = set(table) - {"check", "test", "mutation", "not_done"}
+            unknown = set(table) - {"check", "test", "mutation", "drawn", "not_done"}
             if unknown or name in found:
                 raise ValueError(f"{path.name}: [{name}]: {', '.join(sorted(unknown)) or 'stands twice'}")
-            mutation = Mutation(**table["mutation"]) if "mutation" in table else None
-            found[name] = Row(name, table.get("check", ""), table.get("test"), mutation, table.get("not_done"))
+            made = {key: Mutation(**table[key]) for key in ("mutation", "drawn") if key in table}
+            words = (table.get("check", ""), table.get("test"), made.get("mutation"), table.get("not_done"))
+            found[name] = Row(name, *words, made.get("drawn"))
     return found
 
 

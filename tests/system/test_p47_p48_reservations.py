@@ -1,5 +1,7 @@
 """A bid brings its reservations: tentative with the bid, firm with the award, free when outbid (rows P47, P48)."""
 
+import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import pytest
@@ -8,7 +10,8 @@ from bus_sim.can.node import SimulatedBus
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.planted.tools import replace
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.contract.codes import CallResult, Grade, KindCode, Operation, Reason, TaskPhase
+from onboard.config.site import parse_site
+from onboard.contract.codes import CallResult, Grade, KindCode, LegAction, Reason, TaskPhase
 from onboard.contract.messages import (
     Award,
     Bid,
@@ -20,15 +23,17 @@ from onboard.contract.messages import (
     TaskReport,
 )
 from onboard.core.frame import Frame
-from onboard.core.negotiation import CallKey
-from onboard.core.serial import from_bus_ms
-from onboard.systems.car_park.generation import CarParkGeneration
-from onboard.systems.car_park.robot import ParkingRobot
+from onboard.ways.occupancy import itinerary_windows
+from onboard.ways.reservations import Reservations, SlotWindow
+from onboard.ways.site import BayUse
 from onboard.wire.codec import fleet_codec
+from tests.cut import shown
 from tests.sites import one_floor, telling
-from tests.system.scene import Scene, play, stays
+from tests.system.scene import play, stays
 
 SITE = telling(find_site("small"))
+#: A machine that the site does not have.
+RIVAL = 200
 
 
 @pytest.fixture(scope="module")
@@ -112,10 +117,9 @@ class Rival:
     simulation: Simulation
     bus: SimulatedBus = field(init=False)
     call: tuple[int, int] | None = None
-    kept: list[dict[CallKey, object]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.bus = self.simulation.fleet.attach("rival", 200)
+        self.bus = self.simulation.fleet.attach("rival", RIVAL)
         self.bus.subscribe(self._on_frame)
 
     def _on_frame(self, frame: Frame, _time_us: int) -> None:
@@ -123,19 +127,11 @@ class Rival:
         if isinstance(message, Bid) and self.call in (None, (message.initiator, message.call)):
             self.call = (message.initiator, message.call)
             self.simulation.loop.call_later(0.02, self._outbid, message)
-        if isinstance(message, Award) and (message.sender, message.call) == self.call and message.winner == 200:
-            self._say(TaskReport(200, message.task, TaskPhase.AWARDED, 0, message.reason))
+        if isinstance(message, Award) and (message.sender, message.call) == self.call and message.winner == RIVAL:
+            self._say(TaskReport(RIVAL, message.task, TaskPhase.AWARDED, 0, message.reason))
 
     def _outbid(self, bid: Bid) -> None:
-        self.kept.append(dict(self._tentative))
-        self._say(Bid(200, bid.initiator, bid.call, bid.cost - 100, 0))
-        self.simulation.loop.call_later(0.01, lambda: self.kept.append(dict(self._tentative)))
-
-    @property
-    def _tentative(self) -> dict[CallKey, object]:
-        behaviour = self.simulation.controllers[11].holon.behaviour
-        assert isinstance(behaviour, ParkingRobot) and isinstance(behaviour.generation, CarParkGeneration)
-        return dict(behaviour.generation.tentative)
+        self._say(Bid(RIVAL, bid.initiator, bid.call, bid.cost - 100, 0))
 
     def _say(self, message: Message) -> None:
         for frame in fleet_codec().encode(message):
@@ -149,43 +145,87 @@ def admitted(simulation: Simulation) -> Simulation:
     return simulation
 
 
-@pytest.fixture(scope="module")
-def outbid() -> tuple[Scene, Rival]:
-    """Two customers come to two bays; robot 11 is outbid for the first car."""
-    rivals: list[Rival] = []
+def two_bays(*times_s: float, rival: bool = False, uses: dict[int, BayUse] | None = None) -> list[Message]:
+    """What is said on the fleet bus where cars come to two bays before one robot."""
     bay = '[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,6)"\n'
-    scene = play(
-        one_floor(extra=bay),
-        stays((0, None), (1, None)),
-        before=lambda simulation: rivals.append(Rival(admitted(simulation))),
-        extra_s=60,
-    )
-    return scene, rivals[0]
+    site = dataclasses.replace(telling(one_floor(extra=bay)), bay_uses=uses or {})
+
+    def before(simulation: Simulation) -> None:
+        if rival:
+            Rival(admitted(simulation))
+
+    scene = play(site, stays(*((at_s, None) for at_s in times_s)), before=before, limit_s=40, extra_s=0)
+    return [said.message for said in scene.said if said.bus == "fleet"]
 
 
-def test_p47_being_outbid_frees_what_was_pre_engaged(outbid: tuple[Scene, Rival]) -> None:
-    """Pre-engaged between its own bid and the better one, and nothing firm comes of it."""
-    scene, rival = outbid
-    assert rival.call is not None
-    assert [list(kept) for kept in rival.kept] == [[rival.call], []]
-    bid_us, _ = scene.first(Bid, lambda m: m.sender == 11)
-    award_us, award = scene.first(Award, lambda m: (m.sender, m.call) == rival.call)
-    assert (award.winner, award.result) == (200, CallResult.AWARDED) and award_us > bid_us
-    # The better one does nothing, so that the car is called for once more.
-    anew_us, _ = scene.first(CallForProposals, lambda m: m.task == award.task, after_us=award_us)
-    assert not [t for t, m in scene.all(TaskReport) if m.sender == 11 and m.task == award.task and t < anew_us]
+def test_p47_being_outbid_frees_what_was_pre_engaged() -> None:
+    """Outbid for the first car, it offers for the second what it would have offered without the first; else not."""
+    alone = [one.cost for one in two_bays(1, uses={1: BayUse.EXIT}) if isinstance(one, Bid)]
+    engaged = [one.cost for one in two_bays(0, 1) if isinstance(one, Bid) and one.initiator == 2]
+    outbid = two_bays(0, 1, rival=True)
+
+    def check(said: Sequence[Message]) -> None:
+        calls = [one for one in said if isinstance(one, CallForProposals)]
+        bids = [one for one in said if isinstance(one, Bid)]
+        assert len(bids) > 2
+        first, better, second = bids[:3]
+        assert [first.sender, better.sender, second.sender] == [11, RIVAL, 11] and better.cost < first.cost
+        assert [(first.initiator, first.call), (second.initiator, second.call)] == [
+            (one.sender, one.call) for one in calls[:2]
+        ]
+        awards = [one for one in said if isinstance(one, Award)]
+        assert [(one.sender, one.winner, one.result) for one in awards[:2]] == [
+            (1, RIVAL, CallResult.AWARDED),
+            (2, 11, CallResult.AWARDED),
+        ]
+        plans = [one for one in said if isinstance(one, Itinerary) and one.sender == 11]
+        told = [plan.version for plan in plans if plan.grade is Grade.TENTATIVE]
+        assert told[:2] == [first.itinerary_version, second.itinerary_version]
+        firm = [plan for plan in plans if plan.grade is Grade.FIRM and len(plan.legs) > 2]
+        works = {leg.to_index for leg in firm[0].legs if leg.action is LegAction.WORK}
+        assert works == {6}, "nothing firm comes of what it was outbid for"
+        assert [second.cost] == alone and second.cost < engaged[0] - 40_000
+
+    shown(check, outbid, CallForProposals, Bid, Award, Itinerary)
 
 
-def test_p47_the_next_bid_is_as_if_the_lost_one_had_never_been(outbid: tuple[Scene, Rival]) -> None:
-    """What was pre-engaged for the first car delays nothing: the second bid is what an idle robot offers."""
-    scene, rival = outbid
-    calls = {(c.sender, c.call): c for _, c in scene.all(CallForProposals) if c.operation is Operation.PARK}
-    bids = [m for _, m in scene.all(Bid) if m.sender == 11]
-    assert len(bids) >= 2 and (bids[0].initiator, bids[0].call) == rival.call
-    took_ms = []
-    for bid in bids[:2]:
-        deadline_us = from_bus_ms(calls[bid.initiator, bid.call].deadline_ms, 0)
-        took_ms.append(bid.cost - deadline_us // 1000)
-    # The second bay is two segments nearer, 4.8 m at 1.5 m/s there and back again at most.
-    assert took_ms[1] == pytest.approx(took_ms[0], abs=6_500)
-    assert scene.first(Itinerary, lambda m: m.sender == 11 and m.grade is Grade.FIRM and len(m.legs) > 2)
+# --- what others make of it ------------------------------------------------------------------------------------------
+
+
+def test_p47_two_pre_engage_the_same_segments_and_of_what_they_engage_nothing_meets() -> None:
+    """Nobody plans around a standing bid, which may come to nothing: the awards, and who was first, decide."""
+    text = """
+    site = {name = "pre", bitrate = 500_000}
+    floors = {count = 3, positions = 10, without = ["p(1,*)"]}
+    compartments = [{name = "IOC1", node = 1, at = "p(1,4)"}, {name = "IOC2", node = 2, at = "p(1,7)"}]
+    lifts = [{name = "ER1", node = 5, end = "left"}]
+    spurs = [{at = "p(1,9)", side = "far"}]
+    robots = [{name = "MR1", node = 11, home = "p(2,3)"}, {name = "MR2", node = 12, home = "p(3,3)"}]
+    """
+    site = telling(parse_site(text, "pre.toml"))
+
+    def said_where(*comes: float) -> list[Message]:
+        scene = play(site, stays(*((at_s, None) for at_s in comes)), limit_s=30, extra_s=0)
+        return [one.message for one in scene.said if one.bus == "fleet"]
+
+    def check(said: Sequence[Message]) -> None:
+        bids = [one for one in said if isinstance(one, Bid)]
+        assert [(one.sender, one.initiator) for one in bids] == [(11, 1), (12, 2)]
+        awards = [one for one in said if isinstance(one, Award) and one.result is CallResult.AWARDED]
+        assert {one.winner for one in awards} == {11, 12}
+
+        def windows(grade: Grade) -> dict[int, list[SlotWindow]]:
+            """Of the last plan of each robot."""
+            plans = {one.sender: one for one in said if isinstance(one, Itinerary) and one.grade is grade}
+            return {node: itinerary_windows(site, plan, 12_000_000) for node, plan in plans.items()}
+
+        held = {}
+        for grade in (Grade.TENTATIVE, Grade.FIRM):
+            found = windows(grade)
+            assert found.keys() >= {11, 12}
+            reservations = Reservations()
+            reservations.reserve(11, found[11], [])
+            held[grade] = {window.segment.track for window, _ in reservations.conflicts(12, found[12])}
+        assert held[Grade.TENTATIVE] >= {1, 128} and not held[Grade.FIRM]
+
+    shown(check, said_where(0, 0), Bid, Award, Itinerary)

@@ -413,7 +413,8 @@ class Compartment:
         if self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
             has_left = self.job.has_left(self.bay, self.fleet.mirror)
             return self._left(self.job) if has_left else self.calls.call_for(self.job, now_us)
-        if not self._robot_waits or not self.job.winner or not self._is(DoorName.INPUT, DoorPosition.LOCKED):
+        is_locked = self._is(DoorName.INPUT, DoorPosition.LOCKED) and not self.bay.person_inside
+        if not self._robot_waits or not self.job.winner or not is_locked:
             return []
         self._go(BayPhase.OPENING)
         return self.outputs.door(DoorName.OUTPUT, DoorAction.OPEN)
