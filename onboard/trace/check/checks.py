@@ -40,6 +40,13 @@ BACK_US = 1_000_000
 _event_of: Callable[[Any], LogEvent[Any]] = partial(tuple.__new__, LogEvent)
 
 
+#: Words that may tell that another run begins.
+_OF_TIME = frozenset((BusTime, Heartbeat))
+
+#: Words of a frame, the frame, and the sign of life that it is.
+KnownFrame = tuple[tuple[Message, ...], Frame, Heartbeat | None]
+
+
 @dataclass
 class LogVerdict:
     """What came of a log. ``unknown`` counts frames that came to no message, by reason; ``waits_us`` by node-ID."""
@@ -132,7 +139,7 @@ class Checks:
         self._seen: Counter[type[Message]] = Counter()
         self._whole = self._codecs[0].whole
         #: By ``FrameBlock.keys``, as ``_learn`` gives them.
-        self._known: dict[bytes, tuple[tuple[Message, ...], Frame]] = {}
+        self._known: dict[bytes, KnownFrame] = {}
         self._decoders: dict[str, tuple[Decoder, Decoder]] = {}
         rules = rules_for(site) if rules is None else rules
         self.verdict = LogVerdict(tuple(rule for rule in rules if not self._why_not(rule)))
@@ -212,15 +219,30 @@ class Checks:
             for raw in block.frames():
                 self.feed_raw(raw)
             return
-        known, judge = self._known, self._judge
+        known, judge, verdict = self._known, self._judge, self.verdict
         for time_us, channel, key in zip(block.time_us.tolist(), block.names, block.keys, strict=True):
-            words, frame = known.get(key) or self._learn(key)
+            words, frame, beat = known.get(key) or self._learn(key)
             if not words:
                 self.feed(time_us, channel, frame)
                 continue
-            self.verdict.frames += 1
+            verdict.frames += 1
+            if beat is not None and self._lives_on(beat, time_us):
+                continue
             for word in words:
                 judge(time_us, word, channel, frame)
+
+    def _lives_on(self, beat: Heartbeat, time_us: int) -> bool:
+        """Whether a sign of life tells nothing but that its sender lives, and no rule is to look at the time yet.
+
+        Of most logs that is half of all frames.
+        """
+        picture = self._picture
+        is_due = self._tick_us is None or time_us >= self._tick_us or time_us < (self._last_us or 0)
+        if is_due or picture.beats.get(beat.sender) is not beat:
+            return False
+        self._last_us = picture.now_us = picture.heard_us[beat.sender] = time_us
+        self.verdict.messages += 1
+        return True
 
     def feed_raw(self, raw: RawFrame) -> None:
         """One frame of a log, of whatever kind."""
@@ -230,8 +252,11 @@ class Checks:
         else:
             self.feed(raw.time_us, raw.channel, frame)
 
-    def _learn(self, key: bytes) -> tuple[tuple[Message, ...], Frame]:
-        """A data frame, and its words where it is a whole message that somebody listens to."""
+    def _learn(self, key: bytes) -> KnownFrame:
+        """A data frame, and its words where it is a whole message that somebody listens to.
+
+        Beside them a sign of life that no rule looks at.
+        """
         can_id, data, is_extended = data_frame(key)
         frame = Frame(can_id, data, is_extended)
         message = self._whole(can_id, data) if is_extended else None
@@ -239,15 +264,17 @@ class Checks:
             message = None
         if len(self._known) >= MOST_KNOWN:
             self._known.clear()
-        found = self._known[key] = () if message is None else tuple(singles(message)), frame
+        beat = message if isinstance(message, Heartbeat) and Heartbeat not in self._handlers else None
+        if beat is not None and beat.state is MachineState.STARTING:
+            beat = None
+        found = self._known[key] = () if message is None else tuple(singles(message)), frame, beat
         return found
 
     def _judge(self, time_us: int, message: Message, channel: str, frame: Frame | None) -> None:
         """A message that the site listens to: every rule that reads such messages, and the picture, see it."""
         kind = type(message)
         last_us = self._last_us
-        is_started = isinstance(message, Heartbeat) and message.state is MachineState.STARTING
-        if last_us is None or time_us < last_us or is_started or isinstance(message, BusTime):
+        if last_us is None or time_us < last_us or (kind in _OF_TIME and _is_of_time(message)):
             time_us = self._orderly(time_us, message)
         self._last_us = time_us
         self.verdict.messages += 1
@@ -347,6 +374,10 @@ class Checks:
         for reason, count in decoder.drops.items():
             self.verdict.unknown[reason.name] += count
         decoder.drops.clear()
+
+
+def _is_of_time(message: Message) -> bool:
+    return not isinstance(message, Heartbeat) or message.state is MachineState.STARTING
 
 
 def check_records(records: Iterable[LogRecord], checks: Checks) -> LogVerdict:

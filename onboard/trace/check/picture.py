@@ -55,6 +55,8 @@ class BusPicture:
         #: Boot counter and last sign of life, us of the log, by node.
         self.boots: dict[int, int] = {}
         self.heard_us: dict[int, int] = {}
+        #: The sign of life of each node that was taken up last: the same again tells only that its sender lives.
+        self.beats: dict[int, Heartbeat] = {}
         #: Machines that start, or hold for their journals: what they say that they hold is for the others to compare.
         self.announcing: set[int] = set()
         #: Things that could not be judged, because the log does not tell enough.
@@ -144,7 +146,7 @@ class BusPicture:
         if beat.state not in STILL and beat.sender in self._stopped:
             self._stopped.discard(beat.sender)
             self.excused_us = max(self.excused_us, time_us)
-        self.boots[beat.sender] = beat.boot
+        self.boots[beat.sender], self.beats[beat.sender] = beat.boot, beat
         self.heard_us[beat.sender] = time_us
         if beat.state is MachineState.STARTING:
             self.announcing.add(beat.sender)
@@ -170,6 +172,7 @@ class BusPicture:
         self._sensed_mm[state.sender] = state.position_mm
 
     def _on_halted(self, word: Halted, _time_us: int) -> None:
+        self.beats.pop(word.sender, None)
         if word.sender == word.machine and word.needs_person and word.reason in _STOPPED:
             self._stopped.add(word.sender)
         if word.sender == word.machine and word.reason in RIGHTS_LOST:
