@@ -1,9 +1,9 @@
 """``python -m tests.drawn ROW ...``: a second mutation of a row, drawn from the function of its first.
 
 The draw is that of ``tests.conform.mutants``, with a seed that was fixed before any was played: the issue's number and
-the row's name. Where nothing can be done to that function it is from the whole file. It is printed as the row's table
-in ``docs/systems/*.toml`` has it (``drawn``). Where no test can find one, as it changes nothing, ``--skip N`` passes
-over the first N of the row's draw; that is said beside the table.
+the row's name. Where nothing can be done to that function, or there is none, it is from the whole file. It is printed
+as the row's table in ``docs/systems/*.toml`` has it (``drawn``). Where the row's test cannot find one ``--skip N``
+passes over the first N of the row's draw; why, is said beside the table.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from tests.project.rows import ROOT, Mutation, read_rows
 
 
 def draw(row: str, skip: int = 0) -> Mutation:
-    """The draw of a row that has a mutation. Raises ``ValueError`` where that is in no function."""
+    """The draw of a row. Raises ``ValueError`` where it has no mutation."""
     made = read_rows()[row].mutation
     if made is None:
         raise ValueError(f"{row} has no mutation")
@@ -25,10 +25,10 @@ def draw(row: str, skip: int = 0) -> Mutation:
     tree = ast.parse(whole)
     around = [one for one in ast.walk(tree) if isinstance(one, ast.FunctionDef) and one.lineno <= line]
     around = [one for one in around if line <= (one.end_lineno or 0)]
-    if not around:
-        raise ValueError(f"{row}: {made.file}, line {line} is in no function")
-    function = max(around, key=lambda one: one.lineno)
-    inside = set(range(function.lineno, (function.end_lineno or 0) + 1))
+    inside: set[int] = set()
+    if around:
+        function = max(around, key=lambda one: one.lineno)
+        inside = set(range(function.lineno, (function.end_lineno or 0) + 1))
     every = list(mutations(made.file, inside)) or list(mutations(made.file, set(range(1, whole.count("\n") + 2))))
     chosen = random.Random(f"{SEED} {row}").sample(every, len(every))[skip]
     node = list(ast.walk(tree))[chosen.node]

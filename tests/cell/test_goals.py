@@ -1,5 +1,6 @@
 """Several goals, deadlines, joining robots, goals that cannot be achieved, faults (rows C02, C15 to C17, C19)."""
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -8,12 +9,13 @@ import pytest
 from bus_sim.run import BusRun
 from bus_sim.systems.cell.tree import ContractTree
 from onboard.contract.cell import ArmProgress, PartAt
-from onboard.contract.codes import OrderResult
-from onboard.contract.messages import Bid, CallForProposals, Reference, TaskReport
+from onboard.contract.codes import OrderResult, TaskPhase
+from onboard.contract.messages import Bid, CallForProposals, Heartbeat, Reference, TaskReport
 from onboard.systems.cell.contracts import Goal
 from onboard.systems.cell.geometry import Area, distance_m
 from tests.cell.playing import Scene, cell, goal_demand
 from tests.cell.witness import ARMS, DESK, arm, metres
+from tests.cut import Timed, shown_at
 
 
 def _late(node: int, after_s: float, run: BusRun[Any]) -> None:
@@ -27,10 +29,20 @@ def test_c02_a_robot_that_joins_makes_the_goal_possible() -> None:
     scene = Scene(cell(), partial(_late, 3, 40.0))
     scene.assert_sound()
     assert scene.entries[0].result is OrderResult.DONE
-    bids = [(time_us, one) for time_us, one in scene.said(Bid) if one.initiator == DESK]
-    assert len(bids) == 1 and bids[0][0] > 40_000_000
-    # It is bid for as before: the robots that were there have nothing better.
-    assert bids[0][1].cost == 65212
+
+    def check(heard: Sequence[Timed]) -> None:
+        first_us = min((at for at, one in heard if isinstance(one, Heartbeat) and one.sender == 3), default=0)
+        assert first_us > 39_000_000
+        attempts = [at for at, one in heard if isinstance(one, CallForProposals) and one.sender == DESK]
+        assert len([at for at in attempts if at < first_us]) > 1
+        bids = [(at, one) for at, one in heard if isinstance(one, Bid) and one.initiator == DESK]
+        assert len(bids) == 1 and bids[0][0] > first_us
+        # It is bid for as before: the robots that were there have nothing better.
+        assert bids[0][1].cost == 65212
+        done = [one.task for _, one in heard if isinstance(one, TaskReport) and one.phase is TaskPhase.DONE]
+        assert done[-1:] == [Reference(DESK, 1)]
+
+    shown_at(check, scene.played.messages, Heartbeat, CallForProposals, Bid, TaskReport)
 
 
 def test_c15_the_earlier_deadline_goes_first() -> None:

@@ -149,6 +149,7 @@ _HEAD = """\
 # What the papers ask for
 
 Written by `make docs` from `docs/systems/*.toml`. Every row of the four papers has a test named after it, and one
-change of product code that makes this test fail: `make mutants` makes each of them in a copy and runs its test. Rows A
-are of no paper: what moves anything in each system, and what lets it.
+change of product code that makes this test fail; some have a second one, drawn by a seed from the same function
+(`drawn`, `python -m tests.drawn`). `make mutants` makes each of them in a copy and runs its test. Rows A are of no
+paper: what moves anything in each system, and what lets it.
 """

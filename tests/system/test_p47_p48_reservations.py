@@ -158,7 +158,7 @@ def two_bays(*times_s: float, rival: bool = False, uses: dict[int, BayUse] | Non
     return [said.message for said in scene.said if said.bus == "fleet"]
 
 
-def test_p47_being_outbid_frees_what_was_pre_engaged() -> None:
+def test_p10_p47_being_outbid_frees_what_was_pre_engaged() -> None:
     """Outbid for the first car, it offers for the second what it would have offered without the first; else not."""
     alone = [one.cost for one in two_bays(1, uses={1: BayUse.EXIT}) if isinstance(one, Bid)]
     engaged = [one.cost for one in two_bays(0, 1) if isinstance(one, Bid) and one.initiator == 2]

@@ -18,8 +18,12 @@ ROBOTS = (11, 12, 13)
 
 
 @cache
-def site(capacity: int, more: str, kind: str = "stacker", near: str = "A1") -> Terminal:
-    """Lanes for so many robots, three robots in area 1, R1 in ``near``, three desks; durations as printed."""
+def site(capacity: int, more: str, kind: str = "stacker", near: str = "A1", crossing: int = 0) -> Terminal:
+    """Lanes for so many robots, three robots in area 1, R1 in ``near``, three desks; durations as printed.
+
+    The crossing holds as many as a lane; ``crossing`` 1 leaves that to the site file's default.
+    """
+    holds = "" if crossing else f"capacity = {capacity}"
     lanes = [("L3", 50, "C1"), ("L2", 60, "A4"), ("L11", 100, "C1"), ("L4", 50, "A1")]
     told = ", ".join(
         f'{{name = "{name}", length_mm = {metres}_000, capacity = {capacity}, leads_to = ["{to}"]}}'
@@ -57,7 +61,7 @@ def site(capacity: int, more: str, kind: str = "stacker", near: str = "A1") -> T
     [[crossings]]
     name = "C1"
     duration_ms = 5_000
-    capacity = {capacity}
+    {holds}
     leads_to = ["L2", "A2", "L4"]
     [[crossings.turns]]
     from = "L11"
@@ -83,11 +87,13 @@ def held(vehicle: str, after_s: float, for_s: float) -> str:
 
 
 @cache
-def said(capacity: int, more: str, kind: str = "stacker", until_s: int = 900, near: str = "A1") -> tuple[Timed, ...]:
+def said(
+    capacity: int, more: str, kind: str = "stacker", until_s: int = 900, near: str = "A1", crossing: int = 0
+) -> tuple[Timed, ...]:
     """All that is said until every box is put down, or a time; drives and handlers take exactly their times."""
     found: list[Timed] = []
     outcome = play(
-        site(capacity, more, kind, near),
+        site(capacity, more, kind, near, crossing),
         RunOptions(seed=1, quiet=True),
         limit_us=until_s * SECOND,
         noise=0,

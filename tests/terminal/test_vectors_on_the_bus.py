@@ -45,7 +45,7 @@ def dates_us(mirror: TerminalMirror, robot: int, now_us: int) -> list[tuple[int,
     return fig3.intervals(mirror.traffic, robot, now_us)
 
 
-def test_m09_m10_m12_the_printed_plan_travels_to_the_second() -> None:
+def test_m09_m10_m12_m14_the_printed_plan_travels_to_the_second() -> None:
     """Vector (a): fifteen elementary actions, loading and unloading, each from the end of the one before."""
     names = {one.number: one.name.replace("Area ", "A").replace("Lane ", "L") for one in fig3.fig3().entities.values()}
     names = {number: name.replace("Crossing ", "C").replace("Station ", "S") for number, name in names.items()}
@@ -80,6 +80,28 @@ def test_m15_m18_m19_m20_three_plans_of_one_moment_travel_as_the_vectors_say(cap
             assert [one[2] for one in (first, second, third)] == [(50, 55), (51, 56), (52, 57)], "all in one crossing"
 
     shown_at(check, said(capacity, THREE, until_s=TOLD_S), PlanHead, PlanStep)
+
+
+def test_m20_a_crossing_holds_one_robot_unless_the_site_says_more() -> None:
+    """Of three that come a tick apart the second enters it one tick after the first has left."""
+
+    def check(heard: Sequence[Timed]) -> None:
+        assert [as_printed(heard, robot)[2] for robot in ROBOTS] == [(50, 55), (56, 61), (62, 67)]
+
+    shown_at(check, said(9, THREE, until_s=TOLD_S, crossing=1), PlanHead, PlanStep)
+
+
+def test_m02_in_a_stacker_every_box_can_be_had() -> None:
+    """The lowest of four is called for, and planned, at once; in a stack nobody calls for it."""
+    stack = [one for _, one in said(2, missions("B1"), "stack", until_s=15)]
+    assert not [one for one in stack if isinstance(one, CallForProposals | PlanTask)]
+
+    def check(heard: Sequence[Timed]) -> None:
+        _, call = first_of(heard, CallForProposals)
+        _, load = first_of(heard, PlanTask)
+        assert (call.car.number, load.box) == (1, 1)
+
+    shown_at(check, said(2, missions("B1"), until_s=15), CallForProposals, PlanTask)
 
 
 def visits_ms(heard: Sequence[Timed], where: str) -> list[tuple[int, int, int]]:
