@@ -59,7 +59,7 @@ ALWAYS = (
         ("each only with messages whose senders in the DBC (`BO_TX_BU_`) name its kind"),
     ),
     Check("says-no-bus-time", "T2", "Who does not say it follows"),
-    Check("head-comes-before-legs", "F4", "but the head first"),
+    Check("head-comes-before-legs", "F4", "of an itinerary the head first"),
     Check("legs-come-in-time", "F4", "After `T_set` without a frame of it a set is dropped."),
     *(Check(name, "F9", _SHARE) for name in _SHARES),
     Check("heartbeats-come-in-time", "J2", "I say `Heartbeat` every `T_beat`"),

@@ -150,7 +150,7 @@ export class Calls extends Fleet {
   objection(key, node, { plan, predecessor }) {
     const peer = this.peers.get(node);
     const body = this.body();
-    if (key >= 1 << 24 || body.includes(key) || !peer || this.now - peer.heard > 1.25 * this.site.us.heartbeat) return "TOKEN_NOT_GRANTABLE_YET";
+    if (key >= 1 << 24 || this.site.liftOf(key) || body.includes(key) || !peer || this.now - peer.heard > 1.25 * this.site.us.heartbeat) return "TOKEN_NOT_GRANTABLE_YET";
     const needs = this.needed.includes(key) && (this.isRunning || this.before(key, node) === this.node);
     if (needs) return "TOKEN_NOT_GRANTABLE_YET";
     if (plan === 0) return "";
@@ -271,7 +271,7 @@ export class Calls extends Fleet {
       ends.push(endOf(one.steps.slice(0, work + 1)));
     }
     const last = ends.reduce((a, b) => (b[2] > a[2] ? b : a));
-    return [last[0], last[1], Math.max(last[2], this.now)];
+    return [last[0], last[1], Math.max(last[2] + this.late, this.now)];
   }
 
   /** What of the plan stays for a task behind it: all up to the last work, else the run in hand. */

@@ -2,13 +2,15 @@
 // One process: a line in is a time with a frame or a wake, the lines out are frames, what is to be kept, and the next wake.
 import { readSync, writeSync } from "node:fs";
 import { Calls } from "./calls.mjs";
-import { hopUs } from "./plan.mjs";
+import { FAULTS } from "./faults.mjs";
+import { hopUs, meeting, windowsOf } from "./plan.mjs";
 import { ABOARD, ANY, GATE } from "./site.mjs";
 import { carKey, stationKey } from "./tokens.mjs";
 
 const [S, MS] = [1_000_000, 1_000];
 const ACTIONS = { true: ["REACH", "GRIP", "RETRACT"], false: ["REACH", "RELEASE", "RETRACT"] };
 const AFTER = { REACH: "REACHED", GRIP: "REACHED", RELEASE: "REACHED", RETRACT: "HOME" };
+const RESTS = ["HOME", "REACHED"];
 const gateOf = (platform) => platform | GATE;
 
 export class Robot extends Calls {
@@ -104,11 +106,11 @@ export class Robot extends Calls {
   inHand() {
     const [step] = this.steps;
     const { which, place, takes } = this.hand ?? {};
-    if (this.hand && step?.action !== "WORK" && this.hand.actions.length < 3) {
+    if (this.hand && step?.action !== "WORK" && this.hand.isBegun) {
       const [index, end] = [place & 0x7f, this.now + this.site.handling(place)];
       return [{ action: "WORK", track: place >> 8, from: index, to: index, begin: this.now, end, place, takes, call: this.tasks.get(which).call }];
     }
-    const isFixed = { TRAVEL: step === this.begun && this.isRunning, RIDE: true, WORK: this.hand?.actions.length < 3 };
+    const isFixed = { TRAVEL: step === this.begun && this.isRunning, RIDE: true, WORK: this.hand?.isBegun };
     let count = Number(Boolean(step && isFixed[step.action]));
     if (step && this.site.liftOf(this.place.key)) count = Math.max(count, 1);
     const onLift = ({ action, track, to }) => action === "RIDE" || this.site.liftOf(this.site.at(track, to));
@@ -142,12 +144,19 @@ export class Robot extends Calls {
       }
       this.steps.shift();
       const by = this.steps.length ? this.now - this.steps[0].begin : 0;
-      if (by > 500 * MS) {
-        this.steps = this.steps.map((one) => ({ ...one, begin: one.begin + by, end: one.end + by }));
-        this.publish();
-      }
+      const isNext = this.steps.length > 0 && this.steps[0].begin <= step.end + 10 * MS;
+      if (by > 500 * MS || (by < -500 * MS && isNext)) this.#shift(by);
     }
     return undefined;
+  }
+
+  /** P9: what follows begins later, or sooner where nobody is in the way then. */
+  #shift(by) {
+    const shifted = this.steps.map((one) => ({ ...one, begin: one.begin + by, end: one.end + by }));
+    const windows = windowsOf(this.site, shifted);
+    if (by < 0 && this.robots.some((one) => one.plan && meeting(windows, one.plan.windows))) return;
+    this.steps = shifted;
+    this.publish();
   }
 
   #beginStep(step) {
@@ -161,7 +170,7 @@ export class Robot extends Calls {
   /** When a step that is in hand will be over, as far as can be seen. */
   #over(step) {
     const { action, from, to, place, end } = step;
-    if (action === "WORK") return this.hand.actions.length === 3 ? this.now + this.site.handling(place) : Math.max(end, this.now);
+    if (action === "WORK") return !this.hand.isBegun ? this.now + this.site.handling(place) : Math.max(end, this.now);
     if (action === "TRAVEL" && from === to && !this.isRunning) return this.now + hopUs(this.site, step);
     if (action !== "TRAVEL" || from === to) return Math.max(end, this.now);
     const { speed_mm_s: v, acceleration_mm_s2: a } = this.site.carrier;
@@ -169,6 +178,11 @@ export class Robot extends Calls {
     const top = Math.min(v, Math.sqrt(a * mm + (speed * speed) / 2)) || 1;
     const ramps = (2 * top * top - speed * speed) / (2 * a);
     return Math.max(this.now, (this.drive.mode === "STANDING" ? this.now : this.driveUs) + Math.ceil(1e6 * ((2 * top - speed) / a + Math.max(0, mm - ramps) / top)));
+  }
+
+  get late() {
+    const [step] = this.steps;
+    return step && step === this.begun ? Math.max(0, this.#over(step) - step.end) : 0;
   }
 
   /** P9: it lasts longer, and what follows comes later. */
@@ -333,17 +347,23 @@ export class Robot extends Calls {
   #handle(step) {
     const { call, place, takes } = step;
     const keys = [stationKey(place), carKey(call.car)];
+    const [mark] = this.#line({ track: step.track, from: 0, to: step.to });
+    if (!this.hand.isBegun && Math.abs(mark.mm - this.drive.position_mm) > 5) {
+      this.#driveTo(mark);
+      return false;
+    }
     this.#stand();
     for (const key of keys) this.tokens.want(key);
     const isFull = [...this.cars].some(([car, one]) => one.station === place && car !== call.car);
-    if (!takes && isFull && this.hand.actions.length === 3) return this.#leaveElsewhere(step);
+    if (!takes && isFull && !this.hand.isBegun) return this.#leaveElsewhere(step);
     if (!keys.every((key) => this.tokens.holds(key))) return false;
     const { action, sequence } = this.shuttleOrder;
-    if (action && (this.shuttle.sequence !== sequence || this.shuttle.mode !== AFTER[action])) return false;
+    if (action ? this.shuttle.sequence !== sequence || this.shuttle.mode !== AFTER[action] : !RESTS.includes(this.shuttle.mode)) return false;
+    if (action) this.hand.actions = this.hand.actions.slice(1);
     if (this.hand.actions.length) {
       const side = place & 0x80 ? "FAR" : "NEAR";
       this.shuttleOrder = { sequence: (sequence % 255) + 1, action: this.hand.actions[0], side, wheelbase_mm: this.wheelbase(call) };
-      this.hand.actions = this.hand.actions.slice(1);
+      this.hand.isBegun = true;
       if (takes) this.tasks.get(call.task).phase = "BEGUN";
       this.save();
       this.tell("ShuttleOrder", this.shuttleOrder);
@@ -440,6 +460,7 @@ for (const line of lines()) {
   if (kind === "start") {
     const [setup, journal] = JSON.parse(line.slice(line.indexOf("[")));
     robot = new Robot(setup, journal);
+    FAULTS[setup.fault]?.(robot);
   }
   const bus = { fleet: "fleet", device: "device" }[kind];
   const frames = robot.step(Number(local), bus, Number(number), data && bus ? Buffer.from(data.slice(1), "hex") : undefined);
