@@ -39,8 +39,21 @@ from onboard.systems.mapd.auction import BidWeights
 from onboard.systems.mapd.site import Mapd
 from onboard.trace.durations import percentile
 
-#: By what robots bid: as they do, and with nothing for the way with the load.
-RULES = {"today": BidWeights(), "without-loaded": BidWeights(loaded=0)}
+
+@dataclass(frozen=True)
+class Rule:
+    """By what robots bid, and whether they go where the next call is near."""
+
+    bids: BidWeights
+    waits: bool
+
+
+#: The rule of the robots, the one before it, and that one with nothing for the way with the load.
+RULES = {
+    "negotiated": Rule(BidWeights(), waits=True),
+    "before": Rule(BidWeights(), waits=False),
+    "without-loaded": Rule(BidWeights(loaded=0), waits=False),
+}
 
 
 @dataclass(frozen=True)
@@ -191,7 +204,7 @@ class Played:
         return f"{self.times}{self.more}"
 
 
-def _play(site: Mapd, rule: BidWeights, *, on_bus: bool) -> Played:
+def _play(site: Mapd, rule: Rule, *, on_bus: bool) -> Played:
     began = time.process_time()
     if on_bus:
         return _on_the_bus(site, began)
@@ -199,8 +212,9 @@ def _play(site: Mapd, rule: BidWeights, *, on_bus: bool) -> Played:
     return Played(Times.of(site, day.served, time.process_time() - began))
 
 
-def _alone(site: Mapd, rule: BidWeights) -> SteppedDay:
-    return SteppedDay(site.floor, list(site.homes.values()), site.rests, site.tasks, rule).run()
+def _alone(site: Mapd, rule: Rule) -> SteppedDay:
+    homes, ends = list(site.homes.values()), site.endpoints
+    return SteppedDay(site.floor, homes, site.rests, site.tasks, rule.bids, ends, rule.waits).run()
 
 
 def _on_the_bus(site: Mapd, began: float) -> Played:
@@ -217,7 +231,7 @@ def _on_the_bus(site: Mapd, began: float) -> Played:
             begun_us.setdefault(one.step, time_us)
     longest_us = max(later - earlier for earlier, later in pairwise(begun_us.values()))
     statistics = played.run.fleet.statistics()
-    same = "as alone" if plant.served == _alone(site, BidWeights()).served else "NOT as alone"
+    same = "as alone" if plant.served == _alone(site, RULES["negotiated"]).served else "NOT as alone"
     loads = f"{100 * statistics.mean_load:.1f} % (worst second {100 * statistics.worst_second_load:.1f} %)"
     each_ms = 1000 * spent_s / len(begun_us) / len(site.homes)
     more = f"  {statistics.frames} frames, load {loads}, longest step {longest_us / 1e6:.2f} s"

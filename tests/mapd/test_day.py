@@ -28,7 +28,9 @@ def kiva(robots: int, rate: str) -> Mapd:
 
 
 def played(site: Mapd, tasks: Sequence[TransportTask] | None = None) -> SteppedDay:
-    return SteppedDay(site.floor, list(site.homes.values()), site.rests, site.tasks if tasks is None else tasks).run()
+    homes = list(site.homes.values())
+    tasks = site.tasks if tasks is None else tasks
+    return SteppedDay(site.floor, homes, site.rests, tasks, ends=site.endpoints).run()
 
 
 def judge(site: Mapd, day: SteppedDay, tasks: Sequence[TransportTask]) -> None:

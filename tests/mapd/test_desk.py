@@ -167,13 +167,37 @@ def test_a_bid_of_another_round_does_not_count(open_round: Counter, off: int) ->
     assert desk.awarded() == {}
 
 
-def test_a_robot_without_a_task_that_asks_for_it_gets_a_turn(open_round: Counter) -> None:
-    desk = open_round
+@pytest.mark.parametrize(("cell", "order"), [(FAR, [R2, R1]), (HOMES[R2], [R1, R2])])
+def test_who_makes_room_plans_before_who_has_won_and_who_only_waits_elsewhere_after(
+    cell: int, order: list[int]
+) -> None:
+    desk = Counter()
+    desk.senses(key())
+    desk.stand(0, R1)
+    desk.hears(StepState(R2, 0, cell, NO_TASK, False, False))
+    desk.hears(PathHead(R2, 0, cell, 0, 1, False))
+    while not desk.sent(StepRound):
+        desk.passes(STEP_US / 1e6, STEP_US)
     desk.hears(TurnRequest(R2, desk.opened().step, desk.opened().attempt))
     desk.bid(R1, 3, least(R1) + 10)
     desk.passes(3, STEP_US)
     turns = sorted({(one.index, one.robot, one.won) for one in desk.sent(StepTurn) if one.step == 0})
-    assert turns == [(0, R2, False), (1, R1, True)], "who makes room plans before who has won"
+    assert turns == [(at, robot, robot == R1) for at, robot in enumerate(order)]
+
+
+def test_a_robot_that_carries_makes_room_too_and_keeps_what_it_carries(open_round: Counter) -> None:
+    desk = open_round
+    desk.senses(key(4, pickup=35, delivery=12))
+    desk.bid(R1, 3, least(R1) + 10)
+    desk.passes(3, STEP_US)
+    desk.hears(PathHead(R1, 1, NEAR, 0, 2, False))
+    desk.hears(StepState(R1, 1, NEAR, 3, True, False))
+    desk.stand(1, R2)
+    while desk.opened().step == 0:
+        desk.passes(STEP_US / 1e6, STEP_US)
+    desk.hears(TurnRequest(R1, desk.opened().step, desk.opened().attempt))
+    desk.passes(3, STEP_US)
+    assert {(one.robot, one.won) for one in desk.sent(StepTurn) if one.step == 1} == {(R1, False)}
 
 
 def test_a_round_that_nobody_bids_in_is_closed_with_no_change(open_round: Counter) -> None:

@@ -44,7 +44,7 @@ class TransportDesk(Plain):
     turns: list[StepTurn] = field(default_factory=list)
     awards: list[Award] = field(default_factory=list)
     is_open: bool = False
-    #: Robots without a task that asked for a turn in this round.
+    #: Robots that asked for a turn in this round.
     yielding: set[int] = field(default_factory=set)
     #: Tasks that were ordered and not served, by number, with the step from which on they are to be called for.
     orders: dict[int, TransportTask] = field(default_factory=dict)
@@ -208,24 +208,31 @@ class TransportDesk(Plain):
                 won[robot] = call - 1, bid
         return won
 
-    def _close(self, now_us: int) -> list[Effect]:
-        """Everybody keeps what it bid best for; those for whom that is a change are told, and plan in this order.
+    def _order(self) -> list[tuple[int, int]]:
+        """Who plans, and for which task, first ones first: everybody keeps what it bid best for.
 
-        First who lost its task or must make room, then who won, lower bids first.
+        First who lost its task or must make room, then who won, lower bids first, then who only goes where it waits.
         """
         won = self._won()
-        changed = []
-        idle = []
+        first, then, last = [], [], []
         for robot in self.site.robots:
-            if robot in self.knowledge.loads:
-                continue
             before = self.knowledge.task_of(robot)
             task, bid = won.get(robot, (NO_TASK, 0))
-            if task not in (NO_TASK, before):
-                changed.append((bid, robot, task))
-            elif task == NO_TASK and (before != NO_TASK or robot in self.yielding):
-                idle.append((robot, NO_TASK))
-        order = idle + [(robot, task) for _, robot, task in sorted(changed)]
+            is_asking = robot in self.yielding
+            must_yield = is_asking and self.knowledge.is_in_the_way(robot, self.site.homes[robot])
+            if robot in self.knowledge.loads:
+                first += [(robot, NO_TASK)] if must_yield else []
+            elif task not in (NO_TASK, before):
+                then.append((bid, robot, task))
+            elif must_yield or task != before:
+                first.append((robot, task))
+            elif task == NO_TASK and is_asking:
+                last.append((robot, NO_TASK))
+        return first + [(robot, task) for _, robot, task in sorted(then)] + last
+
+    def _close(self, now_us: int) -> list[Effect]:
+        """Those for whom the round is a change are told, and plan in this order."""
+        order = self._order()
         me, step = self.fleet.node_id, self.step
         self.turns, self.awards = _told(me, step, order)
         self.is_open, self._close_us = False, None

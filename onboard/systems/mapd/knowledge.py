@@ -98,6 +98,20 @@ class Knowledge:
         cells = {task.delivery for task in self.tasks.values()}
         return cells | {task.pickup for task in self.open_tasks}
 
+    def is_in_the_way(self, robot: int, home: int) -> bool:
+        """Whether a robot's path ends where somebody has to pick up or deliver, and not at its ``home``."""
+        path = self.paths.by_robot.get(robot)
+        return path is not None and path.rest != home and path.rest in self.wanted_cells
+
+    def others(self, me: int, step: int) -> list[tuple[int, int, bool]]:
+        """Where all but one robot will be free: the cell, in how many steps, and whether each works until then."""
+        found = []
+        for robot, path in sorted(self.paths.by_robot.items()):
+            if robot != me:
+                works = self.task_of(robot) != NO_TASK
+                found.append((path.rest, max(0, path.end - step) if works else 0, works))
+        return found
+
     def forget_open(self) -> None:
         """Forget tasks that nobody has aboard: the desk says again which there are."""
         aboard = set(self.loads.values())
