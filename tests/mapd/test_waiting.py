@@ -43,5 +43,5 @@ def test_with_nothing_to_do_robots_come_to_rest() -> None:
     site = made(4, [(0, "1,2", "3,5"), (60, "3,2", "1,5")])
     run, plant = played(site)
     assert run.is_good
-    assert len({row for row in plant.history[45:60]}) == 1, "the last quarter of a minute nobody moves"
+    assert len(set(plant.history[45:60])) == 1, "the last quarter of a minute nobody moves"
     assert plant.history[50] != plant.history[0], "and not all are at home"
