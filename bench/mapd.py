@@ -51,8 +51,8 @@ class Rule:
 #: The rule of the robots, the one before it, and that one with nothing for the way with the load.
 RULES = {
     "negotiated": Rule(BidWeights(), waits=True),
-    "before": Rule(BidWeights(), waits=False),
-    "without-loaded": Rule(BidWeights(loaded=0), waits=False),
+    "before": Rule(BidWeights(younger=0), waits=False),
+    "without-loaded": Rule(BidWeights(loaded=0, younger=0), waits=False),
 }
 
 

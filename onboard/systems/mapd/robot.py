@@ -24,7 +24,7 @@ from onboard.core.authority import TokenKey
 from onboard.core.effects import Effect, Send
 from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import successor
-from onboard.systems.mapd.auction import Availability, BidWeights, cost
+from onboard.systems.mapd.auction import Availability, BidWeights, cost, oldest
 from onboard.systems.mapd.bidding import Round, UnitGeneration, bid_timing
 from onboard.systems.mapd.calls import mark_of
 from onboard.systems.mapd.driving import Driving
@@ -92,7 +92,7 @@ class UnitRobot(Plain):
         site = self.fleet.site
         assert isinstance(site, Mapd)
         self.site = site
-        self.knowledge = Knowledge(site.floor, site.robots, self.fleet.node_id)
+        self.knowledge = Knowledge(site.floor, site.robots, self.fleet.node_id, site.step_ms)
         self.driving = Driving(self.fleet, site, self.knowledge)
         self.turns = Turns(0)
         self._home = site.homes[self.fleet.node_id]
@@ -371,8 +371,9 @@ class UnitRobot(Plain):
 
     def _preferences(self) -> list[tuple[int, int]]:
         """What each open task would cost, cheapest first: the task-generation function of this system."""
-        offer = self._offer()
-        bids = ((cost(self.site.floor, self.rule, offer, task), task.number) for task in self.knowledge.open_tasks)
+        floor, offer, tasks = self.site.floor, self._offer(), self.knowledge.open_tasks
+        first = oldest(tasks)
+        bids = ((cost(floor, self.rule, offer, task, first), task.number) for task in tasks)
         return sorted((bid, number) for bid, number in bids if bid is not None)
 
     def _offer(self) -> Availability:
