@@ -9,7 +9,9 @@ from onboard.contract.codes import CallResult, KindCode, OrderResult, Reason
 from onboard.contract.mapd import PathHead, StepRound, StepState, StepTurn, TurnRequest
 from onboard.contract.mapd_device import TransportAnswer, TransportKey
 from onboard.contract.messages import Award, Bid, CallForProposals, SyncRequest
+from onboard.core.effects import Send
 from onboard.core.journal_records import Entry
+from onboard.systems.mapd.calls import CALL_AGAIN_US, CALLS_A_ROUND
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.knowledge import PLAIN
 from onboard.systems.mapd.site import Mapd
@@ -204,6 +206,33 @@ def test_a_round_that_nobody_bids_in_is_closed_with_no_change(open_round: Counte
     open_round.passes(3, STEP_US)
     assert open_round.awarded() == {}
     assert {(one.robot, one.won) for one in open_round.sent(StepTurn)} == {(0, False)}
+
+
+def test_many_tasks_at_once_are_called_for_round_by_round_oldest_first(desk: Counter) -> None:
+    desk.senses(*(key(number) for number in range(CALLS_A_ROUND + 30)))
+    desk.stand()
+    while not desk.sent(StepRound):
+        desk.passes(STEP_US / 1e6, STEP_US)
+    assert {one.task.number for one in desk.sent(CallForProposals)} == set(range(CALLS_A_ROUND))
+    assert desk.opened().open_tasks == CALLS_A_ROUND, "who counts others asks"
+    desk.passes(1, STEP_US)
+    desk.stand(1)
+    while desk.opened().step == 0:
+        desk.passes(STEP_US / 1e6, STEP_US)
+    assert {one.task.number for one in desk.sent(CallForProposals)} == set(range(CALLS_A_ROUND + 30))
+
+
+def test_however_many_ask_the_calls_take_a_part_of_the_bus_only(desk: Counter) -> None:
+    desk.senses(*(key(number) for number in range(CALLS_A_ROUND)))
+    desk.stand()
+    while not desk.sent(StepRound):
+        desk.passes(STEP_US / 1e6, STEP_US)
+    said = []
+    for at_us in range(10_000_000, 12_000_000, 200_000):
+        effects = desk.holon.behaviour.statements(at_us)
+        said.append(sum(isinstance(one, Send) and isinstance(one.message, CallForProposals) for one in effects))
+    each = CALL_AGAIN_US * CALLS_A_ROUND // 200_000 + 1
+    assert said == [CALLS_A_ROUND if not number % each else 0 for number in range(10)]
 
 
 # --- power-up ----------------------------------------------------------------------------------------------------

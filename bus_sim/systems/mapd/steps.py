@@ -5,9 +5,10 @@ others have published, in the order of the bids; then all move at once.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from onboard.systems.mapd.auction import Availability, BidWeights, TransportTask, winners
+from onboard.systems.mapd.calls import CALLS_A_ROUND
 from onboard.systems.mapd.floor import Floor
 from onboard.systems.mapd.paths import Path, Paths
 from onboard.systems.mapd.search import find_path
@@ -93,8 +94,11 @@ class SteppedDay:
 
     def _arrive(self) -> None:
         self.fresh, self._is_news = self._is_news, False
-        while self.waiting and self.waiting[-1].release <= self.step:
-            task = self.waiting.pop()
+        for _ in range(CALLS_A_ROUND):
+            if not self.waiting or self.waiting[-1].release > self.step:
+                break
+            # Others know only since when it is called for.
+            task = replace(self.waiting.pop(), release=self.step)
             self.open[task.number] = task
             self.fresh = True
         for robot in self.robots:

@@ -17,7 +17,15 @@ from onboard.core.journal_records import Entry, records_in
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.core.records import BootRecord
 from onboard.systems.mapd.auction import TransportTask
-from onboard.systems.mapd.calls import award_of, call_of, mark_of, number_of, terms_of
+from onboard.systems.mapd.calls import (
+    CALL_AGAIN_US,
+    CALLS_A_ROUND,
+    award_of,
+    call_of,
+    mark_of,
+    number_of,
+    terms_of,
+)
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.records import AwardsRecord, RoundRecord, ServedRecord, TransportRecord
@@ -53,6 +61,7 @@ class TransportDesk(Plain):
     _due_us: int = 0
     _changed: bool = True
     _told_us: int | None = None
+    _calls_told_us: int | None = None
     #: Since when robots are missed at the step to which all have to come.
     _missed_us: int | None = None
     _close_us: int | None = None
@@ -132,7 +141,10 @@ class TransportDesk(Plain):
         if self._told_us is not None and now_us < self._told_us + SAID_US:
             return []
         self._told_us = now_us
-        effects: list[Effect] = [self._call(task, now_us) for _, task in sorted(self.knowledge.tasks.items())]
+        effects: list[Effect] = []
+        if self._calls_told_us is None or now_us >= self._calls_told_us + CALL_AGAIN_US * len(self.knowledge.tasks):
+            self._calls_told_us = now_us
+            effects += [self._call(task, now_us) for _, task in sorted(self.knowledge.tasks.items())]
         if self.round is not None:
             effects.append(Send(self.round))
         return effects + [Send(word) for word in (*self.awards, *self.turns)]
@@ -180,6 +192,7 @@ class TransportDesk(Plain):
         """Call for what is due, and for bids where anything has changed or somebody has nothing to do."""
         fresh = [task for task in self.orders.values() if task.release <= self.step]
         fresh = [task for task in fresh if task.number not in self.knowledge.tasks]
+        fresh = sorted(fresh, key=lambda task: (task.release, task.number))[:CALLS_A_ROUND]
         for task in fresh:
             self.knowledge.tasks[task.number] = task
         idle = any(self.knowledge.task_of(robot) == NO_TASK for robot in self.site.robots)

@@ -26,7 +26,7 @@ from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import successor
 from onboard.systems.mapd.auction import Availability, BidWeights, cost, oldest
 from onboard.systems.mapd.bidding import Round, UnitGeneration, bid_timing
-from onboard.systems.mapd.calls import mark_of
+from onboard.systems.mapd.calls import CALL_AGAIN_US, mark_of
 from onboard.systems.mapd.driving import Driving
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.knowledge import Knowledge
@@ -293,8 +293,9 @@ class UnitRobot(Plain):
                 return self._tell(now_us)
             case StepDeed.ASK | StepDeed.ASK_TASKS:
                 asked = self._ask(missing, now_us)
-                if asked and deed is StepDeed.ASK_TASKS:
+                if asked and deed is StepDeed.ASK_TASKS and self.round is not None:
                     self.knowledge.forget_open()
+                    self._ask_us = now_us + ASK_US + 2 * CALL_AGAIN_US * self.round.open_tasks
                 return asked
             case StepDeed.BEGIN_BIDS:
                 return self._begin_bids(now_us)
