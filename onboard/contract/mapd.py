@@ -50,13 +50,16 @@ class StepTurn(Message):
     #: Node-ID of the robot, 0 where there are no changes. 0 to 250.
     robot: int
     #: Whether it has won a task: the Award that says which has the lowest 7 bits of the step as its task_version. If
-    #: not, it has none now. 0 to 1.
+    #: not, it has none now but what is aboard. 0 to 1.
     won: int
 
 
 @message(frozen=True, slots=True)
 class TurnRequest(Message):
-    """A robot without a task asks for a turn to plan: others need the place where it rests."""
+    """A robot asks for a turn to plan.
+
+    Others need the place where its path ends, or it has no task and would wait better elsewhere.
+    """
 
     #: The step. 0 to 4194303.
     step: int
@@ -79,7 +82,7 @@ class PathHead(Message):
     moves: int
     #: Grows by one with each path of the sender. 0 to 255.
     version: int
-    #: Whether the robot found no other path, keeps its former one and has no task.
+    #: Whether the robot found no other path, keeps its former one and has no task but what is aboard.
     kept: bool
 
 

@@ -14,7 +14,9 @@ from bus_sim.systems.mapd.published import TOKEN_PASSING
 from bus_sim.systems.mapd.steps import SteppedDay
 from onboard.config.site import parse_site
 from onboard.systems.mapd.auction import Availability, BidWeights, TransportTask, cost, winners
+from onboard.systems.mapd.calls import call_of
 from onboard.systems.mapd.floor import grid_floor
+from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.site import Mapd
 
 DATA = Path(bus_sim.__file__).parent / "data" / "mapd"
@@ -28,7 +30,9 @@ def kiva(robots: int, rate: str) -> Mapd:
 
 
 def played(site: Mapd, tasks: Sequence[TransportTask] | None = None) -> SteppedDay:
-    return SteppedDay(site.floor, list(site.homes.values()), site.rests, site.tasks if tasks is None else tasks).run()
+    homes = list(site.homes.values())
+    tasks = site.tasks if tasks is None else tasks
+    return SteppedDay(site.floor, homes, site.rests, tasks, ends=site.endpoints).run()
 
 
 def judge(site: Mapd, day: SteppedDay, tasks: Sequence[TransportTask]) -> None:
@@ -81,6 +85,26 @@ def test_short_work_comes_before_long_work_equally_far() -> None:
 def test_who_still_carries_bids_from_where_and_when_it_will_be_free() -> None:
     floor = grid_floor(["........."])
     assert cost(floor, BidWeights(), Availability(11, 4, 6), TransportTask(1, 0, 5, 4)) == 750
+
+
+def test_no_task_waits_for_ever_behind_new_ones_that_are_nearer() -> None:
+    floor = grid_floor(["." * 30])
+
+    def chosen(later: int) -> int:
+        tasks = [TransportTask(1, 5, 29, 0), TransportTask(2, 5 + later, 1, 2)]
+        return winners(floor, BidWeights(), [Availability(11, 0, 0)], tasks)[11][0].number
+
+    assert chosen(0) == 2
+    # 28 steps more to the pick-up and 28 more with the load, at 100 and 50, against 2 for each step.
+    assert (chosen(2099), chosen(2101)) == (2, 1)
+
+
+def test_on_the_bus_a_calls_deadline_tells_how_long_it_has_stood() -> None:
+    known = Knowledge(grid_floor(["." * 8]), (11,), 11, step_ms=500)
+    for number, until_us in ((4, 2_400_000), (9, 12_400_000), (2, 1_400_000)):
+        known.on_call(call_of(1, TransportTask(number, 0, 3, 5), until_us))
+    first = min(task.release for task in known.tasks.values())
+    assert {number: task.release - first for number, task in known.tasks.items()} == {4: 2, 9: 22, 2: 0}
 
 
 def test_a_task_that_nobody_can_reach_gets_no_bid() -> None:

@@ -9,7 +9,9 @@ from onboard.contract.codes import CallResult, KindCode, OrderResult, Reason
 from onboard.contract.mapd import PathHead, StepRound, StepState, StepTurn, TurnRequest
 from onboard.contract.mapd_device import TransportAnswer, TransportKey
 from onboard.contract.messages import Award, Bid, CallForProposals, SyncRequest
+from onboard.core.effects import Send
 from onboard.core.journal_records import Entry
+from onboard.systems.mapd.calls import CALL_AGAIN_US, CALLS_A_ROUND
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.knowledge import PLAIN
 from onboard.systems.mapd.site import Mapd
@@ -167,19 +169,70 @@ def test_a_bid_of_another_round_does_not_count(open_round: Counter, off: int) ->
     assert desk.awarded() == {}
 
 
-def test_a_robot_without_a_task_that_asks_for_it_gets_a_turn(open_round: Counter) -> None:
-    desk = open_round
+@pytest.mark.parametrize(("cell", "order"), [(FAR, [R2, R1]), (HOMES[R2], [R1, R2])])
+def test_who_makes_room_plans_before_who_has_won_and_who_only_waits_elsewhere_after(
+    cell: int, order: list[int]
+) -> None:
+    desk = Counter()
+    desk.senses(key())
+    desk.stand(0, R1)
+    desk.hears(StepState(R2, 0, cell, NO_TASK, False, False))
+    desk.hears(PathHead(R2, 0, cell, 0, 1, False))
+    while not desk.sent(StepRound):
+        desk.passes(STEP_US / 1e6, STEP_US)
     desk.hears(TurnRequest(R2, desk.opened().step, desk.opened().attempt))
     desk.bid(R1, 3, least(R1) + 10)
     desk.passes(3, STEP_US)
     turns = sorted({(one.index, one.robot, one.won) for one in desk.sent(StepTurn) if one.step == 0})
-    assert turns == [(0, R2, False), (1, R1, True)], "who makes room plans before who has won"
+    assert turns == [(at, robot, robot == R1) for at, robot in enumerate(order)]
+
+
+def test_a_robot_that_carries_makes_room_too_and_keeps_what_it_carries(open_round: Counter) -> None:
+    desk = open_round
+    desk.senses(key(4, pickup=35, delivery=12))
+    desk.bid(R1, 3, least(R1) + 10)
+    desk.passes(3, STEP_US)
+    desk.hears(PathHead(R1, 1, NEAR, 0, 2, False))
+    desk.hears(StepState(R1, 1, NEAR, 3, True, False))
+    desk.stand(1, R2)
+    while desk.opened().step == 0:
+        desk.passes(STEP_US / 1e6, STEP_US)
+    desk.hears(TurnRequest(R1, desk.opened().step, desk.opened().attempt))
+    desk.passes(3, STEP_US)
+    assert {(one.robot, one.won) for one in desk.sent(StepTurn) if one.step == 1} == {(R1, False)}
 
 
 def test_a_round_that_nobody_bids_in_is_closed_with_no_change(open_round: Counter) -> None:
     open_round.passes(3, STEP_US)
     assert open_round.awarded() == {}
     assert {(one.robot, one.won) for one in open_round.sent(StepTurn)} == {(0, False)}
+
+
+def test_many_tasks_at_once_are_called_for_round_by_round_oldest_first(desk: Counter) -> None:
+    desk.senses(*(key(number) for number in range(CALLS_A_ROUND + 30)))
+    desk.stand()
+    while not desk.sent(StepRound):
+        desk.passes(STEP_US / 1e6, STEP_US)
+    assert {one.task.number for one in desk.sent(CallForProposals)} == set(range(CALLS_A_ROUND))
+    assert desk.opened().open_tasks == CALLS_A_ROUND, "who counts others asks"
+    desk.passes(1, STEP_US)
+    desk.stand(1)
+    while desk.opened().step == 0:
+        desk.passes(STEP_US / 1e6, STEP_US)
+    assert {one.task.number for one in desk.sent(CallForProposals)} == set(range(CALLS_A_ROUND + 30))
+
+
+def test_however_many_ask_the_calls_take_a_part_of_the_bus_only(desk: Counter) -> None:
+    desk.senses(*(key(number) for number in range(CALLS_A_ROUND)))
+    desk.stand()
+    while not desk.sent(StepRound):
+        desk.passes(STEP_US / 1e6, STEP_US)
+    said = []
+    for at_us in range(10_000_000, 12_000_000, 200_000):
+        effects = desk.holon.behaviour.statements(at_us)
+        said.append(sum(isinstance(one, Send) and isinstance(one.message, CallForProposals) for one in effects))
+    each = CALL_AGAIN_US * CALLS_A_ROUND // 200_000 + 1
+    assert said == [CALLS_A_ROUND if not number % each else 0 for number in range(10)]
 
 
 # --- power-up ----------------------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ from tests.wire.samples import frames_of, message_of, random_value
 
 
 def without_bus(site: Mapd) -> SteppedDay:
-    return SteppedDay(site.floor, list(site.homes.values()), site.rests, site.tasks).run()
+    return SteppedDay(site.floor, list(site.homes.values()), site.rests, site.tasks, ends=site.endpoints).run()
 
 
 @pytest.mark.parametrize(("robots", "seed"), [(1, 1), (4, 2), (6, 3)])

@@ -140,8 +140,8 @@ class Expected:
                     self.has_planned = True
                     said.append("plans")
                 case StepDeed.DRIVE:
-                    # Without a task it stays at home, and is in its next cell at once.
-                    if self.words.has_won and self.has_planned:
+                    # Without a turn it stays at home, and is in its next cell at once.
+                    if self.has_planned:
                         return said
                     self.has_arrived = True
                 case StepDeed.NEXT_STEP:

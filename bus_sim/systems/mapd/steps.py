@@ -5,12 +5,14 @@ others have published, in the order of the bids; then all move at once.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from onboard.systems.mapd.auction import Availability, BidWeights, TransportTask, winners
+from onboard.systems.mapd.calls import CALLS_A_ROUND
 from onboard.systems.mapd.floor import Floor
 from onboard.systems.mapd.paths import Path, Paths
 from onboard.systems.mapd.search import find_path
+from onboard.systems.mapd.waiting import WaitingPlaces
 
 
 @dataclass
@@ -29,7 +31,7 @@ class SteppedDay:
     """A day's work: ``run`` plays it. ``served`` is the step at which each task was delivered, by number.
 
     ``searches`` were made, and in ``failures`` of them a robot kept its former path. ``rests`` are where robots may
-    stay.
+    stay, ``ends`` where tasks begin and end. Without ``waits`` robots wait where they end, and who works makes no room.
     """
 
     floor: Floor
@@ -37,6 +39,8 @@ class SteppedDay:
     rests: frozenset[int]
     tasks: Sequence[TransportTask]
     rule: BidWeights = field(default_factory=BidWeights)
+    ends: Sequence[int] = ()
+    waits: bool = True
     step: int = 0
     served: dict[int, int] = field(default_factory=dict)
     searches: int = 0
@@ -52,6 +56,8 @@ class SteppedDay:
         self.waiting = sorted(self.tasks, key=lambda task: (task.release, task.number))[::-1]
         self.open: dict[int, TransportTask] = {}
         self.fresh = False
+        self._working: set[int] = set()
+        self._waiting = [WaitingPlaces(self.floor, self.ends) for _ in self.robots]
         # Whether somebody who planned right at its pick-up took the goods: the others see that in the next step.
         self._is_news = False
         self.history.append(tuple(self.homes))
@@ -88,8 +94,11 @@ class SteppedDay:
 
     def _arrive(self) -> None:
         self.fresh, self._is_news = self._is_news, False
-        while self.waiting and self.waiting[-1].release <= self.step:
-            task = self.waiting.pop()
+        for _ in range(CALLS_A_ROUND):
+            if not self.waiting or self.waiting[-1].release > self.step:
+                break
+            # Others know only since when it is called for.
+            task = replace(self.waiting.pop(), release=self.step)
             self.open[task.number] = task
             self.fresh = True
         for robot in self.robots:
@@ -115,48 +124,92 @@ class SteppedDay:
     def _decide(self) -> None:
         if not self.fresh and all(robot.task for robot in self.robots):
             return
+        # By their words on this step, as on the bus.
+        self._working = {robot.number for robot in self.robots if robot.task is not None}
+        asking = {robot.number for robot in self.robots if self._wants_turn(robot)}
         won = winners(self.floor, self.rule, [self._offer(one) for one in self.robots], list(self.open.values()))
-        changed = []
+        first: list[tuple[SteppingRobot, TransportTask | None]] = []
+        then: list[tuple[int, int, TransportTask]] = []
+        last: list[SteppingRobot] = []
         for robot in self.robots:
             task, bid = won.get(robot.number, (None, 0))
-            if not robot.loaded and task != robot.task:
-                changed.append((bid, robot.number))
-                robot.task = None
-        lost = {number for _, number in changed if number not in won}
-        for robot in self.robots:
-            if robot.task is None and robot.number not in won and (robot.number in lost or self._must_yield(robot)):
-                self._plan(robot, None)
-        for _, number in sorted(changed):
-            if number in won:
-                self._plan(self.robots[number], won[number][0])
+            must_yield = robot.number in asking and self._is_in_the_way(robot)
+            if robot.loaded:
+                first += [(robot, None)] if must_yield else []
+            elif task is not None and task != robot.task:
+                then.append((bid, robot.number, task))
+            elif must_yield or task != robot.task:
+                first.append((robot, task))
+            elif task is None and robot.number in asking:
+                last.append(robot)
+        for one, same in first:
+            self._plan(one, same)
+        for _, number, task in sorted(then, key=lambda turn: turn[:2]):
+            self._plan(self.robots[number], task)
+        for robot in last:
+            self._plan(robot, None)
 
-    def _must_yield(self, robot: SteppingRobot) -> bool:
-        return self.paths.by_robot[robot.number].rest not in self._rests(robot)
+    def _is_in_the_way(self, robot: SteppingRobot) -> bool:
+        rest = self.paths.by_robot[robot.number].rest
+        return rest != robot.home and rest in self._wanted
+
+    def _wants_turn(self, robot: SteppingRobot) -> bool:
+        path = self.paths.by_robot[robot.number]
+        if robot.task is not None:
+            return self.waits and self._is_in_the_way(robot)
+        return path.rest not in self._rests(robot) or (self.waits and self._waits_better(robot, path) is not None)
+
+    def _waits_better(self, robot: SteppingRobot, path: Path) -> int | None:
+        others = []
+        for one in self.robots:
+            if one is not robot:
+                its, works = self.paths.by_robot[one.number], one.number in self._working
+                others.append((its.rest, max(0, its.end - self.step) if works else 0, works))
+        return self._waiting[robot.number].better(path.rest, others, self._rests(robot))
+
+    @property
+    def _wanted(self) -> set[int]:
+        """Where somebody has to pick up or deliver."""
+        wanted = {cell for task in self.open.values() for cell in (task.pickup, task.delivery)}
+        return wanted | {one.task.delivery for one in self.robots if one.loaded and one.task is not None}
 
     def _rests(self, robot: SteppingRobot) -> frozenset[int]:
         """Where it may end: not in others' homes, nor where somebody has to pick up or deliver; its home always."""
-        wanted = {cell for task in self.open.values() for cell in (task.pickup, task.delivery)}
-        wanted.update(one.task.delivery for one in self.robots if one.task is not None)
-        return (self.rests - wanted - set(self.homes)) | {robot.home}
+        return (self.rests - self._wanted - set(self.homes)) | {robot.home}
+
+    def _ends(self, robot: SteppingRobot, old: Path, task: TransportTask | None) -> frozenset[int]:
+        rests = self._rests(robot)
+        if not self.waits or task is not None or robot.task is not None or old.rest not in rests:
+            return rests
+        better = self._waits_better(robot, old)
+        return frozenset((old.rest if better is None else better,))
 
     def _plan(self, robot: SteppingRobot, task: TransportTask | None) -> None:
-        """A path for a task, or to a rest; where there is none the robot keeps its former path and has no task."""
-        old = self.paths.take(robot.number)
-        assert old is not None
-        goals = () if task is None else (task.pickup, task.delivery)
+        """A path for a task, for what is aboard, or to a rest; where there is none it keeps its former path.
+
+        Then it has no task but what is aboard.
+        """
+        old = self.paths.by_robot[robot.number]
+        ends = self._ends(robot, old, task)
+        self.paths.take(robot.number)
+        aboard = robot.task if robot.loaded else None
+        goals: tuple[int, ...] = () if task is None else (task.pickup, task.delivery)
+        if aboard is not None:
+            task, goals = aboard, (aboard.delivery,)
         self.searches += 1
-        path = find_path(self.floor, self.paths, old.at(self.step), self.step, goals, self._rests(robot))
+        path = find_path(self.floor, self.paths, old.at(self.step), self.step, goals, ends)
         if path is None:
             self.failures += 1
             rest_of_old = tuple(old.at(step) for step in range(self.step, max(old.end, self.step) + 1))
             self.paths.put(robot.number, Path(self.step, rest_of_old))
+            robot.task = aboard
             return
         self.paths.put(robot.number, path)
         robot.task = task
         if task is not None:
-            picked = next(step for step, cell in path.steps() if cell == task.pickup)
-            robot.free_at = next(step for step, cell in path.steps() if cell == task.delivery and step >= picked)
-            if picked == self.step:
+            first = next(step for step, cell in path.steps() if cell == goals[0])
+            robot.free_at = next(step for step, cell in path.steps() if cell == task.delivery and step >= first)
+            if not robot.loaded and first == self.step:
                 self._pick_up(robot, task)
                 self._is_news = True
 

@@ -5,7 +5,7 @@ untouched tasks) and also while it still carries something (it then counts from 
 lowest bid of all wins first: it is the one that speaks soonest (design, section 4), and its robot then falls silent.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from onboard.systems.mapd.floor import Floor
@@ -38,19 +38,27 @@ class BidWeights:
     wait: int = 100
     empty: int = 100
     loaded: int = 50
+    #: For each step that a task is younger than the oldest that is open: what is added to no other can wait for ever.
+    younger: int = 2
 
 
-def cost(floor: Floor, rule: BidWeights, offer: Availability, task: TransportTask) -> int | None:
-    """The bid for one task; None where no way leads.
+def oldest(tasks: Iterable[TransportTask]) -> int:
+    """The first release of open tasks, 0 where there are none."""
+    return min((task.release for task in tasks), default=0)
+
+
+def cost(floor: Floor, rule: BidWeights, offer: Availability, task: TransportTask, first: int = 0) -> int | None:
+    """The bid for one task, ``first`` being the release of the oldest that is open; None where no way leads.
 
     Steps until the robot is free, steps to the pick-up and steps with the load: by the added service time of all who
-    wait, the shortest work goes first (Smith's rule, 1956).
+    wait, the shortest work goes first (Smith's rule, 1956). Whatever comes later counts as farther by ``younger`` a
+    step: after so many steps no new task is before an old one.
     """
     empty = floor.steps_to(task.pickup)[offer.cell]
     loaded = floor.steps_to(task.delivery)[task.pickup]
     if empty >= FAR or loaded >= FAR:
         return None
-    return rule.wait * offer.steps + rule.empty * empty + rule.loaded * loaded
+    return rule.wait * offer.steps + rule.empty * empty + rule.loaded * loaded + rule.younger * (task.release - first)
 
 
 def winners(
@@ -59,10 +67,11 @@ def winners(
     """Task and bid that each robot wins, by robot: lowest bid first, then lower robot, then lower task."""
     bids: dict[int, list[tuple[int, int, int]]] = {}
     by_number: Mapping[int, TransportTask] = {task.number: task for task in tasks}
+    first = oldest(tasks)
     for offer in offers:
         own = []
         for task in tasks:
-            bid = cost(floor, rule, offer, task)
+            bid = cost(floor, rule, offer, task, first)
             if bid is not None:
                 own.append((bid, task.number))
         own.sort(reverse=True)

@@ -9,6 +9,11 @@ from onboard.systems.mapd.auction import TransportTask
 
 #: Bits of a round in a bid, and of a step in an award (dbc/fleet.dbc: itinerary_version, task_version).
 _ROUND, _STEP = 0xFF, 0x7F
+#: So many tasks are called for in one round, oldest first: three frames each, a tenth of a second at 500 kbit/s.
+CALLS_A_ROUND = 100
+#: All calls that stand are said again, for whoever asks, at most once in so long for each of them, us: a fifth of the
+#: bus at 500 kbit/s. Said for each who asks, those of a great floor filled the bus, and all missed something for ever.
+CALL_AGAIN_US = 5_000
 #: Rounds of one step that is opened again differ by this (dbc/mapd.dbc).
 _ATTEMPT = 61
 

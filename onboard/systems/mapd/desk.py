@@ -17,7 +17,15 @@ from onboard.core.journal_records import Entry, records_in
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.core.records import BootRecord
 from onboard.systems.mapd.auction import TransportTask
-from onboard.systems.mapd.calls import award_of, call_of, mark_of, number_of, terms_of
+from onboard.systems.mapd.calls import (
+    CALL_AGAIN_US,
+    CALLS_A_ROUND,
+    award_of,
+    call_of,
+    mark_of,
+    number_of,
+    terms_of,
+)
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.records import AwardsRecord, RoundRecord, ServedRecord, TransportRecord
@@ -44,7 +52,7 @@ class TransportDesk(Plain):
     turns: list[StepTurn] = field(default_factory=list)
     awards: list[Award] = field(default_factory=list)
     is_open: bool = False
-    #: Robots without a task that asked for a turn in this round.
+    #: Robots that asked for a turn in this round.
     yielding: set[int] = field(default_factory=set)
     #: Tasks that were ordered and not served, by number, with the step from which on they are to be called for.
     orders: dict[int, TransportTask] = field(default_factory=dict)
@@ -53,6 +61,7 @@ class TransportDesk(Plain):
     _due_us: int = 0
     _changed: bool = True
     _told_us: int | None = None
+    _calls_told_us: int | None = None
     #: Since when robots are missed at the step to which all have to come.
     _missed_us: int | None = None
     _close_us: int | None = None
@@ -132,7 +141,10 @@ class TransportDesk(Plain):
         if self._told_us is not None and now_us < self._told_us + SAID_US:
             return []
         self._told_us = now_us
-        effects: list[Effect] = [self._call(task, now_us) for _, task in sorted(self.knowledge.tasks.items())]
+        effects: list[Effect] = []
+        if self._calls_told_us is None or now_us >= self._calls_told_us + CALL_AGAIN_US * len(self.knowledge.tasks):
+            self._calls_told_us = now_us
+            effects += [self._call(task, now_us) for _, task in sorted(self.knowledge.tasks.items())]
         if self.round is not None:
             effects.append(Send(self.round))
         return effects + [Send(word) for word in (*self.awards, *self.turns)]
@@ -180,6 +192,7 @@ class TransportDesk(Plain):
         """Call for what is due, and for bids where anything has changed or somebody has nothing to do."""
         fresh = [task for task in self.orders.values() if task.release <= self.step]
         fresh = [task for task in fresh if task.number not in self.knowledge.tasks]
+        fresh = sorted(fresh, key=lambda task: (task.release, task.number))[:CALLS_A_ROUND]
         for task in fresh:
             self.knowledge.tasks[task.number] = task
         idle = any(self.knowledge.task_of(robot) == NO_TASK for robot in self.site.robots)
@@ -208,24 +221,31 @@ class TransportDesk(Plain):
                 won[robot] = call - 1, bid
         return won
 
-    def _close(self, now_us: int) -> list[Effect]:
-        """Everybody keeps what it bid best for; those for whom that is a change are told, and plan in this order.
+    def _order(self) -> list[tuple[int, int]]:
+        """Who plans, and for which task, first ones first: everybody keeps what it bid best for.
 
-        First who lost its task or must make room, then who won, lower bids first.
+        First who lost its task or must make room, then who won, lower bids first, then who only goes where it waits.
         """
         won = self._won()
-        changed = []
-        idle = []
+        first, then, last = [], [], []
         for robot in self.site.robots:
-            if robot in self.knowledge.loads:
-                continue
             before = self.knowledge.task_of(robot)
             task, bid = won.get(robot, (NO_TASK, 0))
-            if task not in (NO_TASK, before):
-                changed.append((bid, robot, task))
-            elif task == NO_TASK and (before != NO_TASK or robot in self.yielding):
-                idle.append((robot, NO_TASK))
-        order = idle + [(robot, task) for _, robot, task in sorted(changed)]
+            is_asking = robot in self.yielding
+            must_yield = is_asking and self.knowledge.is_in_the_way(robot, self.site.homes[robot])
+            if robot in self.knowledge.loads:
+                first += [(robot, NO_TASK)] if must_yield else []
+            elif task not in (NO_TASK, before):
+                then.append((bid, robot, task))
+            elif must_yield or task != before:
+                first.append((robot, task))
+            elif task == NO_TASK and is_asking:
+                last.append((robot, NO_TASK))
+        return first + [(robot, task) for _, robot, task in sorted(then)] + last
+
+    def _close(self, now_us: int) -> list[Effect]:
+        """Those for whom the round is a change are told, and plan in this order."""
+        order = self._order()
         me, step = self.fleet.node_id, self.step
         self.turns, self.awards = _told(me, step, order)
         self.is_open, self._close_us = False, None

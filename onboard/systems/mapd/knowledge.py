@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from onboard.contract.mapd import PathHead, PathMoves, StepState
 from onboard.contract.messages import Bid, CallForProposals
-from onboard.core.serial import is_newer
+from onboard.core.serial import is_newer, ms_after
 from onboard.systems.mapd.auction import BidWeights, TransportTask
 from onboard.systems.mapd.calls import task_of
 from onboard.systems.mapd.fields import NO_TASK
@@ -30,6 +30,8 @@ class Knowledge:
     floor: Floor
     robots: tuple[int, ...]
     me: int
+    #: Length of a step, ms: a call's deadline tells by it when its task was released.
+    step_ms: int = 1_000
     states: dict[int, StepState] = field(default_factory=dict)
     tasks: dict[int, TransportTask] = field(default_factory=dict)
     calls: dict[int, CallForProposals] = field(default_factory=dict)
@@ -52,8 +54,19 @@ class Knowledge:
         """A task is called for, or told again."""
         number, cells = call.task.number, (call.from_station, call.to_station)
         if max(cells) < self.floor.size:
-            self.tasks.setdefault(number, TransportTask(number, 0, *cells))
+            self.tasks.setdefault(number, TransportTask(number, self._release(call), *cells))
             self.calls[number] = call
+
+    def _release(self, call: CallForProposals) -> int:
+        """The step of a call's first round by bus time, counted from that of any other call that stands.
+
+        All hear the same deadlines, also who was started again: all know alike which has waited how much longer.
+        """
+        known = next((number for number in self.calls if number in self.tasks), None)
+        if known is None:
+            return 0
+        later_ms = ms_after(call.deadline_ms, self.calls[known].deadline_ms)
+        return self.tasks[known].release + round(later_ms / self.step_ms)
 
     def on_state(self, state: StepState) -> bool:
         """A robot's word; True where it is news."""
@@ -97,6 +110,20 @@ class Knowledge:
         """Where somebody has to pick up or deliver."""
         cells = {task.delivery for task in self.tasks.values()}
         return cells | {task.pickup for task in self.open_tasks}
+
+    def is_in_the_way(self, robot: int, home: int) -> bool:
+        """Whether a robot's path ends where somebody has to pick up or deliver, and not at its ``home``."""
+        path = self.paths.by_robot.get(robot)
+        return path is not None and path.rest != home and path.rest in self.wanted_cells
+
+    def others(self, me: int, step: int) -> list[tuple[int, int, bool]]:
+        """Where all but one robot will be free: the cell, in how many steps, and whether each works until then."""
+        found = []
+        for robot, path in sorted(self.paths.by_robot.items()):
+            if robot != me:
+                works = self.task_of(robot) != NO_TASK
+                found.append((path.rest, max(0, path.end - step) if works else 0, works))
+        return found
 
     def forget_open(self) -> None:
         """Forget tasks that nobody has aboard: the desk says again which there are."""

@@ -24,9 +24,9 @@ from onboard.core.authority import TokenKey
 from onboard.core.effects import Effect, Send
 from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import successor
-from onboard.systems.mapd.auction import Availability, BidWeights, cost
+from onboard.systems.mapd.auction import Availability, BidWeights, cost, oldest
 from onboard.systems.mapd.bidding import Round, UnitGeneration, bid_timing
-from onboard.systems.mapd.calls import mark_of
+from onboard.systems.mapd.calls import CALL_AGAIN_US, mark_of
 from onboard.systems.mapd.driving import Driving
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.knowledge import Knowledge
@@ -37,6 +37,7 @@ from onboard.systems.mapd.search import find_path
 from onboard.systems.mapd.site import Mapd
 from onboard.systems.mapd.steps import LAST, STEP_TABLE, GridStepPhase, StepDeed, StepFinding
 from onboard.systems.mapd.turns import Turns
+from onboard.systems.mapd.waiting import WaitingPlaces
 from onboard.work.plain import Plain
 
 #: Whoever is missed is asked this long after everything else was there, and again after as long, us: a lost frame costs
@@ -91,10 +92,11 @@ class UnitRobot(Plain):
         site = self.fleet.site
         assert isinstance(site, Mapd)
         self.site = site
-        self.knowledge = Knowledge(site.floor, site.robots, self.fleet.node_id)
+        self.knowledge = Knowledge(site.floor, site.robots, self.fleet.node_id, site.step_ms)
         self.driving = Driving(self.fleet, site, self.knowledge)
         self.turns = Turns(0)
         self._home = site.homes[self.fleet.node_id]
+        self._waiting = WaitingPlaces(site.floor, site.endpoints)
         dealing = self.fleet.negotiation
         dealing.timing, dealing.slot = bid_timing(site.timing, site.bid_window_us), ANY_TIME
         dealing.stands = lambda call: call.sender == site.desk
@@ -291,8 +293,9 @@ class UnitRobot(Plain):
                 return self._tell(now_us)
             case StepDeed.ASK | StepDeed.ASK_TASKS:
                 asked = self._ask(missing, now_us)
-                if asked and deed is StepDeed.ASK_TASKS:
+                if asked and deed is StepDeed.ASK_TASKS and self.round is not None:
                     self.knowledge.forget_open()
+                    self._ask_us = now_us + ASK_US + 2 * CALL_AGAIN_US * self.round.open_tasks
                 return asked
             case StepDeed.BEGIN_BIDS:
                 return self._begin_bids(now_us)
@@ -321,7 +324,7 @@ class UnitRobot(Plain):
         return [Send(self._said)]
 
     def _begin_bids(self, now_us: int) -> list[Effect]:
-        """What each open task would cost; whoever must make room for others' ends says so."""
+        """What each open task would cost; who is to make room for others' ends, or waits elsewhere better, says so."""
         assert self.round is not None
         preferences = self._preferences()
         self.generation.costs, self.generation.mark = {task: bid for bid, task in preferences}, mark_of(self.round)
@@ -330,7 +333,7 @@ class UnitRobot(Plain):
         for heard in self._heard_bids:
             self._bids.hear(heard)
         self._ask_us = now_us + self.site.bid_window_us + ASK_US
-        return [Send(TurnRequest(self.fleet.node_id, self.step, self.round.attempt))] if self._must_yield() else []
+        return [Send(TurnRequest(self.fleet.node_id, self.step, self.round.attempt))] if self._wants_turn() else []
 
     def _drive(self, now_us: int) -> list[Effect]:
         """Go on by the path; a task may be delivered on the way."""
@@ -369,8 +372,9 @@ class UnitRobot(Plain):
 
     def _preferences(self) -> list[tuple[int, int]]:
         """What each open task would cost, cheapest first: the task-generation function of this system."""
-        offer = self._offer()
-        bids = ((cost(self.site.floor, self.rule, offer, task), task.number) for task in self.knowledge.open_tasks)
+        floor, offer, tasks = self.site.floor, self._offer(), self.knowledge.open_tasks
+        first = oldest(tasks)
+        bids = ((cost(floor, self.rule, offer, task, first), task.number) for task in tasks)
         return sorted((bid, number) for bid, number in bids if bid is not None)
 
     def _offer(self) -> Availability:
@@ -388,21 +392,44 @@ class UnitRobot(Plain):
         others = self.knowledge.wanted_cells | set(self.site.homes.values())
         return (self.site.rests - others) | {self._home}
 
-    def _must_yield(self) -> bool:
+    def _wants_turn(self) -> bool:
         path = self.knowledge.paths.by_robot[self.fleet.node_id]
-        return self.task == NO_TASK and path.rest not in self._rests()
+        if self.task != NO_TASK:
+            return self.knowledge.is_in_the_way(self.fleet.node_id, self._home)
+        return path.rest not in self._rests() or self._waits_better(path) is not None
+
+    def _waits_better(self, path: Path) -> int | None:
+        """Where it would wait better than at the end of its path."""
+        others = self.knowledge.others(self.fleet.node_id, self.step)
+        return self._waiting.better(path.rest, others, self._rests())
+
+    def _ends(self, old: Path, number: int) -> frozenset[int]:
+        """Where its new path may end: without a task, that is not in the way, where it waits best."""
+        rests = self._rests()
+        if number != NO_TASK or self.task != NO_TASK or old.rest not in rests:
+            return rests
+        better = self._waits_better(old)
+        return frozenset((old.rest if better is None else better,))
+
+    def _goals(self, number: int) -> tuple[int, ...]:
+        """What its new path leads through: that of the task that it won, or what is left of the one aboard."""
+        won, aboard = self.knowledge.tasks.get(number), self.knowledge.tasks.get(self.task)
+        if self._is_loaded and aboard is not None:
+            return (aboard.delivery,)
+        return () if won is None else (won.pickup, won.delivery)
 
     def _plan(self, number: int) -> list[Effect]:
-        """A path for a task, or to a rest; where there is none the former path stays, and it has no task."""
+        """A path for a task, or to a rest; where there is none the former path stays, and only what is aboard."""
         me, paths = self.fleet.node_id, self.knowledge.paths
-        old, task = paths.by_robot[me], self.knowledge.tasks.get(number)
+        old, goals = paths.by_robot[me], self._goals(number)
+        ends = self._ends(old, number)
         paths.take(me)
-        goals = () if task is None else (task.pickup, task.delivery)
         self.searches += 1
-        found = find_path(self.site.floor, paths, old.at(self.step), self.step, goals, self._rests())
+        found = find_path(self.site.floor, paths, old.at(self.step), self.step, goals, ends)
         self.failures += found is None
         path = found or Path(self.step, tuple(old.at(step) for step in range(self.step, max(old.end, self.step) + 1)))
-        self.task = NO_TASK if found is None or task is None else number
+        if not self._is_loaded:
+            self.task = NO_TASK if found is None or not goals else number
         version = successor(self._head.version if self._head is not None else 0, 8)
         self.knowledge.put(self._head_of(path, version, kept=found is None), path)
         self._note_taken(me)

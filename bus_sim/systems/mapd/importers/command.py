@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from math import isqrt
 from pathlib import Path
 
 from bus_sim.systems.mapd.importers.draft import Draft, site_text
@@ -11,6 +12,10 @@ from onboard.bounded_file import MOST_EXPORT
 from onboard.config.files import read_text
 from onboard.config.problems import ConfigError, Problems
 from onboard.config.site import parse_site
+from onboard.holon.witness import AGAIN_US
+
+#: A question with what arbitration and stuffing make of it, as measured: 294 us at 500 kbit/s.
+QUESTION_BITS = 147
 
 _KINDS = "a map (.map, with a .task file or without), an openTCS model (.xml) or an Open-RMF building (.yaml)"
 
@@ -26,6 +31,15 @@ def add_import(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     one.add_argument("--seed", type=int, default=1, help="seed of everything that is drawn (default: 1)")
 
 
+def most_machines(bitrate: int) -> int:
+    """So many can start together: all ask all (``onboard.holon.witness``), which must be over before they ask again.
+
+    More of them fill the bus with questions that are asked again and again, and no step begins (docs/figures.md).
+    """
+    frames = bitrate * AGAIN_US // 1_000_000 // QUESTION_BITS
+    return isqrt(frames)
+
+
 def _positive(text: str) -> int:
     number = int(text)
     if not 1 <= number <= 10_000:
@@ -38,6 +52,12 @@ def run_import(args: argparse.Namespace) -> int:
     draft = import_files(args.files, DrawnDemand(args.robots, args.tasks, args.every, args.seed))
     text = site_text(draft)
     site = parse_site(text, str(args.output))
+    problems = Problems(str(args.files[0]))
+    most = most_machines(site.bitrate)
+    if len(site.machines) > most:
+        what = f"{len(site.machines)} machines with the desk, whose start fills a bus of {site.bitrate} bit/s"
+        problems.add(0, "robots", len(site.machines) - 1, what, f"import at most {most - 1} of them (--robots)")
+        problems.raise_if_any()
     problems = Problems(str(args.output))
     half = args.output.with_name(f".{args.output.name}.new")
     try:
