@@ -83,7 +83,7 @@ def _place(stage: Stage, since_us: int) -> Play:
     is_stand = leg is not None and len(told.legs) == 1 and leg.action is LegAction.STAND
     is_here = leg is not None and (leg.track, leg.from_index) == here and leg.to_index == leg.from_index
     stage.judge("stands-by-one-leg", is_stand and is_here, "another plan than one STAND leg where it is", place, plan)
-    stamp, now_ms = told.stamp, stage.bus_ms(plan.time_us - stage.begin_us + 60 * SECOND)
+    stamp, now_ms = told.stamp, stage.bus_ms(stage.bus_us_at(plan.time_us))
     is_now = abs((now_ms - stamp.award_ms + 2**31) % 2**32 - 2**31) <= 100
     is_own = (stamp.initiator, stamp.call) == (stage.node, 0)
     stage.judge("stands-under-own-stamp", is_now and is_own, f"stamp {stamp}, bus time {now_ms} ms", plan)
@@ -214,7 +214,7 @@ def digests(stage: Stage, cast: Cast) -> Play:
     part.digest_error = 0
     yield from stage.pause(5.0)
     begin_us, before = stage.now_us, part.boot
-    part.boot += 1
+    part.lives_anew()
     part.state = MachineState.STARTING
     cast.beat(part)
     asks = yield from stage.hears(SyncRequest, lambda one: one.whom == stage.other, 2.0)

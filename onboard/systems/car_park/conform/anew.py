@@ -57,7 +57,7 @@ def memory(stage: Stage, cast: Cast) -> Play:
         cast.tokens[key] = (caller, version)
     stage.say(TokenGrant(other, *given, versions[given] + 1, caller))
     yield from stage.pause(3.0)
-    part.boot += 1
+    part.lives_anew()
     part.state = MachineState.STARTING
     begin_us = stage.now_us
     part.answers = False
@@ -99,7 +99,7 @@ def _newcomer(stage: Stage, cast: Cast) -> Play:
         yield from stage.pause(9.0)
         part.is_there = True
         begin_us = stage.now_us
-        part.boot += 1
+        part.lives_anew()
         cast.beat(part)
         if answers:
             yield from stage.pause(0.1)

@@ -6,7 +6,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from onboard.conform.cast import Cast
-from onboard.conform.stage import SECOND, Play, Stage
+from onboard.conform.stage import SECOND, Play, Stage, after_ms
 from onboard.contract.codes import Grade, LegAction, Side, TokenKind
 from onboard.contract.messages import Itinerary, Leg, Progress, Stamp, TokenGrant, TokenHeld, TokenRequest
 from onboard.core.site import Segment
@@ -18,7 +18,7 @@ _MEETS_MS = 10 + 90
 
 
 class Window(NamedTuple):
-    """When a plan is in a segment, bus time in ms since the play's own zero."""
+    """When a plan is in a segment, bus time in ms by the round nearest to now."""
 
     segment: Segment
     from_ms: int
@@ -119,7 +119,7 @@ class Rival:
 
     def _follow(self) -> None:
         plan, now_ms = self.plan, self.stage.bus_ms()
-        number = sum(1 for leg in plan.legs if (now_ms - leg.end_ms + 2**31) % 2**32 >= 2**31)
+        number = sum(1 for leg in plan.legs if after_ms(now_ms, leg.end_ms) >= 0)
         leg = plan.legs[min(number, len(plan.legs) - 1)]
         is_over = number == len(plan.legs)
         at = Segment(leg.track, leg.to_index if is_over or leg.action is LegAction.WORK else leg.from_index)
@@ -161,10 +161,11 @@ class Rival:
 def windows(desk: Desk, plan: Itinerary) -> list[Window]:
     """When it is in which segment, at the least; the last one has no end."""
     found: list[Window] = []
-    begin_ms = plan.stamp.award_ms
+    first_ms = begin_ms = desk.stage.unrolled_ms(plan.stamp.award_ms)
     for leg in plan.legs:
-        found += _windows_of(desk, leg, begin_ms, leg.end_ms)
-        begin_ms = leg.end_ms
+        end_ms = first_ms + (leg.end_ms - plan.stamp.award_ms) % 2**32
+        found += _windows_of(desk, leg, begin_ms, end_ms)
+        begin_ms = end_ms
     last = plan.legs[-1]
     return [*found, Window(Segment(last.track, last.to_index), begin_ms, begin_ms + 3_600_000)]
 

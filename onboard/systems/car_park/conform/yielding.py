@@ -107,7 +107,7 @@ def _takes_part(stage: Stage, cast: Cast, desk: Desk, rival: Rival, least_ms: in
     rival.stands()
     yield from stage.pause(2.5)
     yield from against("robot-that-drives-takes-part", counts=True)
-    part.boot += 1
+    part.lives_anew()
     part.state = MachineState.STARTING
     cast.plans.pop(rival.node)
     cast.beat(part)
@@ -191,7 +191,7 @@ def _at_once(stage: Stage, desk: Desk, rival: Rival, name: str, *, older: bool, 
         if anew is not None:
             is_same = anew.message.stamp[1:] == mine[1:]
             stage.judge("gives-way-under-its-old-stamp", is_same, "another stamp", plan, anew)
-            meets = meeting(desk, anew.message, rival.plan, stage.bus_ms())
+            meets = meeting(desk, anew.message, rival.plan, stage.bus_us // 1000)
             stage.judge("keeps-to-the-other-plan", meets is None, f"{meets}", anew)
     elif holds:
         stage.judge(name, anew, "keeps its windows before who holds the tokens", plan, anew)
