@@ -71,7 +71,7 @@ class FixedTimes:
 
     def on_return(self, beat_us: int, now_us: int) -> None:
         """Somebody was silent for long: at ``beat_us`` all tell what they believe; what waits is said soon again."""
-        self._beat_by(beat_us)
+        self._beat_by(max(beat_us, self._beat_us + BEATS_APART_US))
         self.fleet.tokens.begin_anew(now_us)
         self.fleet.negotiation.begin_anew(now_us)
 

@@ -2,13 +2,18 @@
 
 from itertools import pairwise
 
-from onboard.conform.cast import Cast
+from onboard.conform.cast import Cast, Part
 from onboard.conform.checks import Check
 from onboard.conform.player import Scene
 from onboard.conform.stage import MS, OPERATOR, SECOND, Play, Stage, Word
 from onboard.contract.codes import Grade, LegAction, MachineState, Reason
 from onboard.contract.constants import ACTING
 from onboard.contract.messages import Halted, Heartbeat, Itinerary, Progress, SyncDone, SyncRequest
+
+_PAST = (
+    "A first life in a fleet that has a past (a `boot` above 1) waits for all machines of the site, also those that "
+    "are away; meanwhile it says `Halted` JOURNAL_LOST, naming whom it waits for."
+)
 
 FIRST = (
     Check("no-plan-before-time", "T2", "A robot tells neither place nor plan before the first"),
@@ -33,12 +38,18 @@ FIRST = (
     Check("stands-by-one-leg", "J5", ("One that only stands tells one leg STAND from its segment to its segment")),
     Check("stands-under-own-stamp", "J5", "under a stamp of bus time now, its own node-ID and call 0"),
     Check("stand-ends-after-1-ms", "J5", "ending 1 ms after that."),
+    Check("first-life-names-whom-it-waits-for", "R8", _PAST),
     Check("takes-part-in-the-end", "J9", "its next heartbeat says that it takes part."),
 )
 
 
 def first(stage: Stage, cast: Cast) -> Play:
-    """Off and on, on a bus without time; then the fleet comes."""
+    """Off and on, on a bus without time, on which all but one answer; then time comes, and the last of all."""
+    away = cast.parts.get(stage.other) if stage.means.power else None
+    if away is not None:
+        away.is_there = False
+    cast.begin()
+    cast.gives_time = False
     if stage.means.power:
         stage.switch(on=False)
         yield from stage.pause(1.0)
@@ -50,8 +61,8 @@ def first(stage: Stage, cast: Cast) -> Play:
     if is_fresh:
         early = [*stage.since(Progress, begin_us), *stage.since(Itinerary, begin_us)]
         stage.none_of("no-plan-before-time", early, "told its place or plan before it knew the time")
-    cast.begin()
-    beat = yield from stage.hears(Heartbeat, within_s=10.0)
+    cast.gives_time, cast.time_due_us = True, stage.now_us
+    beat = yield from stage.hears(Heartbeat, within_s=10.0, since_us=begin_us)
     if is_fresh and beat is not None:
         first_word = stage.said_since(begin_us)[0]
         starts = isinstance(first_word.message, Heartbeat) and first_word.message.state is MachineState.STARTING
@@ -59,8 +70,22 @@ def first(stage: Stage, cast: Cast) -> Play:
         asks = yield from stage.hears(SyncRequest, lambda one: one.whom == 0, 1.0, begin_us)
         stage.judge("asks-all-at-once", asks, "no SyncRequest to all within 1 s", beat, asks)
         yield from _place(stage, known_us)
+        if away is not None and beat.message.boot == 1:
+            yield from _waits(stage, away, known_us)
+    if away is not None:
+        away.is_there = True
+        cast.beat(away)
     acts = yield from stage.hears(Heartbeat, lambda one: one.state in ACTING, 10.0)
     stage.judge("takes-part-in-the-end", acts, "says no state of one who takes part", beat, acts)
+
+
+def _waits(stage: Stage, away: Part, since_us: int) -> Play:
+    """It has no journal, the others lived before, and one of them is not there."""
+    yield from stage.pause(8.0)
+    told = [one for one in stage.since(Halted, since_us) if one.message.machine == stage.node]
+    reasons = {(one.message.reason, one.message.cause) for one in told}
+    is_so = (Reason.JOURNAL_LOST, away.node) in reasons
+    stage.judge("first-life-names-whom-it-waits-for", is_so, f"{sorted(reasons)}", *told)
 
 
 def _is_every(words: list[Word], apart_us: int, late_us: int) -> bool:

@@ -29,6 +29,7 @@ _VOID = (
 
 IN_THE_WAY = (
     Check("body-of-an-obstacle-is-in-the-way", "J7", _BODY),
+    Check("obstacle-without-rights-is-in-the-way", "J7", _BODY),
     Check("rights-of-an-obstacle-are-in-the-way", "J7", _BODY),
     Check("plan-of-an-obstacle-is-not-in-the-way", "J7", _VOID),
     Check("bids-when-an-obstacle-has-gone", "J7", _BODY),
@@ -63,9 +64,11 @@ def in_the_way(stage: Stage, cast: Cast) -> Play:
         bid = yield from desk.asks(desk.call())
         stage.judge(name, (bid is not None) is wanted, "no bid" if wanted else "it bid", bid)
 
-    rival.takes(near)
     rival.stands(near)
     yield from state(MachineState.OBSTACLE)
+    yield from bids("obstacle-without-rights-is-in-the-way", wanted=False)
+    rival.takes(near)
+    yield from stage.pause(2.5)
     yield from bids("body-of-an-obstacle-is-in-the-way", wanted=False)
     rival.stands()
     yield from stage.pause(2.5)
