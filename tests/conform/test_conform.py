@@ -225,8 +225,8 @@ def test_the_player_takes_up_frames_and_times_only() -> None:
     player.wake(player.next_us())
     while not player.stage.out:
         player.wake(player.next_us())
-    assert player.stage.now_us == 4_001_000 and player.stage.power == [False, True]
-    assert totals(player.findings).startswith(f"{len(player.findings.by_name)} checks: 1 passed, 0 failed")
+    assert player.stage.now_us == 1_006_000 and player.stage.power == [False, True]
+    assert totals(player.findings).startswith(f"{len(player.findings.by_name)} checks: 0 passed, 0 failed")
 
 
 def test_what_switches_the_node_does_not_outlive_the_play(tmp_path: Path) -> None:

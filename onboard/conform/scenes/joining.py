@@ -48,13 +48,13 @@ def first(stage: Stage, cast: Cast) -> Play:
     away = cast.parts.get(stage.other) if stage.means.power else None
     if away is not None:
         away.is_there = False
-    cast.begin()
     cast.gives_time = False
     if stage.means.power:
         stage.switch(on=False)
         yield from stage.pause(1.0)
         stage.switch(on=True)
     begin_us = stage.now_us
+    cast.begin()
     yield from stage.pause(3.0)
     known_us = stage.now_us
     is_fresh = stage.means.power or not stage.said_since(begin_us)
