@@ -282,14 +282,20 @@ class Always:
         if word.time_us - self.line_us > _ONE_GO_US:
             self.line = dict(self.held)
         self.line_us = word.time_us
-        found = [self.line.get(key, self.held.get(key, 0))]
+        # What leaves a moment later has no part in it.
+        wanted = {self._in_line(self.line, key) + 1, self._in_line(self.held, key) + 1}
+        is_one = word.message.version in wanted
+        self.stage.judge("grants-of-a-line-have-one-version", is_one, f"not {sorted(wanted)}", word)
+
+    def _in_line(self, versions: dict[TokenKey, int], key: TokenKey) -> int:
+        """The highest version of those in line with a segment."""
+        found = [versions.get(key, self.held.get(key, 0))]
         for step in (-1, 1):
             number = key.number + step
-            while TokenKey(key.kind, number) in self.line and abs(number - key.number) <= 15:
-                found.append(self.line[TokenKey(key.kind, number)])
+            while TokenKey(key.kind, number) in versions and abs(number - key.number) <= 15:
+                found.append(versions[TokenKey(key.kind, number)])
                 number += step
-        wanted = max(found) + 1
-        self.stage.judge("grants-of-a-line-have-one-version", word.message.version == wanted, f"not {wanted}", word)
+        return max(found)
 
     def _on_held(self, word: Word) -> None:
         said: TokenHeld = word.message

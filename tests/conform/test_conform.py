@@ -20,6 +20,7 @@ from onboard.conform.suite import scenes_of, watchers_of
 from onboard.contract.messages import Heartbeat
 from onboard.core.negotiation.participant import Participant
 from onboard.holon.holding import HoldResponse, MachineHolds
+from onboard.systems.car_park.site import CarPark
 from onboard.wire.codec import fleet_codec
 from tests.conform import foreign
 from tests.conform.bench import ALL, SITE, SITES, play
@@ -87,9 +88,10 @@ def test_our_robot_keeps_to_all_of_it() -> None:
     assert {one.why for one in findings.of(Verdict.NOT_REACHED)} == {alone}
 
 
+@pytest.mark.parametrize("site", SITES[1:], ids=lambda one: one.name)
 @pytest.mark.parametrize("scene", WITH_ANOTHER, ids=lambda one: one.name)
-def test_our_robot_keeps_to_all_of_it_beside_another(scene: Scene) -> None:
-    findings = play((scene.name,), site=SITES[1]).findings
+def test_our_robot_keeps_to_all_of_it_beside_another(scene: Scene, site: CarPark) -> None:
+    findings = play((scene.name,), site=site).findings
     broken = [line for one in findings.of(Verdict.FAILED) for line in lines_of(one, frame_words)]
     reached = {one.check.name for one in findings.of(Verdict.PASSED)}
     assert broken == [] and {one.name for one in scene.checks} <= reached

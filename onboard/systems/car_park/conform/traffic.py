@@ -33,7 +33,8 @@ def slow(stage: Stage, cast: Cast) -> Play:
     desk = Desk(stage, cast, 0x1A00, 2_500)
     desk.place_car()
     rival = Rival(stage, cast, desk)
-    rival.way((1, 5.0), slower_s=40.0).into(rival.home.track).tell()
+    far = _beyond(desk, rival)
+    rival.way((far, 5.0), slower_s=40.0).into(rival.home.track).tell()
     stamp = rival.plan.stamp
     yield from rival.drives(0.5)
     call, bid = yield from desk.wins()
@@ -48,7 +49,7 @@ def slow(stage: Stage, cast: Cast) -> Play:
         stage.judge("bid-keeps-clear-of-a-slow-leg", is_behind, "is over before the other has passed", bid, plan)
         yield from rival.drives(3.0)
         free = next(one for one in _spurs(desk) if one not in (rival.home.track, _track(stage)))
-        rival.way((1, 25.0), slower_s=40.0).into(free).tell(stamp)
+        rival.way((far, 25.0), slower_s=40.0).into(free).tell(stamp)
         yield from rival.drives(4.0)
         last = next(one for one in reversed(stage.words[Itinerary]) if one.message.grade is Grade.FIRM)
         meets = meeting(desk, last.message, rival.plan, stage.bus_us // 1000, way_back=False)
@@ -61,6 +62,12 @@ def slow(stage: Stage, cast: Cast) -> Play:
     yield from stage.pause(5.0)
     yield from stage.hears(Heartbeat, lambda one: one.state is MachineState.IDLE, 120.0)
     yield from stage.pause(30.0)
+
+
+def _beyond(desk: Desk, rival: Rival) -> int:
+    """The end of the alley that is beyond the bay, seen from where the other rests."""
+    is_low = desk.segment_at(rival.home.track, 0).index > desk.bay.index
+    return 1 if is_low else desk.site.tracks[desk.bay.track].length
 
 
 def _track(stage: Stage) -> int:
