@@ -1,6 +1,7 @@
 """The robot of ``tests/foreign`` on the kit's bench: a life begins with each switching on, without a journal."""
 
 from asyncio import TimerHandle
+from collections.abc import Callable
 from functools import partial
 
 from bus_sim.run import FLEET
@@ -40,12 +41,21 @@ class ForeignLife:
         if not self.is_on:
             return
         if frame.is_extended and not frame.is_remote:
-            self.carry_out(self.robot.receive(name, frame.arbitration_id, frame.data, self.loop.now_us()))
+            self.do(partial(self.robot.receive, name, frame.arbitration_id, frame.data, self.loop.now_us()))
         elif name == FLEET:
-            self.carry_out(self.robot.drop("UNKNOWN_IDENTIFIER", self.loop.now_us()))
+            self.do(partial(self.robot.drop, "UNKNOWN_IDENTIFIER", self.loop.now_us()))
 
     def wake(self) -> None:
-        self.carry_out(self.robot.wake(self.loop.now_us()))
+        self.do(partial(self.robot.wake, self.loop.now_us()))
+
+    def do(self, step: Callable[[], list[tuple[str, int, bytes]]]) -> None:
+        """One step of it; where its numbers go out of their range its program ends until the power is cut."""
+        try:
+            frames = step()
+        except OverflowError:
+            self.off()
+        else:
+            self.carry_out(frames)
 
     def carry_out(self, frames: list[tuple[str, int, bytes]]) -> None:
         for name, number, data in frames:
