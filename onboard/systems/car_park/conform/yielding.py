@@ -14,6 +14,7 @@ from onboard.contract.messages import (
     TokenGrant,
     TokenHeld,
     TokenRequest,
+    Waiting,
 )
 from onboard.core.site import Segment
 from onboard.core.token_keys import TokenKey, genesis_holder
@@ -23,6 +24,7 @@ from onboard.systems.car_park.conform.rival import Rival, meeting
 _BODY = "Its body, and the segments whose tokens it holds, are in the way of all plans."
 _SINCE = "a robot only once it has told a firm itinerary since."
 _STANDS = "or that is a robot and stands where its plan has left for `T_stands`"
+_WAITS = "(`T_waits` where it says `Waiting`, `TaskReport`, `TokenRequest` or plans meanwhile)"
 _VOID = (
     "Of an obstacle bids do not count, plans are not planned around, and nobody comes behind it in an order of passing."
 )
@@ -35,6 +37,7 @@ IN_THE_WAY = (
     Check("bids-when-an-obstacle-has-gone", "J7", _BODY),
     Check("robot-with-a-plan-takes-part-again", "J6", _SINCE),
     Check("robot-that-drives-takes-part", "J6", _STANDS),
+    Check("robot-that-says-it-waits-takes-part", "J6", _WAITS),
     Check("robot-that-stands-is-an-obstacle", "J6", _STANDS),
     Check("robot-that-lives-anew-has-no-plan", "R4", "I forget the plan, but not where its body is."),
     Check("robot-that-lives-anew-is-where-it-was", "R4", "I forget the plan, but not where its body is."),
@@ -124,7 +127,12 @@ def _takes_part(stage: Stage, cast: Cast, desk: Desk, rival: Rival, least_ms: in
     yield from against("robot-that-lives-anew-is-where-it-was", counts=True)
     rival.way((desk.bay.index, 2.0)).into(free).tell()
     rival.is_at(rival.home, leg=0)
-    yield from stage.pause(75.0)
+    mouth = desk.segment_at(rival.home.track, 0)
+    for _ in range(8):
+        stage.say(Waiting(rival.node, mouth.track, mouth.index, stage.caller, Reason.TOKEN_NOT_GRANTABLE_YET))
+        yield from stage.pause(9.0)
+    yield from against("robot-that-says-it-waits-takes-part", counts=True)
+    yield from stage.pause(30.0)
     yield from against("robot-that-stands-is-an-obstacle", counts=False)
     # Only motion ends that.
     rival.is_at(desk.segment_at(rival.home.track, 0), speed_mm_s=500)
