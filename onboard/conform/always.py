@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from onboard.conform.cast import Cast
 from onboard.conform.checks import Check
-from onboard.conform.stage import MS, SECOND, Stage, Word
+from onboard.conform.stage import MS, SECOND, Stage, Word, after_ms
 from onboard.contract.codes import CONTRACT_VERSION, Grade, MachineState, TokenKind
 from onboard.contract.constants import ACTING
 from onboard.contract.messages import (
@@ -119,8 +119,8 @@ class Always:
     boots: dict[int, Word] = field(default_factory=dict)
     #: The last heartbeat that came at the node's own offset.
     in_turn: Word | None = None
-    #: Heartbeats in a row with another digest than that of the fleet.
-    digest_wrong: int = 0
+    #: Heartbeats in a row with another digest than that of the fleet; who starts says several in one moment.
+    wrong_digests: list[Word] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         site, node = self.stage.site, self.stage.node
@@ -206,12 +206,13 @@ class Always:
     def _digest(self, word: Word) -> None:
         """Three words in a row with another digest, while nothing changes, are wrong: one may cross what it tells."""
         if word.message.state is MachineState.STARTING or word.message.mirror_digest == self.cast.digest():
-            self.digest_wrong = 0
+            self.wrong_digests.clear()
             if word.message.state is not MachineState.STARTING:
                 self.stage.judge("heartbeat-tells-the-mirror", True, "")
             return
-        self.digest_wrong += 1
-        if self.digest_wrong >= 3:
+        self.wrong_digests.append(word)
+        lasts_us = word.time_us - self.wrong_digests[0].time_us
+        if len(self.wrong_digests) >= 3 and lasts_us > self.stage.site.timing.heartbeat_us:
             what = f"{self.cast.digest():04X} would be right"
             self.stage.judge("heartbeat-tells-the-mirror", False, what, word)
 
@@ -240,7 +241,7 @@ class Always:
         key = (word.message.initiator, word.message.call)
         before = self.bids.get(key)
         if before is not None:
-            is_better = word.message.cost < before.message.cost
+            is_better = after_ms(word.message.cost, before.message.cost) < 0
             self.stage.judge("bids-improve", is_better, "no better than its last", before, word)
         else:
             self.stage.judge("bids-improve", True, "", word)
@@ -281,14 +282,20 @@ class Always:
         if word.time_us - self.line_us > _ONE_GO_US:
             self.line = dict(self.held)
         self.line_us = word.time_us
-        found = [self.line.get(key, self.held.get(key, 0))]
+        # What leaves a moment later has no part in it.
+        wanted = {self._in_line(self.line, key) + 1, self._in_line(self.held, key) + 1}
+        is_one = word.message.version in wanted
+        self.stage.judge("grants-of-a-line-have-one-version", is_one, f"not {sorted(wanted)}", word)
+
+    def _in_line(self, versions: dict[TokenKey, int], key: TokenKey) -> int:
+        """The highest version of those in line with a segment."""
+        found = [versions.get(key, self.held.get(key, 0))]
         for step in (-1, 1):
             number = key.number + step
-            while TokenKey(key.kind, number) in self.line and abs(number - key.number) <= 15:
-                found.append(self.line[TokenKey(key.kind, number)])
+            while TokenKey(key.kind, number) in versions and abs(number - key.number) <= 15:
+                found.append(versions[TokenKey(key.kind, number)])
                 number += step
-        wanted = max(found) + 1
-        self.stage.judge("grants-of-a-line-have-one-version", word.message.version == wanted, f"not {wanted}", word)
+        return max(found)
 
     def _on_held(self, word: Word) -> None:
         said: TokenHeld = word.message

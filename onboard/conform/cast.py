@@ -30,6 +30,8 @@ from onboard.core.token_keys import TokenKey, genesis_holder
 
 #: A grant is said again so often before its sender gives up on the play.
 _MOST_REPEATS = 40
+#: Versions of plans go round 255 while the play lasts (duty F5).
+_FIRST_PLAN = 248
 #: What the fleet does about a request: grants it (NONE), refuses it with a reason, or says nothing (None).
 Answer = Callable[[TokenKey, TokenRequest], Reason | None]
 
@@ -50,7 +52,8 @@ class Part:
 
     node: int
     kind: KindCode
-    boot: int = 1
+    #: Lives go round 255 while the play lasts (duty J1).
+    boot: int = 252
     state: MachineState = MachineState.IDLE
     is_there: bool = True
     answers: bool = True
@@ -60,6 +63,10 @@ class Part:
     #: What it adds to its mirror's digest: not 0 where it believes something else.
     digest_error: int = 0
     due_us: int = 0
+
+    def lives_anew(self) -> None:
+        """It was switched off and on."""
+        self.boot = self.boot % 255 + 1
 
 
 @dataclass
@@ -291,7 +298,7 @@ class Cast:
         """A robot of the fleet is at its home (duty J5)."""
         home, now_ms = self.stage.site.machines[node].home, self.stage.bus_ms()
         leg = Leg(LegAction.STAND, home.track, home.index, home.index, Side.NEAR, now_ms + 1)
-        version = self.plans[node].version % 255 + 1 if node in self.plans else 1
+        version = self.plans[node].version % 255 + 1 if node in self.plans else _FIRST_PLAN
         self.plans[node] = Itinerary(node, version, Grade.FIRM, Stamp(now_ms, node, 0), (leg,))
         self.places[node] = Progress(node, 0, 0, home.track, home.index, 0, 0)
         self.stage.say(self.places[node], self.plans[node])

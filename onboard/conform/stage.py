@@ -17,6 +17,9 @@ from onboard.wire.decoder import Decoder
 M = TypeVar("M", bound=Message)
 SECOND = 1_000_000
 MS = 1_000
+#: Bus time goes round 2^32 ms so long after the play began (duty F6): amid two calls at a time; where there is another
+#: robot, amid what that is for.
+_ROUND_US, _ROUND_WITH_RIVAL_US = 735 * SECOND, 1_500 * SECOND
 #: The node of a tool under which the kit speaks for an operator.
 OPERATOR = 251
 
@@ -38,6 +41,11 @@ class Word(NamedTuple):
     time_us: int
     message: Any
     frame: Frame
+
+
+def after_ms(one: int, other: int) -> int:
+    """How long bus time ``one`` is behind ``other``, negative before it, by the nearest round (duty F6)."""
+    return (one - other + 2**31) % 2**32 - 2**31
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,8 +220,18 @@ class Stage:
 
     @property
     def bus_us(self) -> int:
-        """Bus time: the kit gives it, from a minute on."""
-        return self.now_us - self.begin_us + 60 * SECOND + self.jumped_us
+        """Bus time: the kit gives it, and not from 0 on."""
+        return self.bus_us_at(self.now_us) + self.jumped_us
+
+    def bus_us_at(self, now_us: int) -> int:
+        """What it is at a time of the kit's clock before it is set on."""
+        round_us = _ROUND_WITH_RIVAL_US if self.rival else _ROUND_US
+        return now_us - self.begin_us + (1000 << 32) - round_us
+
+    def unrolled_ms(self, ms: int) -> int:
+        """Bus time as frames tell it, by the round that is nearest to now: such times can be compared (duty F6)."""
+        now_ms = self.bus_us // 1000
+        return now_ms + after_ms(ms, now_ms)
 
     def bus_ms(self, us: int | None = None) -> int:
         """Bus time in ms as frames tell it."""

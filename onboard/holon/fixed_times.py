@@ -39,8 +39,10 @@ class FixedTimes:
     ask_due_us: int | None = None
     _told: ToldDrops = field(default_factory=ToldDrops)
     _is_starting: bool = False
-    #: When the last sign of life was given.
+    #: When the last sign of life was given, and when the next one is due in its turn; one that is said sooner, as
+    #: something has changed, tells no drops: each reason is told at most once in a period (duty F3).
     _beat_us: int = 0
+    _turn_us: int | None = None
 
     def __post_init__(self) -> None:
         nodes, beat_us = sorted(self.fleet.site.machines), self.fleet.site.timing.heartbeat_us
@@ -69,7 +71,7 @@ class FixedTimes:
 
     def on_return(self, beat_us: int, now_us: int) -> None:
         """Somebody was silent for long: at ``beat_us`` all tell what they believe; what waits is said soon again."""
-        self._beat_by(beat_us)
+        self._beat_by(max(beat_us, self._beat_us + BEATS_APART_US))
         self.fleet.tokens.begin_anew(now_us)
         self.fleet.negotiation.begin_anew(now_us)
 
@@ -87,11 +89,12 @@ class FixedTimes:
         effects: list[Effect] = []
         timing, node_id = self.fleet.site.timing, self.fleet.node_id
         if self.heartbeat_due_us is not None and self.heartbeat_due_us <= now_us:
+            is_in_turn = self.heartbeat_due_us == self._turn_us
             self._beat_us, beat_us = now_us, timing.heartbeat_us
-            self.heartbeat_due_us = now_us + beat_us - (now_us - self._phase_us) % beat_us
+            self._turn_us = self.heartbeat_due_us = now_us + beat_us - (now_us - self._phase_us) % beat_us
             self.presence.review(now_us)
             effects += self.holds.words() + self.fleet.mirror.forgotten()
-            effects += self._told.words(node_id, self.drops())
+            effects += self._told.words(node_id, self.drops()) if is_in_turn else []
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
             effects += [Send(self.presence.standing_word(node)) for node in self.fleet.winners.stuck(now_us)]
         if self.ask_due_us is not None and self.ask_due_us <= now_us:

@@ -18,9 +18,9 @@ from onboard.ports.bus import Bus
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.wire.codec import fleet_codec
 
-SITE = car_park(load_site(Path(__file__).parent / "bench.toml"))
-#: The robot alone, then with another.
-SITES = (SITE, car_park(load_site(Path(__file__).parent / "pair.toml")))
+#: The robot alone, then with another, then the other way round.
+SITES = tuple(car_park(load_site(Path(__file__).parent / f"{name}.toml")) for name in ("bench", "pair", "mirror"))
+SITE = SITES[0]
 WHEELBASE_MM = 2_870
 #: No play is longer, s of virtual time.
 LIMIT_S = 3_600.0

@@ -1,9 +1,10 @@
 """``python -m tests.conform.mutants``: break our robot in 60 places, one at a time, and play the kit before each.
 
 Mutations are drawn by a seed from the lines that the robot runs in the play: a comparison turned round, ``and`` for
-``or``, a ``not`` left out, a sum for a difference, a number one more, a truth for its contrary, a call left out. A
-mutant is caught where a check fails. Each is played in a process of its own, in virtual time, ``--jobs N`` of them at
-a time.
+``or``, a ``not`` left out, a sum for a difference, a number one more, a truth for its contrary, a call left out. Left
+out are those that no frame could ever tell: what goes to the telemetry only (``UNHEARD``), and files about machines
+that the benches do not have (``_OF_OTHERS``). A mutant is caught where a check fails. Each is played in a process of
+its own, in virtual time, ``--jobs N`` of them at a time.
 """
 
 import argparse
@@ -37,6 +38,11 @@ _SHARED = frozenset(
         *("onboard/ways/site.py", "onboard/ways/kinematics.py", "onboard/systems/car_park/site.py"),
     }
 )
+#: What is told to the telemetry alone: counters of the negotiation, events, and reports for people.
+UNHEARD = frozenset({"counters", "telemetry", "Report"})
+#: What a robot runs on a site without lifts as well, where nothing comes of it: whether the sill may be crossed, and
+#: what a compartment remembers.
+_OF_OTHERS = frozenset({"onboard/systems/car_park/sill.py", "onboard/systems/car_park/bay_memory.py"})
 _CONTRARY: dict[type[ast.AST], Any] = {
     one: other
     for pair in (
@@ -66,11 +72,25 @@ def mutations(file: str, lines: set[int]) -> Iterator[Mutation]:
         for body in function.body
         for one in ast.walk(body)
     }
+    unheard = {id(one) for statement in ast.walk(tree) if _is_unheard(statement) for one in ast.walk(statement)}
     for number, node in enumerate(ast.walk(tree)):
         line = getattr(node, "lineno", 0)
-        what = _kind(node) if id(node) in inside and line in lines else ""
+        is_drawn = id(node) in inside and id(node) not in unheard and line in lines
+        what = _kind(node) if is_drawn else ""
         if what:
             yield Mutation(file, number, line, what)
+
+
+def _is_unheard(node: ast.AST) -> bool:
+    """Whether a statement or call does nothing else than tell the telemetry."""
+    match node:
+        case ast.AugAssign(target=ast.Attribute(value=ast.Attribute(attr=attr))):
+            return attr in UNHEARD
+        case ast.Expr(value=ast.Call(func=ast.Attribute(value=ast.Attribute(attr=attr)))):
+            return attr in UNHEARD
+        case ast.Call(func=ast.Name(id=name)):
+            return name in UNHEARD
+    return False
 
 
 def _kind(node: ast.AST) -> str:
@@ -173,7 +193,7 @@ def _lines() -> None:
         code = frame.f_code
         if code not in left:
             name = code.co_filename.removeprefix(root)
-            is_its = name.startswith(FOLDERS) and name not in _SHARED and "/conform/" not in name
+            is_its = name.startswith(FOLDERS) and name not in _SHARED | _OF_OTHERS and "/conform/" not in name
             lines = {line for *_, line in code.co_lines() if line is not None} - {code.co_firstlineno}
             left[code] = lines if is_its else set()
         return local if left[code] else None

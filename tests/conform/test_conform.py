@@ -20,6 +20,7 @@ from onboard.conform.suite import scenes_of, watchers_of
 from onboard.contract.messages import Heartbeat
 from onboard.core.negotiation.participant import Participant
 from onboard.holon.holding import HoldResponse, MachineHolds
+from onboard.systems.car_park.site import CarPark
 from onboard.wire.codec import fleet_codec
 from tests.conform.bench import ALL, SITE, SITES, play
 from tests.foreign.life import Foreign
@@ -87,9 +88,10 @@ def test_our_robot_keeps_to_all_of_it() -> None:
     assert {one.why for one in findings.of(Verdict.NOT_REACHED)} == {alone}
 
 
+@pytest.mark.parametrize("site", SITES[1:], ids=lambda one: one.name)
 @pytest.mark.parametrize("scene", WITH_ANOTHER, ids=lambda one: one.name)
-def test_our_robot_keeps_to_all_of_it_beside_another(scene: Scene) -> None:
-    findings = play((scene.name,), site=SITES[1]).findings
+def test_our_robot_keeps_to_all_of_it_beside_another(scene: Scene, site: CarPark) -> None:
+    findings = play((scene.name,), site=site).findings
     broken = [line for one in findings.of(Verdict.FAILED) for line in lines_of(one, frame_words)]
     reached = {one.check.name for one in findings.of(Verdict.PASSED)}
     assert broken == [] and {one.name for one in scene.checks} <= reached
@@ -105,17 +107,30 @@ def test_without_a_switch_and_a_car_it_is_judged_as_far_as_it_can_be() -> None:
     }
 
 
-def test_the_robot_of_the_page_keeps_to_all_beside_another() -> None:
+#: What the robot of tests/foreign does not know yet: the checks are newer than it (docs/conform.md).
+NEWER = [
+    "first-life-names-whom-it-waits-for",
+    "robot-that-stands-is-an-obstacle",
+    "request-names-who-leads-elsewhere",
+    "forgotten-life-is-told",
+    "forgotten-life-uses-no-right",
+    "rights-are-made-anew",
+    "acts-with-rights-made-anew",
+]
+
+
+def test_the_robot_of_the_page_keeps_to_all_beside_another_but_what_is_newer() -> None:
     """Written from the page in another language (tests/foreign)."""
     with Foreign() as robot:
         findings = play(site=SITES[1], joins=robot.joins).findings
-    assert names(findings, Verdict.FAILED) == names(findings, Verdict.NOT_REACHED) == []
+    assert names(findings, Verdict.NOT_REACHED) == []
+    assert names(findings, Verdict.FAILED) == NEWER
 
 
-def test_the_robot_of_the_page_keeps_to_all_that_it_meets_alone() -> None:
+def test_the_robot_of_the_page_keeps_to_all_that_it_meets_alone_but_what_is_newer() -> None:
     with Foreign() as robot:
         findings = play(joins=robot.joins).findings
-    assert names(findings, Verdict.FAILED) == []
+    assert set(names(findings, Verdict.FAILED)) <= set(NEWER)
     unreached = {one.scene for one in findings.of(Verdict.NOT_REACHED)}
     assert unreached == {one.name for one in WITH_ANOTHER}
 
@@ -227,8 +242,8 @@ def test_the_player_takes_up_frames_and_times_only() -> None:
     player.wake(player.next_us())
     while not player.stage.out:
         player.wake(player.next_us())
-    assert player.stage.now_us == 4_001_000 and player.stage.power == [False, True]
-    assert totals(player.findings).startswith(f"{len(player.findings.by_name)} checks: 1 passed, 0 failed")
+    assert player.stage.now_us == 1_006_000 and player.stage.power == [False, True]
+    assert totals(player.findings).startswith(f"{len(player.findings.by_name)} checks: 0 passed, 0 failed")
 
 
 def test_what_switches_the_node_does_not_outlive_the_play(tmp_path: Path) -> None:

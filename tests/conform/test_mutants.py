@@ -24,13 +24,27 @@ def changed(line_of: str, what: str) -> str:
     ("line", "what"),
     [
         ("if now_us > self.cut_off_us:", "contrary"),
-        ("self.counters.late_bids_ignored += 1", "one more"),
+        ("self.due_us = now_us + 1", "one more"),
         ("if no_account or not self.is_sound", "no not"),
         ("self.is_stale = False", "contrary"),
     ],
 )
 def test_each_kind_of_mutation_compiles(line: str, what: str) -> None:
     assert changed(line, what) == what
+
+
+@pytest.mark.parametrize(
+    ("file", "words"),
+    [
+        (PARTICIPANT, "self.counters.late_bids_ignored += 1"),
+        ("onboard/controller/shell.py", "self.ports.telemetry.event("),
+        ("onboard/holon/admission.py", "return [Report("),
+    ],
+)
+def test_what_only_the_telemetry_hears_is_not_drawn(file: str, words: str) -> None:
+    text = (ROOT / file).read_text(encoding="utf-8").splitlines()
+    lines = {number for number, line in enumerate(text, 1) if words in line}
+    assert lines and not list(mutations(file, lines))
 
 
 def test_all_lines_of_a_function_and_none_outside_are_drawn_from() -> None:

@@ -2,13 +2,18 @@
 
 from itertools import pairwise
 
-from onboard.conform.cast import Cast
+from onboard.conform.cast import Cast, Part
 from onboard.conform.checks import Check
 from onboard.conform.player import Scene
 from onboard.conform.stage import MS, OPERATOR, SECOND, Play, Stage, Word
 from onboard.contract.codes import Grade, LegAction, MachineState, Reason
 from onboard.contract.constants import ACTING
 from onboard.contract.messages import Halted, Heartbeat, Itinerary, Progress, SyncDone, SyncRequest
+
+_PAST = (
+    "A first life in a fleet that has a past (a `boot` above 1) waits for all machines of the site, also those that "
+    "are away; meanwhile it says `Halted` JOURNAL_LOST, naming whom it waits for."
+)
 
 FIRST = (
     Check("no-plan-before-time", "T2", "A robot tells neither place nor plan before the first"),
@@ -33,25 +38,31 @@ FIRST = (
     Check("stands-by-one-leg", "J5", ("One that only stands tells one leg STAND from its segment to its segment")),
     Check("stands-under-own-stamp", "J5", "under a stamp of bus time now, its own node-ID and call 0"),
     Check("stand-ends-after-1-ms", "J5", "ending 1 ms after that."),
+    Check("first-life-names-whom-it-waits-for", "R8", _PAST),
     Check("takes-part-in-the-end", "J9", "its next heartbeat says that it takes part."),
 )
 
 
 def first(stage: Stage, cast: Cast) -> Play:
-    """Off and on, on a bus without time; then the fleet comes."""
+    """Off and on, on a bus without time, on which all but one answer; then time comes, and the last of all."""
+    away = cast.parts.get(stage.other) if stage.means.power else None
+    if away is not None:
+        away.is_there = False
+    cast.gives_time = False
     if stage.means.power:
         stage.switch(on=False)
         yield from stage.pause(1.0)
         stage.switch(on=True)
     begin_us = stage.now_us
+    cast.begin()
     yield from stage.pause(3.0)
     known_us = stage.now_us
     is_fresh = stage.means.power or not stage.said_since(begin_us)
     if is_fresh:
         early = [*stage.since(Progress, begin_us), *stage.since(Itinerary, begin_us)]
         stage.none_of("no-plan-before-time", early, "told its place or plan before it knew the time")
-    cast.begin()
-    beat = yield from stage.hears(Heartbeat, within_s=10.0)
+    cast.gives_time, cast.time_due_us = True, stage.now_us
+    beat = yield from stage.hears(Heartbeat, within_s=10.0, since_us=begin_us)
     if is_fresh and beat is not None:
         first_word = stage.said_since(begin_us)[0]
         starts = isinstance(first_word.message, Heartbeat) and first_word.message.state is MachineState.STARTING
@@ -59,8 +70,22 @@ def first(stage: Stage, cast: Cast) -> Play:
         asks = yield from stage.hears(SyncRequest, lambda one: one.whom == 0, 1.0, begin_us)
         stage.judge("asks-all-at-once", asks, "no SyncRequest to all within 1 s", beat, asks)
         yield from _place(stage, known_us)
+        if away is not None and beat.message.boot == 1:
+            yield from _waits(stage, away, known_us)
+    if away is not None:
+        away.is_there = True
+        cast.beat(away)
     acts = yield from stage.hears(Heartbeat, lambda one: one.state in ACTING, 10.0)
     stage.judge("takes-part-in-the-end", acts, "says no state of one who takes part", beat, acts)
+
+
+def _waits(stage: Stage, away: Part, since_us: int) -> Play:
+    """It has no journal, the others lived before, and one of them is not there."""
+    yield from stage.pause(8.0)
+    told = [one for one in stage.since(Halted, since_us) if one.message.machine == stage.node]
+    reasons = {(one.message.reason, one.message.cause) for one in told}
+    is_so = (Reason.JOURNAL_LOST, away.node) in reasons
+    stage.judge("first-life-names-whom-it-waits-for", is_so, f"{sorted(reasons)}", *told)
 
 
 def _is_every(words: list[Word], apart_us: int, late_us: int) -> bool:
@@ -83,7 +108,7 @@ def _place(stage: Stage, since_us: int) -> Play:
     is_stand = leg is not None and len(told.legs) == 1 and leg.action is LegAction.STAND
     is_here = leg is not None and (leg.track, leg.from_index) == here and leg.to_index == leg.from_index
     stage.judge("stands-by-one-leg", is_stand and is_here, "another plan than one STAND leg where it is", place, plan)
-    stamp, now_ms = told.stamp, stage.bus_ms(plan.time_us - stage.begin_us + 60 * SECOND)
+    stamp, now_ms = told.stamp, stage.bus_ms(stage.bus_us_at(plan.time_us))
     is_now = abs((now_ms - stamp.award_ms + 2**31) % 2**32 - 2**31) <= 100
     is_own = (stamp.initiator, stamp.call) == (stage.node, 0)
     stage.judge("stands-under-own-stamp", is_now and is_own, f"stamp {stamp}, bus time {now_ms} ms", plan)
@@ -214,7 +239,7 @@ def digests(stage: Stage, cast: Cast) -> Play:
     part.digest_error = 0
     yield from stage.pause(5.0)
     begin_us, before = stage.now_us, part.boot
-    part.boot += 1
+    part.lives_anew()
     part.state = MachineState.STARTING
     cast.beat(part)
     asks = yield from stage.hears(SyncRequest, lambda one: one.whom == stage.other, 2.0)

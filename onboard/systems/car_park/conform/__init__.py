@@ -10,6 +10,7 @@ from onboard.systems.car_park.conform import (
     meanwhile,
     plans,
     rights,
+    traffic,
     work,
     yielding,
 )
@@ -25,6 +26,7 @@ SCENES = (
     lives.STOP,
     *company.SCENES,
     *yielding.SCENES,
+    *traffic.SCENES,
 )
 WATCHERS = ((plans.PLANS, plans.watch),)
 #: Behind all others: rights that are made anew, and a node that has lost its own.

@@ -57,7 +57,7 @@ def memory(stage: Stage, cast: Cast) -> Play:
         cast.tokens[key] = (caller, version)
     stage.say(TokenGrant(other, *given, versions[given] + 1, caller))
     yield from stage.pause(3.0)
-    part.boot += 1
+    part.lives_anew()
     part.state = MachineState.STARTING
     begin_us = stage.now_us
     part.answers = False
@@ -99,7 +99,7 @@ def _newcomer(stage: Stage, cast: Cast) -> Play:
         yield from stage.pause(9.0)
         part.is_there = True
         begin_us = stage.now_us
-        part.boot += 1
+        part.lives_anew()
         cast.beat(part)
         if answers:
             yield from stage.pause(0.1)
@@ -273,12 +273,19 @@ _OLD = (
     "Whoever is told by a machine that has not answered yet of a newer version of a right that its journal says is its "
     "own has an old journal"
 )
+_LIFE = (
+    "So does, with JOURNAL_LOST, whom `SyncRequest.boot_before` names a life that its journal lacks, within "
+    "`T_compare` of its start."
+)
 SHORT = (
     Check("short-journal-is-told", "R7", _OLD),
     Check("short-journal-needs-a-person", "R7", "holds for a person, and uses no right."),
     Check("short-journal-uses-no-right", "R7", "holds for a person, and uses no right."),
     Check("short-journal-goes-not-by-go", "H4", "but for a lost, short or foreign journal"),
     Check("short-journal-outlasts-a-restart", "H4", "A hold for a person is in the journal and outlives a restart"),
+    Check("forgotten-life-is-told", "R7", _LIFE),
+    Check("forgotten-life-uses-no-right", "R7", "holds for a person, and uses no right."),
+    Check("known-life-is-no-news", "R7", _LIFE),
     Check("rights-are-made-anew", "G4", _COUNTS),
     Check("acts-with-rights-made-anew", "G4", _COUNTS),
 )
@@ -319,6 +326,35 @@ def short(stage: Stage, cast: Cast) -> Play:
         plans = [one for one in stage.since(Itinerary, begin_us) if len(one.message.legs) > 1]
         stage.none_of("short-journal-uses-no-right", [*uses, *plans], "uses rights")
     yield from _healed(stage, cast, desk, here, version)
+    yield from _forgotten(stage, cast, desk, here)
+
+
+def _forgotten(stage: Stage, cast: Cast, desk: Desk, here: TokenKey) -> Play:
+    """It lives anew twice: somebody has known the life before this one, then one that it does not know."""
+    for newer in (0, 3):
+        stage.switch(on=False)
+        yield from stage.pause(1.0)
+        begin_us = stage.now_us
+        stage.switch(on=True)
+        asked = yield from stage.hears(SyncRequest, lambda one: one.whom == 0, 5.0, begin_us)
+        beat = stage.last(Heartbeat)
+        if asked is None or beat is None:
+            return
+        known = (beat.message.boot + newer - (0 if newer else 2)) % 255 + 1
+        stage.say(SyncRequest(stage.caller, stage.node, known))
+        word = yield from stage.hears(Halted, lambda one: one.machine == stage.node, 6.0, begin_us)
+        if not newer:
+            stage.judge("known-life-is-no-news", word is None, "takes its journal for short", word)
+            yield from stage.hears(Heartbeat, lambda one: one.state in ACTING, 12.0, begin_us)
+            yield from stage.pause(10.0)
+            continue
+        is_lost = word is not None and word.message.reason is Reason.JOURNAL_LOST
+        stage.judge("forgotten-life-is-told", is_lost, "no Halted JOURNAL_LOST", word)
+        yield from stage.pause(5.0)
+        acts = [one for one in stage.since(Heartbeat, begin_us) if one.message.state in ACTING]
+        uses = [*stage.since(TokenRequest, begin_us), *stage.since(TokenGrant, begin_us), *acts]
+        stage.none_of("forgotten-life-uses-no-right", uses, "uses rights")
+    yield from _healed(stage, cast, desk, here, cast.holder(here)[1])
 
 
 def _healed(stage: Stage, cast: Cast, desk: Desk, here: TokenKey, version: int) -> Play:

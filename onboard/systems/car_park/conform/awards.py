@@ -5,7 +5,7 @@ from collections.abc import Generator
 from onboard.conform.cast import Cast, silent
 from onboard.conform.checks import Check
 from onboard.conform.player import Scene
-from onboard.conform.stage import SECOND, Play, Stage, Wait, Word
+from onboard.conform.stage import SECOND, Play, Stage, Wait, Word, after_ms
 from onboard.contract.codes import CallResult, Grade, LegAction, Reason, TaskPhase, TokenKind
 from onboard.contract.messages import Award, CallForProposals, Itinerary, Reference, TaskReport, TokenRequest
 from onboard.systems.car_park.conform.desk import Desk
@@ -144,7 +144,7 @@ def _judge_answer(
     stage.judge("plan-works-at-the-bay", works[:1] == [desk.bay.number], "its first work is elsewhere", plan)
     stage.judge("plan-works-at-the-place", works[1:2] == [report.message.station], "its second work is elsewhere", plan)
     ends = [leg.end_ms for leg in told.legs if leg.action is LegAction.WORK]
-    late_ms = (ends[-1] - bid.message.cost + 2**31) % 2**32 - 2**31 if ends else 0
+    late_ms = after_ms(ends[-1], bid.message.cost) if ends else 0
     stage.judge("plan-keeps-its-bid", ends and abs(late_ms) <= 1_000, f"{late_ms} ms later than bid", bid, plan)
 
 

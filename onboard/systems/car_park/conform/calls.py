@@ -13,6 +13,8 @@ from onboard.systems.car_park.conform.desk import Desk
 
 #: A bid that comes sooner cannot be beaten by a word that is said 2 ms after the call, on a bus that others use too.
 _TIME_FOR_A_WORD_US = 20 * MS
+#: A call is said again so long after it, s.
+_AGAIN_S = 0.03
 _COUNTS = "I bid only if my cost beats the best bid heard that counts."
 _COUNTS_NOT = (
     "Bids do not count of obstacles, of nodes that the call [leaves "
@@ -280,6 +282,7 @@ SETS = (
     Check("call-of-two-numbers-is-none", "F4", "with one sender and one `call`"),
     Check("call-after-its-time-is-none", "F4", "After `T_set` without a frame of it a set is dropped."),
     Check("call-twice-is-one", "B5", "So the bids of one call strictly improve on the bus."),
+    Check("call-twice-waits-once", "B4", "I bid when my delay since I heard the call is over"),
 )
 
 
@@ -345,10 +348,16 @@ def _late_or_twice(stage: Stage, desk: Desk, after: _After, before: int) -> Play
     yield from after("call-after-its-time-is-none", call, bids=False)
     begin_us = stage.now_us
     call = desk.call()
-    stage.say(call, call)
-    yield from stage.pause(1.2)
+    stage.say(call)
+    # Before its delay is over, and long enough to be seen in the bid.
+    yield from stage.pause(_AGAIN_S)
+    stage.say(call)
+    yield from stage.pause(1.2 - _AGAIN_S)
     mine = [one for one in stage.since(Bid, begin_us) if one.message.call == call.call]
     stage.judge("call-twice-is-one", len(mine) == 1, f"{len(mine)} bids", *mine)
+    above_us = (desk.over_ms(call, mine[0]) - desk.floor_over_ms()) * 1000 if mine else 0
+    limit_us = begin_us + desk.delay_us(above_us) + stage.means.late_us
+    stage.judge("call-twice-waits-once", mine and mine[0].time_us <= limit_us, "waits since the second", *mine)
     desk.withdraw(call)
     yield from stage.pause(2.5)
     told = [one for one in stage.since(Diagnostic, 0) if one.message.reason is Reason.INCOMPLETE_SET]

@@ -5,7 +5,7 @@ from collections.abc import Generator
 from onboard.conform.cast import Cast, grants
 from onboard.conform.checks import Check
 from onboard.conform.player import Scene
-from onboard.conform.stage import Play, Stage, Wait, Word
+from onboard.conform.stage import Play, Stage, Wait, Word, after_ms
 from onboard.contract.codes import Grade, LegAction, MachineState, Reason, TaskPhase, TokenKind
 from onboard.contract.messages import (
     CallForProposals,
@@ -79,7 +79,7 @@ def behind(stage: Stage, cast: Cast) -> Play:
         return
     awarded_us = stage.now_us
     leaves_ms = max(one.to_ms for one in windows(desk, rival.plan) if one.segment == bay)
-    least_ms = leaves_ms - call.deadline_ms + desk.handling_us(desk.bay) // 1000
+    least_ms = leaves_ms - stage.unrolled_ms(call.deadline_ms) + desk.handling_us(desk.bay) // 1000
     is_behind = desk.over_ms(call, bid) >= least_ms
     stage.judge("bid-comes-behind-another-plan", is_behind, f"not {least_ms} ms behind the deadline", bid)
     plan = yield from stage.hears(Itinerary, lambda one: one.grade is Grade.FIRM, 3.0, awarded_us)
@@ -89,7 +89,7 @@ def behind(stage: Stage, cast: Cast) -> Play:
     meets = meeting(desk, plan.message, rival.plan)
     stage.judge("plan-leaves-anothers-windows", meets is None, f"{meets}", plan)
     ends = [leg.end_ms for leg in plan.message.legs if leg.action is LegAction.WORK]
-    off_ms = ends[-1] - bid.message.cost if ends else 1 << 31
+    off_ms = after_ms(ends[-1], bid.message.cost) if ends else 1 << 31
     stage.judge("plan-keeps-its-bid-behind-another", abs(off_ms) <= 1_000, f"{off_ms} ms later", bid, plan)
     yield from _waits(stage, cast, desk, rival, before, plan)
     yield from _goes(stage, cast, desk, rival, before, call, awarded_us)
@@ -111,13 +111,13 @@ def _waits(stage: Stage, cast: Cast, desk: Desk, rival: Rival, before: list[Segm
     later_us = stage.now_us
     rival.way((desk.bay.index, 45.0)).into(rival.home.track).tell(stamp)
     anew = yield from stage.hears(Itinerary, lambda one: one.grade is Grade.FIRM, 3.0, later_us)
-    by_ms = _work_ms(anew.message) - _work_ms(last.message) if anew is not None else 0
+    by_ms = _work_ms(stage, anew.message) - _work_ms(stage, last.message) if anew is not None else 0
     stage.judge("later-other-makes-it-later", by_ms >= 5_000, f"later by {by_ms} ms, the other by 15 s", last, anew)
     if anew is not None:
         is_same = anew.message.stamp[1:] == last.message.stamp[1:]
         stage.judge("later-plan-keeps-its-stamp", is_same, "another stamp", last, anew)
         work_ms = max(one.to_ms for one in windows(desk, rival.plan) if one.segment == desk.bay.segment)
-        is_behind = _work_ms(anew.message) - desk.handling_us(desk.bay) // 1000 >= work_ms - 100
+        is_behind = _work_ms(stage, anew.message) - desk.handling_us(desk.bay) // 1000 >= work_ms - 100
         stage.judge("later-plan-leaves-anothers-windows", is_behind, "works before the other has left", anew)
     lasts_s = (rival.plan.legs[-1].end_ms - stage.bus_ms()) % 2**32 / 1000
     yield from rival.drives(lasts_s + 8.0)
@@ -142,8 +142,8 @@ def _is_slot(word: Word) -> bool:
     return bool(word.message.token_kind is TokenKind.SEGMENT)
 
 
-def _work_ms(plan: Itinerary) -> int:
-    return next((leg.end_ms for leg in plan.legs if leg.action is LegAction.WORK), 0)
+def _work_ms(stage: Stage, plan: Itinerary) -> int:
+    return next((stage.unrolled_ms(leg.end_ms) for leg in plan.legs if leg.action is LegAction.WORK), 0)
 
 
 def _goes(

@@ -6,7 +6,7 @@ from math import ceil, sqrt
 from typing import Any
 
 from onboard.conform.cast import Cast
-from onboard.conform.stage import SECOND, Stage, Wait, Word
+from onboard.conform.stage import SECOND, Stage, Wait, Word, after_ms
 from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, Reason, TokenKind
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import Award, Bid, CallForProposals, CarAt, Reference
@@ -165,7 +165,7 @@ class Desk:
     def over_ms(self, call: CallForProposals, bid: Word) -> int:
         """A bid's cost in ms after the deadline of its call."""
         cost: int = bid.message.cost
-        return (cost - call.deadline_ms + 2**31) % 2**32 - 2**31
+        return after_ms(cost, call.deadline_ms)
 
     def delay_us(self, above_us: int) -> int:
         """Duty B4: how long a cost above the floor waits, moved to the node's slot."""

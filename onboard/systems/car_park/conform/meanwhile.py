@@ -5,7 +5,7 @@ from collections.abc import Generator
 from onboard.conform.cast import Cast, grants, silent
 from onboard.conform.checks import Check
 from onboard.conform.player import Scene
-from onboard.conform.stage import SECOND, Play, Stage, Wait, Word
+from onboard.conform.stage import SECOND, Play, Stage, Wait, Word, after_ms
 from onboard.contract.codes import CallResult, Grade, LegAction, Reason, TaskPhase, TokenKind
 from onboard.contract.constants import ANY_STATION, OUTSIDE
 from onboard.contract.messages import Bid, CallForProposals, CarAt, Itinerary, Reference, TaskReport
@@ -118,7 +118,7 @@ def _won(stage: Stage, desk: Desk, pair: _Pair) -> Play:
     second = pair.call()
     other = yield from desk.asks(second, withdraws=False)
     least_ms = bid.message.cost + desk.handling_us(pair.bay) // 1000
-    is_behind = other is None or other.message.cost >= least_ms
+    is_behind = other is None or after_ms(other.message.cost, least_ms) >= 0
     stage.judge("bid-comes-behind-what-is-won", is_behind, "not behind what it has won", bid, other)
     if other is not None:
         begin_us = stage.now_us
@@ -128,7 +128,7 @@ def _won(stage: Stage, desk: Desk, pair: _Pair) -> Play:
         at = [(leg.track, leg.to_index) for leg in works]
         are_both = desk.bay.segment in at and pair.bay.segment in at and len(works) >= 4
         stage.judge("two-tasks-are-one-plan", are_both, "not the work of both", plan)
-        late_ms = works[-1].end_ms - other.message.cost if works else 1 << 31
+        late_ms = after_ms(works[-1].end_ms, other.message.cost) if works else 1 << 31
         stage.judge("two-tasks-keep-their-bids", abs(late_ms) <= 1_000, f"{late_ms} ms later than bid", other, plan)
         begin_us = stage.now_us
         desk.withdraw(call)

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 from onboard.conform.cast import Cast
 from onboard.conform.checks import Check
-from onboard.conform.stage import Stage, Word
+from onboard.conform.stage import Stage, Word, after_ms
 from onboard.contract.codes import Grade, LegAction
 from onboard.contract.messages import Itinerary, Leg, Progress, TaskReport
 from onboard.core.site import Segment
@@ -127,8 +127,8 @@ class PlanJudge:
             return
         begin_ms = legs[at.leg - 1].end_ms if at.leg else plan.message.stamp.award_ms
         now_ms = stage.bus_ms()
-        late_ms = (now_ms - legs[at.leg].end_ms + 2**31) % 2**32 - 2**31
-        soon_ms = (begin_ms - now_ms + 2**31) % 2**32 - 2**31
+        late_ms = after_ms(now_ms, legs[at.leg].end_ms)
+        soon_ms = after_ms(begin_ms, now_ms)
         stage.judge("is-where-its-plan-has-it", late_ms <= _LATE_MS, f"{late_ms} ms behind the leg's end", plan, word)
         stage.judge("is-there-no-sooner-than-planned", soon_ms <= _SOON_MS, f"{soon_ms} ms before it", plan, word)
 

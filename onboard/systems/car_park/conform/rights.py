@@ -156,6 +156,8 @@ TAKING = (
     Check("grant-by-a-chain-counts", "K7", "If that chain leads to the giver, the grant counts now."),
     Check("grant-of-a-stranger-is-none", "F2", "I hear only machines of the site file"),
     Check("hint-is-no-right", "K6", "All else is a hint and decides nothing."),
+    Check("word-of-a-gift-is-no-grant", "K5", _COUNTS),
+    Check("unasked-claim-is-a-hint", "K6", "All else is a hint and decides nothing."),
     Check("grant-is-confirmed", "K5", "journal, hold, say `TokenHeld` under its version."),
     Check("grant-again-is-confirmed-again", "K5", "The same grant again is answered with `TokenHeld` again."),
     Check("grant-of-a-run-is-one-for-each", "F8", ("A word of kind `RUN` is as good as one for each of its segments")),
@@ -178,10 +180,11 @@ def taking(stage: Stage, cast: Cast) -> Play:
     yield from stage.pause(1.0)
     key = _key(asked)
     giver, version = cast.holder(key)
-    lies: tuple[tuple[str, TokenGrant | TokenSeen], ...] = (
+    lies: tuple[tuple[str, TokenGrant | TokenSeen | TokenGiven], ...] = (
         ("grant-of-an-old-version-is-none", TokenGrant(giver, *key, version, stage.node)),
         ("grant-of-a-stranger-is-none", TokenGrant(stage.stranger, *key, version + 1, stage.node)),
         ("hint-is-no-right", TokenSeen(giver, *key, version + 1, stage.node)),
+        ("word-of-a-gift-is-no-grant", TokenGiven(giver, *key, version + 1, stage.node)),
     )
     for name, lie in lies:
         yield from _takes_not(stage, name, key, lie)
@@ -198,7 +201,7 @@ def taking(stage: Stage, cast: Cast) -> Play:
     yield from _given_away(stage, cast, desk, call)
 
 
-def _takes_not(stage: Stage, name: str, key: TokenKey, lie: TokenGrant | TokenSeen) -> Play:
+def _takes_not(stage: Stage, name: str, key: TokenKey, lie: TokenGrant | TokenSeen | TokenGiven) -> Play:
     begin_us = stage.now_us
     stage.say(lie)
     yield from stage.pause(0.4)
@@ -218,7 +221,14 @@ def _lied_to(stage: Stage, cast: Cast, key: TokenKey) -> Play:
     """Somebody grants what it does not hold; then its holder says that it gave it there."""
     giver, version = cast.holder(key)
     begin_us = stage.now_us
+    # It says first that it holds the token, which nobody has asked.
+    stage.say(TokenHeld(stage.other, *key, version + 1))
+    yield from stage.pause(0.3)
+    claim_us = stage.now_us
     stage.say(TokenGrant(stage.other, *key, version + 2, stage.node))
+    yield from stage.pause(0.3)
+    taken = [one for one in stage.since(TokenHeld, claim_us) if _key(one) == key]
+    stage.none_of("unasked-claim-is-a-hint", taken, "it believes who only says so")
     word = yield from stage.hears(TokenDispute, lambda one: (one.token_kind, one.token) == key, 2.0, begin_us)
     stage.judge("grant-of-who-holds-nothing-is-disputed", word, "no TokenDispute within 2 s", word)
     stage.judge("dispute-names-whom-it-believes", word and word.message.believed == giver, f"not {giver}", word)

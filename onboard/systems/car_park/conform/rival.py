@@ -1,12 +1,12 @@
 """Another robot of the kit's fleet: its plans, its places and its tokens; and when two plans meet (duties P4, P6)."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import sqrt
 from typing import NamedTuple
 
 from onboard.conform.cast import Cast
-from onboard.conform.stage import SECOND, Play, Stage
+from onboard.conform.stage import SECOND, Play, Stage, after_ms
 from onboard.contract.codes import Grade, LegAction, Side, TokenKind
 from onboard.contract.messages import Itinerary, Leg, Progress, Stamp, TokenGrant, TokenHeld, TokenRequest
 from onboard.core.site import Segment
@@ -18,7 +18,7 @@ _MEETS_MS = 10 + 90
 
 
 class Window(NamedTuple):
-    """When a plan is in a segment, bus time in ms since the play's own zero."""
+    """When a plan is in a segment, bus time in ms by the round nearest to now."""
 
     segment: Segment
     from_ms: int
@@ -51,8 +51,11 @@ class Rival:
 
     # --- plans ---------------------------------------------------------------------------------------------------
 
-    def way(self, *stops: tuple[int, float], first_s: float = 0.0) -> "Rival":
-        """A plan from home: out of the spur after ``first_s``, then to each index of the alley to work so long, s."""
+    def way(self, *stops: tuple[int, float], first_s: float = 0.0, slower_s: float = 0.0) -> "Rival":
+        """A plan from home: out of the spur after ``first_s``, then to each index of the alley to work so long, s.
+
+        Each run there takes ``slower_s`` longer than it must.
+        """
         self.legs = []
         if first_s:
             self._add(LegAction.STAND, self.home.track, self.home.index, self.home.index, round(first_s * 1000))
@@ -60,7 +63,7 @@ class Rival:
         self._turn(mouth.track, mouth.index)
         here = mouth.index
         for index, works_s in stops:
-            here = self._run(mouth.track, here, index)
+            here = self._run(mouth.track, here, index, round(slower_s * 1000))
             if works_s:
                 self._add(LegAction.WORK, mouth.track, here, here, round(works_s * 1000))
         return self
@@ -73,9 +76,9 @@ class Rival:
         self._turn(spur, 1)
         return self
 
-    def _run(self, track: int, begin: int, end: int) -> int:
+    def _run(self, track: int, begin: int, end: int, slower_ms: int = 0) -> int:
         if begin != end:
-            self._add(LegAction.TRAVEL, track, begin, end, self.desk.run_us(begin, end) // 1000)
+            self._add(LegAction.TRAVEL, track, begin, end, self.desk.run_us(begin, end) // 1000 + slower_ms)
         return end
 
     def _turn(self, track: int, index: int) -> None:
@@ -119,7 +122,7 @@ class Rival:
 
     def _follow(self) -> None:
         plan, now_ms = self.plan, self.stage.bus_ms()
-        number = sum(1 for leg in plan.legs if (now_ms - leg.end_ms + 2**31) % 2**32 >= 2**31)
+        number = sum(1 for leg in plan.legs if after_ms(now_ms, leg.end_ms) >= 0)
         leg = plan.legs[min(number, len(plan.legs) - 1)]
         is_over = number == len(plan.legs)
         at = Segment(leg.track, leg.to_index if is_over or leg.action is LegAction.WORK else leg.from_index)
@@ -161,12 +164,19 @@ class Rival:
 def windows(desk: Desk, plan: Itinerary) -> list[Window]:
     """When it is in which segment, at the least; the last one has no end."""
     found: list[Window] = []
-    begin_ms = plan.stamp.award_ms
+    first_ms = begin_ms = desk.stage.unrolled_ms(plan.stamp.award_ms)
     for leg in plan.legs:
-        found += _windows_of(desk, leg, begin_ms, leg.end_ms)
-        begin_ms = leg.end_ms
+        end_ms = first_ms + (leg.end_ms - plan.stamp.award_ms) % 2**32
+        found += _windows_of(desk, leg, begin_ms, end_ms)
+        begin_ms = end_ms
     last = plan.legs[-1]
     return [*found, Window(Segment(last.track, last.to_index), begin_ms, begin_ms + 3_600_000)]
+
+
+def _work_windows(desk: Desk, plan: Itinerary) -> list[Window]:
+    """The same up to the end of its last work: the way back, where it is not begun, yields to work (duty P7)."""
+    last = max((number for number, leg in enumerate(plan.legs, 1) if leg.action is LegAction.WORK), default=0)
+    return windows(desk, replace(plan, legs=plan.legs[:last]))[:-1] if last else []
 
 
 def _windows_of(desk: Desk, leg: Leg, begin_ms: int, end_ms: int) -> Iterator[Window]:
@@ -203,9 +213,14 @@ def _lasts_ms(speed: int, acceleration: int, way_mm: float) -> float:
     return 2000 * sqrt(way_mm / acceleration)
 
 
-def meeting(desk: Desk, one: Itinerary, other: Itinerary, from_ms: int = 0) -> tuple[Window, Window] | None:
-    """Where two plans are in one segment at once, behind ``from_ms``; None where they are nowhere."""
-    others = windows(desk, other)
+def meeting(
+    desk: Desk, one: Itinerary, other: Itinerary, from_ms: int = 0, *, way_back: bool = True
+) -> tuple[Window, Window] | None:
+    """Where two plans are in one segment at once, behind ``from_ms``; None where they are nowhere.
+
+    Without ``way_back`` that of the other counts for nothing.
+    """
+    others = windows(desk, other) if way_back else _work_windows(desk, other)
     for mine in windows(desk, one):
         for theirs in others:
             if mine.segment == theirs.segment:

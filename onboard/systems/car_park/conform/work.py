@@ -3,7 +3,7 @@
 from onboard.conform.cast import Cast, grants
 from onboard.conform.checks import Check
 from onboard.conform.player import Scene
-from onboard.conform.stage import SECOND, Heard, Play, Stage, Word
+from onboard.conform.stage import SECOND, Heard, Play, Stage, Word, after_ms
 from onboard.contract.codes import MachineState, Operation, Reason, TaskPhase, TokenKind
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import (
@@ -249,7 +249,7 @@ def fetched(stage: Stage, cast: Cast) -> Play:
     done = yield from _report(stage, call, TaskPhase.DONE, 10.0, begin_us)
     stage.judge("fetch-is-done", done, "no DONE within 10 s", done)
     if done is not None:
-        late_ms = (stage.bus_ms() - bid.message.cost + 2**31) % 2**32 - 2**31
+        late_ms = after_ms(stage.bus_ms(), bid.message.cost)
         stage.judge("fetch-is-done-when-it-was-promised", abs(late_ms) <= 3_000, f"{late_ms} ms later", bid, done)
         plans = stage.since(Itinerary, begin_us)
         # As many as it has steps: one that is over may have taken a little longer or shorter.

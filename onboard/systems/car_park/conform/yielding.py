@@ -14,6 +14,7 @@ from onboard.contract.messages import (
     TokenGrant,
     TokenHeld,
     TokenRequest,
+    Waiting,
 )
 from onboard.core.site import Segment
 from onboard.core.token_keys import TokenKey, genesis_holder
@@ -23,17 +24,20 @@ from onboard.systems.car_park.conform.rival import Rival, meeting
 _BODY = "Its body, and the segments whose tokens it holds, are in the way of all plans."
 _SINCE = "a robot only once it has told a firm itinerary since."
 _STANDS = "or that is a robot and stands where its plan has left for `T_stands`"
+_WAITS = "(`T_waits` where it says `Waiting`, `TaskReport`, `TokenRequest` or plans meanwhile)"
 _VOID = (
     "Of an obstacle bids do not count, plans are not planned around, and nobody comes behind it in an order of passing."
 )
 
 IN_THE_WAY = (
     Check("body-of-an-obstacle-is-in-the-way", "J7", _BODY),
+    Check("obstacle-without-rights-is-in-the-way", "J7", _BODY),
     Check("rights-of-an-obstacle-are-in-the-way", "J7", _BODY),
     Check("plan-of-an-obstacle-is-not-in-the-way", "J7", _VOID),
     Check("bids-when-an-obstacle-has-gone", "J7", _BODY),
     Check("robot-with-a-plan-takes-part-again", "J6", _SINCE),
     Check("robot-that-drives-takes-part", "J6", _STANDS),
+    Check("robot-that-says-it-waits-takes-part", "J6", _WAITS),
     Check("robot-that-stands-is-an-obstacle", "J6", _STANDS),
     Check("robot-that-lives-anew-has-no-plan", "R4", "I forget the plan, but not where its body is."),
     Check("robot-that-lives-anew-is-where-it-was", "R4", "I forget the plan, but not where its body is."),
@@ -63,9 +67,11 @@ def in_the_way(stage: Stage, cast: Cast) -> Play:
         bid = yield from desk.asks(desk.call())
         stage.judge(name, (bid is not None) is wanted, "no bid" if wanted else "it bid", bid)
 
-    rival.takes(near)
     rival.stands(near)
     yield from state(MachineState.OBSTACLE)
+    yield from bids("obstacle-without-rights-is-in-the-way", wanted=False)
+    rival.takes(near)
+    yield from stage.pause(2.5)
     yield from bids("body-of-an-obstacle-is-in-the-way", wanted=False)
     rival.stands()
     yield from stage.pause(2.5)
@@ -107,7 +113,7 @@ def _takes_part(stage: Stage, cast: Cast, desk: Desk, rival: Rival, least_ms: in
     rival.stands()
     yield from stage.pause(2.5)
     yield from against("robot-that-drives-takes-part", counts=True)
-    part.boot += 1
+    part.lives_anew()
     part.state = MachineState.STARTING
     cast.plans.pop(rival.node)
     cast.beat(part)
@@ -121,7 +127,12 @@ def _takes_part(stage: Stage, cast: Cast, desk: Desk, rival: Rival, least_ms: in
     yield from against("robot-that-lives-anew-is-where-it-was", counts=True)
     rival.way((desk.bay.index, 2.0)).into(free).tell()
     rival.is_at(rival.home, leg=0)
-    yield from stage.pause(75.0)
+    mouth = desk.segment_at(rival.home.track, 0)
+    for _ in range(8):
+        stage.say(Waiting(rival.node, mouth.track, mouth.index, stage.caller, Reason.TOKEN_NOT_GRANTABLE_YET))
+        yield from stage.pause(9.0)
+    yield from against("robot-that-says-it-waits-takes-part", counts=True)
+    yield from stage.pause(30.0)
     yield from against("robot-that-stands-is-an-obstacle", counts=False)
     # Only motion ends that.
     rival.is_at(desk.segment_at(rival.home.track, 0), speed_mm_s=500)
@@ -191,7 +202,7 @@ def _at_once(stage: Stage, desk: Desk, rival: Rival, name: str, *, older: bool, 
         if anew is not None:
             is_same = anew.message.stamp[1:] == mine[1:]
             stage.judge("gives-way-under-its-old-stamp", is_same, "another stamp", plan, anew)
-            meets = meeting(desk, anew.message, rival.plan, stage.bus_ms())
+            meets = meeting(desk, anew.message, rival.plan, stage.bus_us // 1000)
             stage.judge("keeps-to-the-other-plan", meets is None, f"{meets}", anew)
     elif holds:
         stage.judge(name, anew, "keeps its windows before who holds the tokens", plan, anew)
