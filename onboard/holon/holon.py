@@ -296,8 +296,9 @@ class Holon:
         self.fixed.heartbeat_due_us = now_us + self.site.timing.heartbeat_us
         self.holding.slept(now_us)
         self.witness.slept(now_us)
-        # One by one: all are asked at power-up only.
-        asked = [effect for node in self.mirror.peers for effect in self.witness.ask(node)]
+        # One by one: all are asked at power-up only, and who has asked them just then waits for their answers.
+        peers = self.mirror.peers if self.witness.is_over else ()
+        asked = [effect for node in peers for effect in self.witness.ask(node)]
         return [Report("woke after a sleep"), Send(self._heartbeat()), *asked]
 
     def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:

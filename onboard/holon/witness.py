@@ -213,7 +213,7 @@ class Witness:
     def slept(self, now_us: int) -> None:
         """I heard nothing for a while, or my clock has jumped: who has not answered has had no time to."""
         if not self.is_over and self._since_us is not None:
-            self._since_us = self._ask_at_us = now_us
+            self._since_us, self._ask_at_us = now_us, now_us + self.site.timing.heartbeat_us
 
     def ask(self, node: int, boot_before: int = 0) -> list[Effect]:
         """Ask one machine for all that it vouches for; what it says that it holds is believed until it has done."""

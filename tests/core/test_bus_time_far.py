@@ -2,9 +2,9 @@
 
 from bus_sim.sites import find_site
 from onboard.contract.codes import Reason
-from onboard.contract.messages import BusTime
+from onboard.contract.messages import BusTime, Heartbeat, SyncRequest
 from onboard.core.bus_time import BUS_TIME_MODULUS, FAR_US, MAX_SLEW_US, BusClock
-from onboard.core.effects import Effect, Send
+from onboard.core.effects import Effect, Report, Send
 from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 
@@ -152,3 +152,34 @@ def test_an_old_time_of_who_is_the_source_no_longer_sets_no_clock() -> None:
     for later_us in (quiet_us, quiet_us + 1_000):
         robot.receive(BusTime(LIFT, later_us + HOURS_US), later_us)
     assert robot.clock.bus_us(0) == HOURS_US, "it is the source once the lower one was silent for a heartbeat"
+
+
+def asked_alone(effects: list[Effect]) -> list[int]:
+    words = [effect.message for effect in effects if isinstance(effect, Send)]
+    return [word.whom for word in words if isinstance(word, SyncRequest) and word.whom]
+
+
+def beat(node: int) -> Heartbeat:
+    """Its first sign of life."""
+    words = [effect.message for effect in fixed(node).start(0) if isinstance(effect, Send)]
+    return next(word for word in words if isinstance(word, Heartbeat))
+
+
+def test_a_clock_that_is_set_while_all_answer_a_start_asks_nobody_alone() -> None:
+    """Where fifty start together the first times wait behind their words: each asked all the others one by one."""
+    robot = fixed(11)
+    effects = robot.start(0)
+    for node in (BAY, LIFT):
+        effects += robot.receive(beat(node), 1_000)
+    effects += robot.receive(BusTime(BAY, 5_000), 6_000)
+    for late_us in (300_000, 301_000):
+        effects += robot.receive(BusTime(BAY, late_us - 200_000), late_us)
+    for due_us in range(310_000, 380_000, 10_000):
+        effects += robot.wake(due_us)
+    assert Report("woke after a sleep") in effects, "its clock was set anew"
+    assert not asked_alone(effects)
+    for due_us in range(1_000_000, 5_000_000, 500_000):
+        for node in (BAY, LIFT):
+            effects += robot.receive(beat(node), due_us)
+        effects += robot.wake(due_us)
+    assert {BAY, LIFT} <= set(asked_alone(effects)), "who does not answer is asked again"
