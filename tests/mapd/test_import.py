@@ -140,14 +140,14 @@ def test_more_robots_than_can_start_on_the_bus_are_refused_with_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     wide, output = tmp_path / "wide.map", tmp_path / "site.toml"
-    wide.write_text("\n".join(mark * 50 for mark in "r.e"))
+    wide.write_text("\n".join(mark * 160 for mark in "r.e"))
     assert main(["import", str(wide), "-o", str(output)]) == 2
     assert capsys.readouterr().err.splitlines() == [
-        f"{wide}: robots = 50: 51 machines with the desk, whose start fills a bus of 500000 bit/s; "
-        "import at most 40 of them (--robots)"
+        f"{wide}: robots = 160: 161 machines with the desk, whose start fills a bus of 500000 bit/s; "
+        "import at most 150 of them (--robots)"
     ]
     assert not output.exists()
-    assert len(imported(tmp_path, wide, "--robots", "40").homes) == 40
+    assert len(imported(tmp_path, wide, "--robots", "150").homes) == 150
 
 
 def test_a_mistake_leaves_a_site_file_of_before_as_it_was(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-from math import isqrt
 from pathlib import Path
 
 from bus_sim.systems.mapd.importers.draft import Draft, site_text
@@ -12,10 +11,12 @@ from onboard.bounded_file import MOST_EXPORT
 from onboard.config.files import read_text
 from onboard.config.problems import ConfigError, Problems
 from onboard.config.site import parse_site
-from onboard.holon.witness import AGAIN_US
+from onboard.holon.witness import FIRST_SLOT_US
 
-#: A question with what arbitration and stuffing make of it, as measured: 294 us at 500 kbit/s.
-QUESTION_BITS = 147
+#: A frame of the start with what arbitration and stuffing make of it, as measured: 294 us at 500 kbit/s.
+START_FRAME_BITS = 147
+#: What each machine says at a start before others ask it alone, as measured with 121 of them.
+START_FRAMES = 9
 
 _KINDS = "a map (.map, with a .task file or without), an openTCS model (.xml) or an Open-RMF building (.yaml)"
 
@@ -32,12 +33,11 @@ def add_import(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 
 def most_machines(bitrate: int) -> int:
-    """So many can start together: all ask all (``onboard.holon.witness``), which must be over before they ask again.
+    """So many can start together: all ask all, and answer, before any is asked alone (``onboard.holon.witness``).
 
-    More of them fill the bus with questions that are asked again and again, and no step begins (docs/figures.md).
+    Of more of them each would ask those whose answers still wait, and all would wait longer (docs/figures.md).
     """
-    frames = bitrate * AGAIN_US // 1_000_000 // QUESTION_BITS
-    return isqrt(frames)
+    return bitrate * FIRST_SLOT_US // 1_000_000 // (START_FRAMES * START_FRAME_BITS)
 
 
 def _positive(text: str) -> int:
