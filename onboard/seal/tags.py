@@ -27,8 +27,8 @@ def _begun(key: bytes) -> blake2s:
 
 def bytes_of(frame: Frame) -> bytes:
     """What of one frame goes into a tag."""
-    arbitration_id, data, *_ = frame
-    return _FRAME(arbitration_id, len(data)) + data
+    data = frame.data
+    return _FRAME(frame.arbitration_id, len(data)) + data
 
 
 def tag_over(key: bytes, number: int, said: bytes, taker: int = 0, nonce: int = 0) -> int:
