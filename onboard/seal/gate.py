@@ -13,7 +13,15 @@ from onboard.contract.constants import MAX_NODE_ID, NOBODY
 from onboard.contract.messages import EmergencyStop, Heartbeat, Message
 from onboard.contract.seal import Seal, SealAnswer, SealChallenge, SealFault, SealTo, SealWord
 from onboard.core.frame import Frame
-from onboard.seal.heard import MOST_WAITING, WAITS_US, HeardNode, WaitingFrame, readings
+from onboard.seal.heard import (
+    MOST_WAITING,
+    TWINS_AFTER_US,
+    WAITS_US,
+    HeardNode,
+    WaitingFrame,
+    readings,
+    readings_among_twins,
+)
 from onboard.seal.keys import Keys
 from onboard.seal.sender import SealingSender
 from onboard.seal.subjects import Reading, frame_of, taker_of
@@ -238,6 +246,9 @@ class Gate:
             if heard.free is not None and self._fitting(seal, number, [heard.free]):
                 heard.proved(number, now_us)
                 return [], []
+            found = self._among_twins(seal, number, heard, now_us)
+            if found is not None:
+                return self._take_up(seal.sender, heard, number, found, now_us), []
         if heard.last is None:
             self._drop_all(seal.sender, heard, SealWord.NOT_FRESH)
             return [], self._ask(seal.sender, heard, now_us)
@@ -375,7 +386,20 @@ class Gate:
 
     def _fitting(self, seal: Seal, number: int, waiting: Iterable[WaitingFrame]) -> Sequence[WaitingFrame] | None:
         """What of the frames that wait the seal is over, under that number; None where that is nothing."""
-        for found in readings(list(waiting)):
+        return self._first(seal, number, readings(list(waiting)))
+
+    def _among_twins(self, seal: Seal, number: int, heard: HeardNode, now_us: int) -> Sequence[WaitingFrame] | None:
+        """The same where others have spoken more than once in its sender's name; not tried again at once in vain."""
+        if now_us < heard.twins_us:
+            return None
+        found = self._first(seal, number, readings_among_twins(list(heard.waiting)))
+        heard.twins_us = now_us + TWINS_AFTER_US if found is None else 0
+        return found
+
+    def _first(
+        self, seal: Seal, number: int, sequences: Iterable[Sequence[WaitingFrame]]
+    ) -> Sequence[WaitingFrame] | None:
+        for found in sequences:
             if seal.tag == tag_over(self._keys.group, number, b"".join([one.said for one in found])):
                 return found
         return None

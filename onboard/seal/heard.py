@@ -1,8 +1,9 @@
 """What was heard of one node: its number, and the frames that wait for their seal."""
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 
 from onboard.contract.messages import Heartbeat
 from onboard.core.frame import Frame
@@ -11,11 +12,15 @@ from onboard.seal.subjects import UNSEALED_FOR_US, CarPlaces, life_told
 from onboard.seal.tags import bytes_of
 
 #: Most frames of one node that wait for a seal: those of one, and what others may say between them in its name.
-MOST_WAITING = MOST_SEALED + 4
+MOST_WAITING = 2 * MOST_SEALED
 #: So long a frame waits for its seal, us; they are said together, but a bus can be busy.
 WAITS_US = 500_000
 #: After so long without any seal of a node its signs of life do not count unsealed: two seals may be lost, us.
 UNHEARD_US = 5 * UNSEALED_FOR_US // 2
+#: Frames of one node that may be another's twins of those before them, where a seal is over none of the usual ones.
+_MOST_TWINS = 6
+#: So long after that was tried in vain it is not tried again, us: whoever says false seals shall not keep a board busy.
+TWINS_AFTER_US = 50_000
 #: Challenges of mine that a node may still answer.
 _NONCES = 3
 
@@ -59,6 +64,8 @@ class HeardNode:
     misfits: int = 0
     ask_us: int = 0
     patience_us: int = 0
+    #: When it may be tried next which of the frames that wait are another's, us.
+    twins_us: int = 0
     _told: tuple[int, ...] = ()
     _sealed_us: int = 0
 
@@ -93,3 +100,28 @@ def readings(waiting: Sequence[WaitingFrame]) -> Iterator[Sequence[WaitingFrame]
     if whole <= MOST_SEALED + 1:
         for left_out in range(1, whole - 1):
             yield [*waiting[:left_out], *waiting[left_out + 1 :]]
+
+
+def readings_among_twins(waiting: Sequence[WaitingFrame]) -> Iterator[Sequence[WaitingFrame]]:
+    """What a seal may be over where others spoke more than once before it, in its sender's name.
+
+    First without those that say anew what one of the two before them said, which is what they are that flip a bit or
+    repeat; then of the last ones, as those of before may wait for nothing, without any one or two. At most 63 and 219
+    sequences, none of more than ``MOST_SEALED`` frames.
+    """
+    whole = len(waiting)
+    identifiers = [one.frame.arbitration_id for one in waiting]
+    again = [at for at in range(1, whole) if identifiers[at] in identifiers[max(0, at - 2) : at]][:_MOST_TWINS]
+    for count in range(len(again), 0, -1):
+        if whole - count <= MOST_SEALED:
+            yield from (_without(waiting, left_out) for left_out in combinations(again, count))
+    for first in range(max(0, whole - MOST_SEALED - 2), whole - 1):
+        for count in (1, 2):
+            if count < whole - first <= MOST_SEALED + count:
+                yield from (
+                    _without(waiting[first:], left_out) for left_out in combinations(range(whole - first), count)
+                )
+
+
+def _without(waiting: Sequence[WaitingFrame], left_out: Collection[int]) -> Sequence[WaitingFrame]:
+    return [one for at, one in enumerate(waiting) if at not in left_out]

@@ -115,6 +115,24 @@ def test_somebody_who_speaks_in_between_does_not_spoil_a_seal() -> None:
     assert faults(wire, 5) == {(1, SealWord.UNSEALED): 2}
 
 
+@pytest.mark.parametrize("at", [(0, 5), (1, 2), (3, 6)], ids=str)
+def test_somebody_who_says_each_word_a_little_otherwise_does_not_spoil_a_seal(at: tuple[int, ...]) -> None:
+    """A decision that is lost at all is no lost frame, which CAN would say again: nobody would ever hear of it."""
+    decision = [HELD if place % 2 else CarAt(1, Reference(1, 1), 258, place, 2800) for place in range(MOST_SEALED)]
+    wire = wire_of()
+    gate = wire.gates[1]
+    for place, word in enumerate(decision):
+        (frame,) = CODEC.encode(word)
+        said = gate.say(frame, wire.now_us)
+        wire.put(said[:1], 1)
+        if place in at:
+            wire.put([frame._replace(data=frame.data[:-1] + bytes([frame.data[-1] ^ 1]))])
+        wire.put(said[1:], 1)
+    wire.put(gate.seal(wire.now_us), 1)
+    assert wire.heard[5] == decision
+    assert faults(wire, 5) == {(1, SealWord.UNSEALED): len(at)}
+
+
 def test_signs_of_life_that_say_nothing_new_go_without_a_seal_for_a_while() -> None:
     wire = wire_of()
     said = [names(wire.say(beat(digest=number))) for number in range(4)]
