@@ -40,9 +40,8 @@ def _differences(old: object, new: object, where: str, aside: set[str]) -> Itera
                 name = f"{where}.{one.name}" if where else one.name
                 yield from _differences(getattr(old, one.name), getattr(new, one.name), name, set())
     elif isinstance(old, Mapping) and isinstance(new, Mapping):
-        for key in old.keys() - new.keys():
-            yield f"{where}[{key}]", "left out"
-        for key in old.keys() & new.keys():
+        yield from ((f"{where}[{key}]", "left out") for key in old if key not in new)
+        for key in (key for key in old if key in new):
             yield from _differences(old[key], new[key], f"{where}[{key}]", set())
     elif old != new and not _is_longer(old, new):
         yield where, f"{_short(old)} before, {_short(new)} here"

@@ -2,7 +2,7 @@
 
 from onboard.contract.change import ChangePhase, SiteNext
 from onboard.contract.codes import MachineState
-from onboard.contract.messages import Heartbeat, Message
+from onboard.contract.messages import Message
 from onboard.operate.order import DONE, NOT_CONFIRMED, OperatorCommand
 from onboard.operate.park import Park
 
@@ -53,17 +53,16 @@ class ChangeCommand(OperatorCommand):
         if self.status is not None or message.sender not in self.park.machines:
             return
         name, node, new = self.park.name(message.sender), message.sender, self.park.site.digest
-        if isinstance(message, SiteNext) and message.change_phase is ChangePhase.HEARD:
-            if node not in self._counting and {message.site_digest, message.next_digest} == {self._old, new}:
-                self._counting.add(node)
-                self.tell(f"{name} counts both")
-        elif isinstance(message, Heartbeat):
-            takes_part = message.site_digest == new and message.state is not MachineState.STARTING
-            if takes_part and node not in self._changed:
-                self._changed.add(node)
-                left = [self.park.name(one) for one in self.park.machines if one not in self._changed]
-                self.tell(f"{name} takes part by the new file" + (f"; to come: {', '.join(left)}" if left else ""))
-                self._wake_us = self._wake_us if left else now_us
+        if node not in self._counting and isinstance(message, SiteNext) and message.change_phase is ChangePhase.HEARD:
+            self._counting.add(node)
+            self.tell(f"{name} counts both")
+        beat = self.park.machines[node].beat
+        takes_part = beat is not None and beat.site_digest == new and beat.state is not MachineState.STARTING
+        if takes_part and node not in self._changed:
+            self._changed.add(node)
+            left = [self.park.name(one) for one in self.park.machines if one not in self._changed]
+            self.tell(f"{name} takes part by the new file" + (f"; to come: {', '.join(left)}" if left else ""))
+            self._wake_us = self._wake_us if left else now_us
 
     def wake(self, now_us: int) -> list[Message]:
         """The announcement; once all take part by the new file, that it is over."""
