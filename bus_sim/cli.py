@@ -28,6 +28,7 @@ from bus_sim.virtual_time import DeadlockError, StandstillError
 from onboard import __version__
 from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
+from onboard.config.site_change import added_machines
 from onboard.config.site_report import site_report
 from onboard.core.site import Site
 from onboard.entry import INTERRUPTED
@@ -149,6 +150,20 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         default=[],
         metavar="MACHINE",
         help="leave this machine's controller out; it may join from another process",
+    )
+    how.add_argument(
+        "--was",
+        metavar="SITE",
+        help="machines begin with this site file, which that of the run follows with more machines while they work "
+        "(onboard operate change-site)",
+    )
+    how.add_argument(
+        "--change-at",
+        type=float,
+        dest="change_s",
+        default=60.0,
+        metavar="SECONDS",
+        help="with --was: when an operator announces that (default: 60)",
     )
     how.add_argument(
         "--fault",
@@ -403,6 +418,8 @@ def _options(args: argparse.Namespace, site: Site) -> RunOptions:
         limit_s=args.limit_s,
         demand=demand,
         without=frozenset(args.without),
+        was=_was(args, site),
+        change_s=args.change_s,
         faults=tuple(faults),
         prepare=_planted(system, args.plant_bug),
         trace=args.trace,
@@ -416,6 +433,19 @@ def _options(args: argparse.Namespace, site: Site) -> RunOptions:
         web=_web(args),
         web_token=args.web_token,
     )
+
+
+def _was(args: argparse.Namespace, site: Site) -> Site | None:
+    """The site file that machines begin with. Raises ``ConfigError`` for one that this site cannot follow."""
+    if args.was is None:
+        return None
+    if not 0 <= args.change_s < float("inf"):
+        raise OptionError(f"--change-at {args.change_s:g}: must be seconds, 0 or more")
+    if args.processes:
+        raise OptionError("--was: with --processes each machine reads its site file itself; leave one of them out")
+    old = find_site(args.was)
+    added_machines(old, site, args.site or DEFAULT_SITE)
+    return old
 
 
 def _web(args: argparse.Namespace) -> str | None:

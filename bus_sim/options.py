@@ -7,6 +7,7 @@ from typing import Any
 
 from bus_sim.faults.injection import AnyFault
 from bus_sim.processes.plan import ProcessPlan
+from onboard.core.site import Site
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,9 @@ class RunOptions:
     #: Machines whose controllers are left out: somebody else runs them, or nobody.
     without: frozenset[str] = frozenset()
     faults: tuple[AnyFault, ...] = ()
+    #: The site file that machines begin with, where that of the run follows it, and when that is announced, s.
+    was: Site | None = None
+    change_s: float = 60.0
     #: Given the run before it is switched on: mistakes that are planted come in here.
     prepare: Callable[[Any], None] | None = None
     trace: Path | None = None

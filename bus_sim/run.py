@@ -111,6 +111,8 @@ class BusRun(Generic[PlantT]):
     after_repair: list[Callable[[], None]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        #: By node-ID the site file that a machine has; who is not among them has no controller yet.
+        self.in_force = dict.fromkeys(self.site.machines, self.site)
         self.codecs = codecs_for(self.site)
         #: What machines of a kind share; drawn from the seed.
         self.secret = blake2s(f"secret:{self.options.seed}".encode()).digest()
@@ -121,20 +123,20 @@ class BusRun(Generic[PlantT]):
         self._tap()
         self.plant.start()
         for machine in self.site.machines.values():
-            if machine.name not in self.options.without:
+            if machine.name not in self.options.without and machine.node_id in self.in_force:
                 self.start_controller(machine)
 
     def start_controller(self, machine: Machine) -> None:
         """Power up one machine's controller; a second time means a restart, with the same journal."""
         journal = self.journals.setdefault(machine.node_id, SimulatedJournal(journal_owner(self.site, machine)))
-        entries = journal.replay()
+        entries, site = journal.replay(), self.in_force[machine.node_id]
         holon = self.holon_class(
-            self.site,
+            site,
             machine,
-            with_secrets(self.factories(self.site, machine.kind), (self.secret,)),
+            with_secrets(self.factories(site, machine.kind), (self.secret,)),
             boot=next_boot(entries),
             entries=entries,
-            journal=condition_for(self.site, journal.condition, entries, journal.name),
+            journal=condition_for(site, journal.condition, entries, journal.name),
         )
         ports = Ports(
             self.seals.behind_gate(self.fleet.attach(machine.name, machine.node_id), machine.node_id),
@@ -142,7 +144,7 @@ class BusRun(Generic[PlantT]):
             journal,
             self.log,
             NoWatchdog(),
-            compaction_for(self.site),
+            compaction_for(site),
         )
         controller = Controller(holon, ports, self.codecs.fleet, self.codecs.device)
         self.controllers[machine.node_id] = controller

@@ -21,6 +21,7 @@ from bus_sim.outside import Outside
 from bus_sim.processes.fleet import ProcessFleet
 from bus_sim.publish import Publishing
 from bus_sim.run import BusRun, run_until
+from bus_sim.site_change import roll_out
 from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.stage import EndedRun, PersonAtKeys, RunFigures, Show, SystemStage
 from bus_sim.systems.system import SimulatedSystem
@@ -112,6 +113,8 @@ class _Session:
         run, options, stage = self._run, self._options, self.stage
         self._say(*stage.head())
         arm(run, options.faults)
+        if options.was is not None:
+            roll_out(run, options.was, round(options.change_s * 1_000_000))
         if options.prepare is not None:
             options.prepare(run)
         self._begin_s = time.monotonic()

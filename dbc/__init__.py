@@ -1,9 +1,9 @@
-"""The wire contract as data: four files of all systems, and what single systems add. This only finds the files."""
+"""The wire contract as data: five files of all systems, and what single systems add. This only finds the files."""
 
 from importlib.resources import files
 
 #: What is no single system's.
-_OF_ALL = ("fleet.dbc", "device.dbc", "seal.dbc", "battery.dbc")
+_OF_ALL = ("fleet.dbc", "device.dbc", "seal.dbc", "battery.dbc", "change.dbc")
 
 
 def fleet_dbc_text() -> str:
@@ -24,6 +24,11 @@ def seal_dbc_text() -> str:
 def battery_dbc_text() -> str:
     """Text of what machines with a battery tell of it on the fleet bus; only sites with batteries have it said."""
     return files(__name__).joinpath("battery.dbc").read_text(encoding="utf-8")
+
+
+def change_dbc_text() -> str:
+    """Text of the word of a change of site on the fleet bus; said while an operator rolls one out, and never else."""
+    return files(__name__).joinpath("change.dbc").read_text(encoding="utf-8")
 
 
 def systems() -> list[str]:

@@ -48,6 +48,7 @@ from onboard.holon.presence import Presence
 from onboard.holon.regeneration import Regenerating
 from onboard.holon.rights import RightsTalk
 from onboard.holon.schedule import Schedule
+from onboard.holon.site_change import SiteChange
 from onboard.holon.taking_part import TakingPart
 from onboard.holon.timekeeper import TimeHeard, Timekeeper
 from onboard.holon.witness import Doubt, Witness
@@ -107,8 +108,9 @@ class Holon:
         self.rights = RightsTalk(self.fleet, self._may_grant, self.witness)
         self.regeneration = Regenerating(self.tokens, self.mirror, self._statements, self._thaw)
         self.regeneration.replay(entries)
+        self.change = SiteChange(machine.node_id, site.digest)
         self.regeneration.refuses = lambda: self.holding.why.reason if self.holding.is_apart else Reason.NONE
-        self.part = TakingPart(self.presence, self.holding, self.regeneration, self.witness, self.time)
+        self.part = TakingPart(self.presence, self.holding, self.regeneration, self.witness, self.time, self.change)
         self.fleet.motion.why_still = self.part.why_still
         self.rights.is_frozen = self.mirror.is_frozen = lambda: self.regeneration.is_frozen
         if self.holding.why.reason in RIGHTS_LOST:
@@ -121,6 +123,7 @@ class Holon:
         self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
             **self.rights.handlers(),
             **self.regeneration.handlers(),
+            **self.change.handlers(),
             **dict.fromkeys((CallForProposals, Bid, Award, TaskReport, LeftOut), self._negotiate),
             Itinerary: self._on_itinerary,
             Progress: self._on_progress,
@@ -244,7 +247,7 @@ class Holon:
         self.time.elect(local_us)
         now_us = self.clock.bus_us(local_us)
         effects += self.holds.apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
-        effects += self.regeneration.wake(now_us)
+        effects += self.regeneration.wake(now_us) + self.change.wake(now_us)
         if not self.holding.is_apart:
             effects += self.witness.wake(now_us)
         if self.part.deals:
@@ -360,7 +363,7 @@ class Holon:
 
     def _on_heartbeat(self, beat: Heartbeat, now_us: int) -> list[Effect]:
         news = self.regeneration.on_heartbeat(beat, now_us)
-        reason = self.regeneration.strange(beat)
+        reason = self.change.strange(beat, self.regeneration.epoch)
         if reason is not Reason.NONE:
             self.drops[reason] += 1
             self.presence.heard_foreign(beat.sender, reason, now_us)
@@ -470,10 +473,7 @@ class Holon:
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
         effects: list[Effect] = []
         for item in outcome:
-            if isinstance(item, EVENT_TYPES):
-                effects += self.behaviour.negotiated(item, now_us)
-            else:
-                effects.append(item)
+            effects += self.behaviour.negotiated(item, now_us) if isinstance(item, EVENT_TYPES) else [item]
         return effects
 
     def _all_drops(self) -> Counter[Reason]:

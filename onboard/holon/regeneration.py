@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from onboard.contract.assignments import assignment_digest
-from onboard.contract.codes import CONTRACT_VERSION, MachineState, Reason, RegenerationPhase, TokenKind
+from onboard.contract.codes import MachineState, Reason, RegenerationPhase, TokenKind
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import (
     Heartbeat,
@@ -124,14 +124,6 @@ class Regenerating:
         if self.phase is RegenerationPhase.FREEZE and may_exist(self.site, key):
             self._list[key] = word
         return []
-
-    def strange(self, beat: Heartbeat) -> Reason:
-        """Why a machine's words do not count: another contract, another site, or rights of another epoch; or NONE."""
-        if beat.contract != CONTRACT_VERSION:
-            return Reason.OTHER_CONTRACT
-        if beat.site_digest != self.site.digest:
-            return Reason.OTHER_SITE
-        return Reason.NONE if beat.epoch == self.epoch else Reason.OTHER_EPOCH
 
     def on_heartbeat(self, beat: Heartbeat, now_us: int) -> list[Effect]:
         """Somebody lives in the epoch of my list: it counts. Somebody of mine works: it does not."""

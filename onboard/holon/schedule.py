@@ -48,8 +48,8 @@ class Schedule:
     _looks_from_us: int = 0
     #: Who said last what changes nothing, by node.
     _unchanged: dict[int, Peer] = field(default_factory=dict)
-    #: The mirror, the epoch of the rights, and whether I send bus time, as they were when that was found.
-    _ground: tuple[int, int, bool] | None = None
+    #: The mirror, the epoch of the rights, whether I send bus time, and which other site counts, as they were then.
+    _ground: tuple[int, int, bool, int] | None = None
     _attentive: Attentive | None = field(init=False)
 
     def __post_init__(self) -> None:
@@ -113,7 +113,8 @@ class Schedule:
     def _first_of_rest_us(self) -> int | None:
         """The same of all but the behaviour, and the negotiation of which it is a part."""
         part, is_apart = self.part, self.part.holding.is_apart
-        times = [part.holding.next_wake(), part.regeneration.next_wake(), part.presence.held_until_us]
+        times = [part.holding.next_wake(), part.regeneration.next_wake(), part.change.next_wake()]
+        times.append(part.presence.held_until_us)
         if not is_apart:
             times.append(part.witness.next_wake())
         if not (is_apart or part.regeneration.is_frozen):
@@ -169,7 +170,7 @@ class Schedule:
         """Let go of whose word said nothing new, unless all that this was judged by is as it was."""
         part, mirror = self.part, self.fleet.mirror
         is_usual = not (mirror.aside or part.presence.foreign or part.presence.halts) and part.deals
-        ground = mirror.digest(), part.regeneration.epoch, part.time.clock.is_source
+        ground = mirror.digest(), part.regeneration.epoch, part.time.clock.is_source, part.change.other
         if ground != self._ground or not is_usual:
             self._unchanged.clear()
         self._ground = ground

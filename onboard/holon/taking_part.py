@@ -7,6 +7,7 @@ from onboard.contract.messages import Heartbeat
 from onboard.holon.holding import MachineHolds
 from onboard.holon.presence import Presence
 from onboard.holon.regeneration import Regenerating
+from onboard.holon.site_change import SiteChange
 from onboard.holon.timekeeper import Timekeeper
 from onboard.holon.witness import Witness
 
@@ -23,6 +24,7 @@ class TakingPart:
     regeneration: Regenerating
     witness: Witness
     time: Timekeeper
+    change: SiteChange
 
     @property
     def is_still(self) -> bool:
@@ -62,7 +64,7 @@ class TakingPart:
         """
         if not self.deals or (self.time.clock.is_source and beat.sender < self.time.machine.node_id):
             return False
-        if self.regeneration.strange(beat) is not Reason.NONE or not self.witness.agrees(beat):
+        if self.change.strange(beat, self.regeneration.epoch) is not Reason.NONE or not self.witness.agrees(beat):
             return False
         if not self.presence.lives_on(beat, now_us):
             return False

@@ -6,12 +6,14 @@ import contextlib
 import sys
 import time
 from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from onboard.config.arguments import Parser
 from onboard.config.keys import tool_keys
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
+from onboard.config.site_change import added_machines
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError, BusSettings, add_site_arguments, bus_settings, open_bus, parse_with_bus
 from onboard.io.seal_lives import SealLivesError
@@ -83,6 +85,8 @@ def build_parser() -> argparse.ArgumentParser:
     )
     command("hold", "a machine comes to rest, and stands").add_argument("machine", metavar="MACHINE")
     command("release", "a machine that is held goes on").add_argument("machine", metavar="MACHINE")
+    change = command("change-site", "a new site file (--site), with more machines, is rolled out while the site works")
+    change.add_argument("old", type=Path, metavar="OLD", help="the site file that it follows")
     regenerate = command("regenerate", "the rights of a machine whose journal is lost are made anew")
     regenerate.add_argument("machine", metavar="MACHINE", help="whose rights; it holds, or is --absent")
     regenerate.add_argument("--absent", default="", metavar="MACHINE", help="a machine that is off and locked off")
@@ -108,7 +112,12 @@ def main(argv: Sequence[str]) -> int:
         if args.node is not None:
             tool_of(args.node)
         # Another life of this station begins elsewhere in the numbers of orders.
-        make = maker_of(site, request_of(args), seed=time.time_ns() // 1_000_000_000)
+        asked = request_of(args)
+        if args.command == "change-site":
+            old = load_site(args.old)
+            added_machines(old, site, str(args.site))
+            asked = replace(asked, replaces=old.digest)
+        make = maker_of(site, asked, seed=time.time_ns() // 1_000_000_000)
         settings = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
         keys = None if args.command == "status" else tool_keys(args.keys, site, args.node)
         return asyncio.run(_run(args, site, settings, make, keys))

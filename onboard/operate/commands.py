@@ -11,6 +11,7 @@ from onboard.core.site import Machine, Site
 from onboard.holon.remedies import START_ANEW, remedy
 from onboard.operate.assignment import BodySlots
 from onboard.operate.blocks import Mark
+from onboard.operate.change import ChangeCommand
 from onboard.operate.holds import HoldCommand
 from onboard.operate.names import OperateError, machine_of, movable_of, node_of, reason_of, segment_of, slot_of
 from onboard.operate.order import OperatorCommand
@@ -44,6 +45,8 @@ class CommandRequest:
     body: tuple[str, ...] = ()
     absent: str = ""
     absent_body: tuple[str, ...] = ()
+    #: Of change-site: the digest of the site file that the new one follows.
+    replaces: int = 0
 
 
 def maker_of(site: Site, asked: CommandRequest, seed: int) -> Maker:
@@ -65,6 +68,14 @@ def maker_of(site: Site, asked: CommandRequest, seed: int) -> Maker:
             return partial(HoldCommand, machine=movable_of(site, asked.machine), holds=True, seed=seed)
         case "release":
             return partial(_release, site=site, machine=machine_of(site, asked.machine), seed=seed)
+    return _maker_of_change(site, asked)
+
+
+def _maker_of_change(site: Site, asked: CommandRequest) -> Maker:
+    """The same of what changes the rights, or the site."""
+    match asked.command:
+        case "change-site":
+            return partial(ChangeCommand, old=asked.replaces)
         case "regenerate":
             return partial(_regenerate, site=site, who=_lost_of(site, asked))
     raise OperateError(f"{asked.command}: no command")

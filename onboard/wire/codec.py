@@ -21,7 +21,7 @@ from onboard.contract.messages import (
     ItineraryLeg,
     Message,
 )
-from onboard.contract.packing import battery, calls, device, plans, presence, rights, seal
+from onboard.contract.packing import battery, calls, change, device, plans, presence, rights, seal
 from onboard.core.frame import Frame
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.wire.speakers import speakers_of
@@ -32,7 +32,15 @@ NO_WHEELBASE_MM = 1500
 #: Decoded frames kept for the other receivers of the same frame: a simulated fleet decodes each frame once.
 _MEMORY = 1024
 #: Frames of the two contracts of all.
-_FLEET = (*presence.FRAMES, *rights.FRAMES, *calls.FRAMES, *plans.FRAMES, *seal.FRAMES, *battery.FRAMES)
+_FLEET = (
+    *presence.FRAMES,
+    *rights.FRAMES,
+    *calls.FRAMES,
+    *plans.FRAMES,
+    *seal.FRAMES,
+    *battery.FRAMES,
+    *change.FRAMES,
+)
 _DEVICE = device.FRAMES
 #: ``Frame`` from a tuple of all its fields: half the time of naming those that are not as usual.
 _frame_of: Callable[[type[Frame], Any], Frame] = tuple.__new__

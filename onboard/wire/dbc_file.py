@@ -14,7 +14,7 @@ from cantools.database import Signal as DbcSignal
 from cantools.database.can.database import Database
 from cantools.database.namedsignalvalue import NamedSignalValue
 
-from dbc import battery_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text
+from dbc import battery_dbc_text, change_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,8 +153,9 @@ CONTROLLER = "Controller"
 
 @cache
 def fleet_layouts(system: str = "") -> tuple[MessageLayout, ...]:
-    """Layouts of ``dbc/fleet.dbc``, ``seal.dbc`` and ``battery.dbc``, and of what a system adds to the fleet bus."""
-    return (*read_layouts(fleet_dbc_text()), *seal_layouts(), *battery_layouts(), *system_layouts(system)[0])
+    """Layouts of the fleet bus: of all four files of all systems, and of what a system adds."""
+    beside = (*seal_layouts(), *battery_layouts(), *change_layouts())
+    return (*read_layouts(fleet_dbc_text()), *beside, *system_layouts(system)[0])
 
 
 def seal_layouts() -> tuple[MessageLayout, ...]:
@@ -165,6 +166,11 @@ def seal_layouts() -> tuple[MessageLayout, ...]:
 def battery_layouts() -> tuple[MessageLayout, ...]:
     """What machines tell of their batteries: in the contract of every site, said only where its file has them."""
     return read_layouts(battery_dbc_text())
+
+
+def change_layouts() -> tuple[MessageLayout, ...]:
+    """The word of a change of site: in the contract of every site, said only while an operator changes it."""
+    return read_layouts(change_dbc_text())
 
 
 @cache

@@ -5,11 +5,20 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
-from dbc import battery_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text, systems
+from dbc import (
+    battery_dbc_text,
+    change_dbc_text,
+    device_dbc_text,
+    fleet_dbc_text,
+    seal_dbc_text,
+    system_dbc_text,
+    systems,
+)
 from onboard.wire.dbc_file import (
     MessageLayout,
     SignalLayout,
     battery_layouts,
+    change_layouts,
     device_layouts,
     fleet_layouts,
     read_annotations,
@@ -63,7 +72,7 @@ def _link(name: str) -> str:
 def _value_tables() -> dict[tuple[tuple[int, str], ...], str]:
     """Name of each value table of the two contracts of all (``VAL_TABLE_``), by its content."""
     named: dict[tuple[tuple[int, str], ...], str] = {}
-    for text in (fleet_dbc_text(), device_dbc_text(), seal_dbc_text(), battery_dbc_text()):
+    for text in (fleet_dbc_text(), device_dbc_text(), seal_dbc_text(), battery_dbc_text(), change_dbc_text()):
         named |= {choices: name for name, choices in read_annotations(text).tables.items()}
     return {**named, ((0, "NO"), (1, "YES")): "Answer"}
 
@@ -141,6 +150,7 @@ def network_page() -> str:
         *_bus("Fleet bus", fleet_dbc_text(), read_layouts(fleet_dbc_text())),
         *_bus("Seals on the fleet bus", seal_dbc_text(), seal_layouts()),
         *_bus("Batteries on the fleet bus", battery_dbc_text(), battery_layouts()),
+        *_bus("A change of site on the fleet bus", change_dbc_text(), change_layouts()),
         *_bus("Device bus", device_dbc_text(), device_layouts()),
     ]
     layouts = [*fleet_layouts(), *device_layouts()]

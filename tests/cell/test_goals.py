@@ -1,18 +1,23 @@
 """Several goals, deadlines, joining robots, goals that cannot be achieved, faults (rows C02, C15 to C17, C19)."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import pytest
 
 from bus_sim.run import BusRun
+from bus_sim.site_change import roll_out
 from bus_sim.systems.cell.tree import ContractTree
+from onboard.config.site import site_digest
 from onboard.contract.cell import ArmProgress, PartAt
+from onboard.contract.change import ChangePhase, SiteNext
 from onboard.contract.codes import OrderResult, TaskPhase
 from onboard.contract.messages import Bid, CallForProposals, Heartbeat, Reference, TaskReport
 from onboard.systems.cell.contracts import Goal
 from onboard.systems.cell.geometry import Area, distance_m
+from onboard.systems.cell.site import Cell
 from tests.cell.playing import Scene, cell, goal_demand
 from tests.cell.witness import ARMS, DESK, arm, metres
 from tests.cut import Timed, shown_at
@@ -43,6 +48,45 @@ def test_c02_a_robot_that_joins_makes_the_goal_possible() -> None:
         assert done[-1:] == [Reference(DESK, 1)]
 
     shown_at(check, scene.played.messages, Heartbeat, CallForProposals, Bid, TaskReport)
+
+
+def test_c02_a_robot_that_was_in_no_site_file_joins_live() -> None:
+    """The operator rolls out a file with one robot more; heartbeats name both sites, and all stay machines of one."""
+    new = _with_digest(cell())
+    old = _with_digest(cell(arms=tuple(one for one in ARMS if one.node_id != 3)))
+    scene = Scene(new, partial(roll_out, old=old, at_us=40_000_000))
+    scene.assert_sound()
+    assert scene.entries[0].result is OrderResult.DONE
+    others = set(old.machines)
+
+    def check(heard: Sequence[Timed]) -> None:
+        joined_us = min((at for at, one in heard if isinstance(one, Heartbeat) and one.sender == 3), default=0)
+        attempts = [at for at, one in heard if isinstance(one, CallForProposals) and one.sender == DESK]
+        assert len([at for at in attempts if at < joined_us]) > 1, "in vain"
+        named = {
+            (one.sender, one.site_digest, one.next_digest)
+            for at, one in heard
+            if isinstance(one, SiteNext) and one.change_phase is ChangePhase.HEARD and at < joined_us
+        }
+        assert named == {(node, *both) for node in others for both in (_pair(old, new), _pair(new, old))}
+        beats = {(one.sender, one.site_digest) for at, one in heard if isinstance(one, Heartbeat) and at < joined_us}
+        assert beats == {(node, one.digest) for node in others for one in (old, new)}
+        bids = [(at, one) for at, one in heard if isinstance(one, Bid) and one.initiator == DESK]
+        assert len(bids) == 1 and bids[0][0] > joined_us and bids[0][1].cost == 65212
+        done = [one.task for _, one in heard if isinstance(one, TaskReport) and one.phase is TaskPhase.DONE]
+        assert done[-1:] == [Reference(DESK, 1)]
+
+    shown_at(check, scene.played.messages, Heartbeat, SiteNext, CallForProposals, Bid, TaskReport)
+    told = [text for _, source, text in scene.played.run.log.lines if source == "operator"]
+    assert told[-1] == "all machines take part by the new file"
+
+
+def _with_digest(site: Cell) -> Cell:
+    return replace(site, digest=site_digest(site))
+
+
+def _pair(one: Cell, other: Cell) -> tuple[int, int]:
+    return one.digest, other.digest
 
 
 def test_c15_the_earlier_deadline_goes_first() -> None:

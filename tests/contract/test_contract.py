@@ -8,7 +8,15 @@ import pytest
 from cantools.database.can import Message as DbcMessage
 
 import dbc
-from dbc import battery_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text, systems
+from dbc import (
+    battery_dbc_text,
+    change_dbc_text,
+    device_dbc_text,
+    fleet_dbc_text,
+    seal_dbc_text,
+    system_dbc_text,
+    systems,
+)
 from onboard.contract import constants
 from onboard.contract.base import OutOfRangeError
 from onboard.contract.codes import Reason
@@ -21,7 +29,7 @@ from tests.wire.samples import CODES, judge_of, message_of, random_value, signal
 
 FOLDER = Path(__file__).parents[2] / "onboard" / "contract"
 TEXTS = {"fleet": fleet_dbc_text(), "device": device_dbc_text(), "seal": seal_dbc_text()}
-TEXTS |= {"battery": battery_dbc_text()}
+TEXTS |= {"battery": battery_dbc_text(), "change": change_dbc_text()}
 OF_ALL = tuple(TEXTS)
 TEXTS |= {name: text for name in systems() if (text := system_dbc_text(name)) is not None}
 LAYOUTS = {(file, layout.name): layout for file, text in TEXTS.items() for layout in read_layouts(text)}
@@ -186,7 +194,7 @@ def test_words_that_are_kept_for_later_are_free_and_fit_a_frame() -> None:
     """``docs/protocol.md`` promises identifiers that nothing else takes, to words of at most 64 bits."""
     page = (FOLDER.parents[1] / "docs" / "protocol.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(\w+)` \| `([0-9A-F]{6})nn` \| [^|]+ \| ([^|]+) \|", page, re.MULTILINE)
-    assert len(rows) == 4
+    assert len(rows) == 3
     taken = {layout.frame_id >> 8 for layout in LAYOUTS.values()}
     assert not {name for name, _, _ in rows} & {name for _, name in LAYOUTS}
     assert len({number for _, number, _ in rows}) == len(rows)

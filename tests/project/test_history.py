@@ -34,6 +34,7 @@ LOOK = {
     "onboard/gateway/own_words.py": "what a gateway may say",
     "onboard/gateway/pauses.py": "a conversation",
     "onboard/operate/blocks.py": "a conversation",
+    "onboard/operate/change.py": "a conversation",
     "onboard/operate/holds.py": "a conversation",
     "onboard/operate/regenerate.py": "a conversation, whose statements count since all stand only",
     "onboard/operate/stops.py": "a conversation",

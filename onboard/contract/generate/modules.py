@@ -8,7 +8,15 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from dbc import battery_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text, systems
+from dbc import (
+    battery_dbc_text,
+    change_dbc_text,
+    device_dbc_text,
+    fleet_dbc_text,
+    seal_dbc_text,
+    system_dbc_text,
+    systems,
+)
 from onboard.contract.generate.classes import (
     HEAD,
     enumerations,
@@ -33,6 +41,7 @@ _ABOUT = {
     "rights": "Tokens: who asks for them, who gives and who holds them",
     "seal": "Seals: proof of who said what on the fleet bus",
     "battery": "What machines with a battery tell of it on the fleet bus",
+    "change": "The word of a change of site",
     "device": "What a machine says to its own drives, doors and sensors, and they to it",
 }
 
@@ -44,6 +53,7 @@ def contracts() -> tuple[DbcFile, ...]:
     shared = (*fleet.tables, *device.tables)
     found = [fleet, device, read_contract("seal", seal_dbc_text(), "seal", shared)]
     found.append(read_contract("battery", battery_dbc_text(), "battery", shared))
+    found.append(read_contract("change", change_dbc_text(), "change", shared))
     for name in systems():
         text = system_dbc_text(name)
         assert text is not None

@@ -19,7 +19,15 @@ from onboard.core.site import Machine, Site
 from onboard.systems.graph.fields import NO_NODE
 from onboard.systems.graph.network import NOWHERE, Edge, edge
 from onboard.systems.graph.rights import edge_token, keeper, slot_token
-from onboard.systems.graph.rules import Heading, Rules, are_head_on, kept_edge, may_enter, other_edges
+from onboard.systems.graph.rules import (
+    Heading,
+    Rules,
+    are_head_on,
+    is_of_another_site,
+    kept_edge,
+    may_enter,
+    other_edges,
+)
 from onboard.systems.graph.site import FactoryGraph
 from onboard.work.plain import NoEstimator
 
@@ -115,7 +123,8 @@ class NodeAgents:
             case TokenGrant():
                 self._on_grant(message)
             case Heartbeat():
-                (self.strangers.discard, self.strangers.add)[message.site_digest != self.site.digest](message.sender)
+                is_strange = is_of_another_site(self.fleet.mirror, message.sender)
+                (self.strangers.discard, self.strangers.add)[is_strange](message.sender)
         return []
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:

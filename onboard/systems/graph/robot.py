@@ -31,7 +31,7 @@ from onboard.systems.graph.fields import NO_NODE, stops_of
 from onboard.systems.graph.network import NOWHERE
 from onboard.systems.graph.planning import Position, RobotPlanning, told_way
 from onboard.systems.graph.rights import edge_token, keeper, slot_token
-from onboard.systems.graph.rules import Rules
+from onboard.systems.graph.rules import Rules, is_of_another_site
 from onboard.systems.graph.site import FactoryGraph
 from onboard.systems.graph.steps import LOAD_TABLE, NODE_TABLE, Approach, NodeDeed, NodeEvent, Stay, StayDeed
 from onboard.work.device_link import DeviceLink
@@ -179,7 +179,7 @@ class GraphRobot:
             case NodeAnswer() if message.robot == self.fleet.node_id:
                 self._on_answer(message, now_us)
             case Heartbeat() if message.sender in self.site.hosts.values():
-                self.has_other_map = message.site_digest != self.fleet.site.digest
+                self.has_other_map = is_of_another_site(self.fleet.mirror, message.sender)
             case RobotAt():
                 self.planning.others[message.sender] = message
             case VisitList() if message.robot == self.fleet.node_id:

@@ -11,6 +11,8 @@ from collections.abc import Container
 from enum import Enum
 from typing import NamedTuple
 
+from onboard.contract.codes import Reason
+from onboard.core.mirror import Mirror
 from onboard.systems.graph.network import Graph, edge
 
 
@@ -73,3 +75,9 @@ def other_edges(
     return tuple(
         after for after in graph.neighbours[node] if after != came_from and may_enter(graph, taken, node, after, rules)
     )
+
+
+def is_of_another_site(mirror: Mirror, node: int) -> bool:
+    """Whether a machine's heartbeat names a site that does not count for mine: its map is wrong or old (row G27)."""
+    obstacle = mirror.aside.get(node)
+    return obstacle is not None and obstacle.reason is Reason.OTHER_SITE
