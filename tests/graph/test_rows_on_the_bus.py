@@ -1,4 +1,4 @@
-"""Rows G01 to G03, G09, G12, G15, G28, G30, each read from what robots, agents and desk say on the bus."""
+"""Rows G01 to G03, G09, G12, G15, G28, G30 and P04, each read from what robots, agents and desk say on the bus."""
 
 import random
 from collections.abc import Iterator, Sequence
@@ -295,6 +295,46 @@ def test_g28_of_the_free_robots_the_nearest_as_told_on_the_bus_has_the_order() -
         assert list(dict.fromkeys(won)) == [(R2, 2), (R1, 2), (R1, 1)]
 
     shown(check, [one for _, one in listen(site)], RobotAt, CallForProposals, Bid, Award)
+
+
+def test_p04_ten_calls_of_one_desk_at_once_end_as_they_do_one_after_the_other() -> None:
+    """Ten robots in a hall of 25 nodes; orders, shuffled, from where each of them stands to a node beside it."""
+    homes = tuple(range(0, 25, 5)) + tuple(range(4, 25, 5))
+    wanted = [(node, node + (1 if node % 5 == 0 else -1)) for node in homes]
+    random.Random(4).shuffle(wanted)
+
+    def winners(messages: Sequence[Message], at_once: int) -> dict[tuple[int, int], int]:
+        """Who has which task, by where it begins and ends; so many calls must have stood at one moment."""
+        standing: dict[tuple[int, int], CallForProposals] = {}
+        bids: dict[int, list[tuple[int, int]]] = {}
+        won: dict[tuple[int, int], int] = {}
+        most = 0
+        for one in messages:
+            match one:
+                case CallForProposals():
+                    standing[one.sender, one.call] = one
+                    most = max(most, len(standing))
+                case Bid():
+                    bids.setdefault(one.call, []).append((one.cost, one.sender))
+                case Award() if (call := standing.pop((one.sender, one.call), None)) is not None:
+                    assert one.call in bids and one.winner == min(bids[one.call])[1]
+                    won[call.from_station, call.to_station] = one.winner
+                case _:
+                    pass
+        assert most == at_once
+        return won
+
+    def said(every_s: int) -> list[Message]:
+        orders: list[Wanted] = [(every_s * number, "any", stops) for number, stops in enumerate(wanted)]
+        return [one for _, one in listen(made(grid(5, 5, 6000), homes, orders, capacity=10), limit_s=14 + 10 * every_s)]
+
+    serially = winners(said(2), 1)
+    assert serially == {(home, other): R1 + homes.index(home) for home, other in wanted}
+
+    def check(messages: Sequence[Message]) -> None:
+        assert winners(messages, 10) == serially
+
+    shown(check, said(0), CallForProposals, Bid, Award)
 
 
 def test_g30_the_number_that_is_proposed_does_most_on_the_bus(
