@@ -3,7 +3,7 @@
 A robot is its whole remaining list of nodes; ways come from enumerating all ways by length. Slow and plain on purpose.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 Way = tuple[int, ...]
 Edges = frozenset[frozenset[int]]
@@ -104,3 +104,16 @@ def _steps(edges: Edges, ways: tuple[Way, ...], way: Way, grants: object) -> Ite
                 again = shortest(edges, (node, after), way[-1])
                 if again is not None:
                     yield again
+
+
+def least(lengths: Mapping[tuple[int, int], int], behind: int, node: int, goal: int, room: int) -> int | None:
+    """Every way without reversing that is not longer than ``room``."""
+    if node == goal:
+        return 0
+    found: list[int] = []
+    for ends, length in lengths.items():
+        if node in ends and behind not in ends and length <= room:
+            rest = least(lengths, node, sum(ends) - node, goal, min([room - length, *found]))
+            if rest is not None:
+                found.append(length + rest)
+    return min(found, default=None)

@@ -3,6 +3,7 @@
 import random
 
 from onboard.systems.graph.network import NOWHERE, Graph, edge, grid, ring
+from tests.graph.brute_force import least
 
 
 def test_g01_lengths_decide_between_ways() -> None:
@@ -28,17 +29,4 @@ def test_g12_shortest_ways_are_what_trying_all_ways_gives() -> None:
         for came_from in graph.nodes:
             for node in graph.neighbours[came_from]:
                 for goal in graph.nodes:
-                    assert graph.distance_mm(came_from, node, goal) == _least(lengths, came_from, node, goal, 40)
-
-
-def _least(lengths: dict[tuple[int, int], int], behind: int, node: int, goal: int, room: int) -> int | None:
-    """Every way without reversing that is not longer than ``room``."""
-    if node == goal:
-        return 0
-    found: list[int] = []
-    for ends, length in lengths.items():
-        if node in ends and behind not in ends and length <= room:
-            rest = _least(lengths, node, sum(ends) - node, goal, min([room - length, *found]))
-            if rest is not None:
-                found.append(length + rest)
-    return min(found, default=None)
+                    assert graph.distance_mm(came_from, node, goal) == least(lengths, came_from, node, goal, 40)

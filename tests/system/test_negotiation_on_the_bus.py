@@ -1,23 +1,50 @@
-"""Negotiation between machines of a site, as it travels (rows P02 to P05, P07, P12, P17): calls, bids, winners."""
+"""Negotiation on a site, as it travels (rows P02 to P07, P09, P12, P14, P15, P17): calls, bids, winners."""
 
 import dataclasses
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import pytest
 
+from bus_sim.can.faults import parse_fault
 from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
-from onboard.contract.codes import CallResult, KindCode, ManualMode, Operation, Reason, TaskPhase
-from onboard.contract.messages import Award, Bid, CallForProposals, ManualOrder, Message, TaskReport
+from onboard.contract.battery import BatteryLevel
+from onboard.contract.codes import (
+    CallResult,
+    Grade,
+    KindCode,
+    LegAction,
+    MachineState,
+    ManualMode,
+    Operation,
+    Reason,
+    TaskPhase,
+)
+from onboard.contract.messages import (
+    Award,
+    Bid,
+    CallForProposals,
+    Heartbeat,
+    Itinerary,
+    ManualOrder,
+    Message,
+    Reference,
+    TaskReport,
+)
+from onboard.core.negotiation import Estimator, NeededAnswers, Proposal
 from onboard.core.serial import from_bus_ms
 from onboard.systems.car_park.site import CarPark, RideCalls, car_park
 from onboard.wire.codec import fleet_codec
 from tests.cut import Timed, shown_at
 from tests.sites import at_arrival, at_the_key, one_floor
-from tests.system.scene import play, stays
+from tests.system.scene import Scene, play, stays
+from tests.system.test_batteries import begin
+from tests.system.test_batteries import site as with_batteries
 from tests.system.test_p47_p48_reservations import RIVAL, admitted
 
 Key = tuple[int, int]
@@ -49,6 +76,11 @@ def played(site: CarPark, *faults: str) -> list[Timed]:
     slow = [parse_injection(fault) for fault in faults]
     cars = stays((0, None), (0.1, None), (0.2, None))
     scene = play(at_arrival(site), cars, plant=lambda run: arm(run, slow), limit_s=14.5, extra_s=0)
+    return on_the_fleet_bus(scene)
+
+
+def on_the_fleet_bus(scene: Scene) -> list[Timed]:
+    """What travelled there."""
     return [(said.time_us, said.message) for said in scene.said if said.bus == "fleet"]
 
 
@@ -222,7 +254,7 @@ def test_p05_a_bid_behind_the_cut_off_counts_for_nobody(before_ms: int, counts: 
         taken = {one.sender for _, one in heard if isinstance(one, TaskReport) and one.phase is TaskPhase.AWARDED}
         assert taken == (set() if counts else {11})
 
-    shown_at(check, [(one.time_us, one.message) for one in scene.said if one.bus == "fleet"], Bid, Award)
+    shown_at(check, on_the_fleet_bus(scene), Bid, Award)
 
 
 def test_p12_a_call_that_nobody_answers_is_opened_again_for_longer_and_then_given_up() -> None:
@@ -252,4 +284,185 @@ def test_p12_a_call_that_nobody_answers_is_opened_again_for_longer_and_then_give
         assert {one.reason for _, one in heard if isinstance(one, Award)} == {Reason.NO_BID}
         assert not [one for _, one in heard if isinstance(one, Bid)]
 
-    shown_at(check, [(one.time_us, one.message) for one in scene.said if one.bus == "fleet"], CallForProposals, Award)
+    shown_at(check, on_the_fleet_bus(scene), CallForProposals, Award)
+
+
+# --- who is not asked, and who says nothing --------------------------------------------------------------------------
+
+
+@dataclass
+class Eager:
+    """The lift's own task-generation function, which would do anything else as well, and best of all."""
+
+    own: Estimator
+    robot: Estimator
+    asked: set[KindCode]
+
+    def floor(self, call: CallForProposals, now_us: int) -> int:
+        """As every machine computes it."""
+        return (self.own if call.operation is Operation.RIDE else self.robot).floor(call, now_us)
+
+    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
+        """For any work but rides, as little as anybody could name."""
+        self.asked.add(call.kind)
+        is_ride = call.operation is Operation.RIDE
+        return self.own.lower_bound(call, now_us) if is_ride else self.floor(call, now_us) + 1
+
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
+        """The same."""
+        self.asked.add(call.kind)
+        is_ride = call.operation is Operation.RIDE
+        return self.own.estimate(call, now_us) if is_ride else Proposal(self.floor(call, now_us) + 1, None, (), ())
+
+
+def test_p06_who_is_of_another_kind_than_called_for_is_not_asked_and_does_not_answer() -> None:
+    """A lift whose task-generation function would beat every robot: it is asked for rides, and bids for rides."""
+    asked: set[KindCode] = set()
+
+    def before(simulation: Simulation) -> None:
+        lift, robot = (simulation.controllers[node].holon.negotiation for node in (5, 11))
+        lift.estimator = Eager(lift.estimator, robot.estimator, asked)
+
+    scene = play(at_arrival(rush()), stays((0, None)), before=before, limit_s=14, extra_s=0)
+    assert asked == {KindCode.LIFT}
+
+    def check(heard: Sequence[Timed]) -> None:
+        said = Calls(heard)
+        assert {call.kind for _, call in said.calls.values()} == {KindCode.ROBOT, KindCode.LIFT}
+        bidders: dict[KindCode, set[int]] = {}
+        for key, bids in said.bids.items():
+            assert key in said.calls
+            bidders.setdefault(said.calls[key][1].kind, set()).update(bid.sender for _, bid in bids)
+        assert 5 in bidders[KindCode.LIFT], "it does bid"
+        for kind, nodes in bidders.items():
+            assert kinds(nodes) == {kind}
+        won = {award.winner for key, (_, award) in said.awards.items() if said.calls[key][1].kind is KindCode.ROBOT}
+        assert won and kinds(won - {0}) == {KindCode.ROBOT}
+
+    shown_at(check, on_the_fleet_bus(scene), CallForProposals, Bid, Award)
+
+
+def test_p09_who_cannot_do_it_is_heard_to_live_and_says_nothing_of_the_call() -> None:
+    """By its search, shut in behind one that is dead: a third robot does it."""
+    site = at_arrival(one_floor(robots=3))
+
+    def before(simulation: Simulation) -> None:
+        simulation.loop.call_at(7.0, simulation.crash, site.machines[12])
+        simulation.devices[12].attach("listener")
+
+    scene = play(site, stays((0, None)), before=before, limit_s=16, extra_s=0)
+    counters = scene.simulation.controllers[11].holon.negotiation.counters
+    assert (counters.calls_heard, counters.searches, counters.calls_impossible) == (1, 1, 1)
+
+    def check(heard: Sequence[Timed]) -> None:
+        said = Calls(heard)
+        ((called_us, _),) = said.calls.values()
+        ((awarded_us, award),) = said.awards.values()
+        assert award.winner == 13 and {bid.sender for bids in said.bids.values() for _, bid in bids} == {13}
+        mine = [(at, type(one)) for at, one in heard if one.sender == 11 and at > called_us]
+        assert {kind for at, kind in mine if at < awarded_us} <= {Heartbeat} and Heartbeat in dict(mine).values()
+
+    shown_at(check, on_the_fleet_bus(scene), CallForProposals, Bid, Award, Heartbeat)
+
+
+def test_p09_who_cannot_do_it_by_its_bound_says_nothing_of_the_call_either() -> None:
+    """Its battery is nearly empty, as it tells: it drives to charge, and lets the other robot do it."""
+    scene = play(with_batteries(), stays((0, None)), plant=begin(0.05), limit_s=16, extra_s=0)
+    counters = scene.simulation.controllers[11].holon.negotiation.counters
+    assert (counters.calls_heard, counters.searches, counters.calls_impossible) == (1, 0, 1)
+
+    def check(heard: Sequence[Timed]) -> None:
+        said = Calls(heard)
+        ((called_us, _),) = said.calls.values()
+        told = {one.sender: one.bids for at, one in heard if isinstance(one, BatteryLevel) and at < called_us}
+        assert (told.get(11), told.get(12)) == (False, True)
+        assert {bid.sender for bids in said.bids.values() for _, bid in bids} == {12}
+        assert {award.winner for _, award in said.awards.values()} == {12}
+
+    shown_at(check, on_the_fleet_bus(scene), CallForProposals, Bid, Award, BatteryLevel)
+
+
+# --- what is lost, and how far anybody looks -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_p14_whatever_is_lost_at_single_receivers_one_does_it_and_nobody_waits_for_ever(seed: int) -> None:
+    """For 12 s, from when the car comes, each receiver misses every other frame; then the bus is well."""
+    loss = f"omission:probability=0.5,from_us=10000000,until_us=22000000,seed={seed}"
+    scene = play(
+        at_arrival(one_floor(robots=2)), stays((0, None)), faults=[parse_fault(loss)], limit_s=200, extra_s=100
+    )
+
+    def check(heard: Sequence[Timed]) -> None:
+        called = {(one.sender, one.call): one.task for _, one in heard if isinstance(one, CallForProposals)}
+        closed = {(one.sender, one.call): one for _, one in heard if isinstance(one, Award)}
+        assert called and called.keys() <= closed.keys(), "every call comes to its end"
+        owner: dict[Reference, int] = {}
+        done = set()
+        for _, one in heard:
+            match one:
+                case TaskReport(phase=TaskPhase.AWARDED | TaskPhase.STARTED | TaskPhase.LOADED | TaskPhase.DONE):
+                    assert owner.setdefault(one.task, one.sender) == one.sender, "one machine at most has it"
+                    done |= {one.task} if one.phase is TaskPhase.DONE else set()
+                case TaskReport(phase=TaskPhase.FORFEITED):
+                    owner.pop(one.task, None)
+                case _:
+                    pass
+        refused = {one.task for one in closed.values() if one.result is CallResult.REFUSED}
+        opened = Counter(called.values())
+        assert all(one.result is not CallResult.REOPENED or opened[one.task] > 1 for one in closed.values())
+        assert all(opened[task] == 5 for task in refused)
+        assert done and done == set(called.values()) - refused, (
+            "what nobody could be heard to bid for, in five attempts"
+        )
+        assert {closed[max(called)].winner} == set(owner.values())
+        last = {one.sender: one.state for _, one in heard if isinstance(one, Heartbeat)}
+        assert last == dict.fromkeys((1, 11, 12), MachineState.IDLE)
+
+    shown_at(
+        check,
+        on_the_fleet_bus(scene),
+        *(CallForProposals, Award, TaskReport, Heartbeat),
+    )
+
+
+#: How far a plan's last work may be ahead for each task that its robot has in hand, ms.
+HORIZON_MS = 180_000
+
+
+def test_p15_no_plan_holds_more_than_what_was_called_for_and_is_in_hand() -> None:
+    """Six cars before four robots: work only for tasks that were called for, won and are not done, and not far off."""
+    cars = stays(*((at_s, None) for at_s in (0, 0.1, 0.2, 20, 21, 22)))
+    scene = play(at_arrival(car_park(parse_site(SITE, "rush.toml"))), cars, limit_s=70, extra_s=0)
+
+    def check(heard: Sequence[Timed]) -> None:
+        called: set[Reference] = set()
+        in_hand: dict[int, set[Reference]] = {}
+        reported: set[Reference] = set()
+        most = 0
+        for at_us, one in heard:
+            match one:
+                case CallForProposals():
+                    called.add(one.task)
+                case Award(result=CallResult.AWARDED):
+                    assert one.task in called
+                    in_hand.setdefault(one.winner, set()).add(one.task)
+                case TaskReport():
+                    assert one.task in in_hand.get(one.sender, set()), "of no other task anything is said"
+                    in_hand[one.sender] -= {one.task} if one.phase is TaskPhase.DONE else set()
+                    reported.add(one.task)
+                case Itinerary(grade=Grade.FIRM):
+                    works = [leg.end_ms + one.stamp.award_ms for leg in one.legs if leg.action is LegAction.WORK]
+                    tasks = len(in_hand.get(one.sender, set()))
+                    assert len(works) <= 2 * tasks, "a car is taken and left, and no more"
+                    assert all(end_ms - at_us // 1000 < HORIZON_MS * tasks for end_ms in works)
+                    most = max(most, len(works))
+                case _:
+                    pass
+        assert most == 3 and reported == called
+
+    shown_at(
+        check,
+        on_the_fleet_bus(scene),
+        *(CallForProposals, Award, TaskReport, Itinerary),
+    )

@@ -8,7 +8,7 @@ WIDTH, HEIGHT = 78, 24
 
 
 class _CharacterSheet:
-    """A sheet of characters over the span of all areas."""
+    """A sheet of characters over the span of all areas and obstacles."""
 
     def __init__(self, areas: list[Area]) -> None:
         self._x0, self._y0 = min(area.x0_mm for area in areas), min(area.y0_mm for area in areas)
@@ -44,7 +44,7 @@ class _CharacterSheet:
 def plan(plant: CellPlant, view: CellView) -> str:
     """Areas as dotted frames, obstacles as #, parts as o (O in a gripper), robots by their names."""
     site = plant.site
-    sheet = _CharacterSheet([arm.area for arm in site.arms.values()])
+    sheet = _CharacterSheet([*(arm.area for arm in site.arms.values()), *site.obstacles])
     for arm in site.arms.values():
         sheet.frame(arm.area)
     for obstacle in site.obstacles:
