@@ -13,7 +13,7 @@ from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.stage import CarParkStage
 from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
-from onboard.systems.car_park.site import car_park
+from onboard.systems.car_park.site import DeskPolicy, car_park
 from onboard.ways.lifts import is_same_stop
 from onboard.ways.site import BayUse, TrackKind
 from tests.system.scene import play
@@ -78,13 +78,15 @@ def test_cars_come_and_go_with_all_checkers_silent(name: str) -> None:
     assert (street.served, street.inside) == (cars, 0)
 
 
-def test_robots_of_the_tower_start_beside_its_compartments() -> None:
+def test_robots_of_the_tower_start_beside_its_compartments_and_cars_come_to_the_one_beside_them() -> None:
     tower = Building("tower")
     robots = [machine for machine in tower.site.machines.values() if machine.kind is KindCode.ROBOT]
     assert (len(tower.site.places), len(tower.bays), len(tower.sills), len(robots)) == (1_192, 4, 2, 4)
     assert {alley.length for alley in tower.alleys if alley.number <= 20} == {30}
     mouths = {tower.site.tracks[robot.home.track].low for robot in robots}
     assert mouths == {Segment(bay.track, bay.index - 2) for bay in tower.bays}
+    # A car that comes to another compartment than the one beside it has to pass other robots in the street's one alley.
+    assert tower.site.desk is DeskPolicy.NEAREST
 
 
 #: Published figures (docs/layouts.md): floors, places, compartments, lifts.
