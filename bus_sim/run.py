@@ -127,9 +127,15 @@ class BusRun(Generic[PlantT]):
                 self.start_controller(machine)
 
     def start_controller(self, machine: Machine) -> None:
-        """Power up one machine's controller; a second time means a restart, with the same journal."""
+        """Power up one machine's controller; a second time means a restart, with the same journal.
+
+        Nothing where it has no site file yet.
+        """
+        site = self.in_force.get(machine.node_id)
+        if site is None:
+            return
         journal = self.journals.setdefault(machine.node_id, SimulatedJournal(journal_owner(self.site, machine)))
-        entries, site = journal.replay(), self.in_force[machine.node_id]
+        entries = journal.replay()
         holon = self.holon_class(
             site,
             machine,

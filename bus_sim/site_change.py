@@ -37,5 +37,5 @@ def roll_out(run: BusRun[Any], old: Site, at_us: int) -> None:
 
 def _start(run: BusRun[Any], machine: Machine) -> None:
     run.in_force[machine.node_id] = run.site
-    if machine.name not in run.options.without:
+    if machine.name not in run.options.without and machine.node_id not in run.controllers:
         run.start_controller(machine)
