@@ -19,7 +19,7 @@ from onboard.core.motion_authority import authorised
 from onboard.core.negotiation import Awarded, Closed, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.records import last_boot
 from onboard.core.site import Machine, Site
-from onboard.systems.cell.contracts import Contract, part_token
+from onboard.systems.cell.contracts import Contract, Goal, part_token
 from onboard.systems.cell.generation import ArmGeneration, call_terms
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.goal_frames import contract_messages
@@ -75,6 +75,8 @@ class ArmRobot:
     _ask_at_us: dict[Reference, int] = field(default_factory=dict)
     #: Rests of goals whose calls an earlier life made: somebody may have won one.
     _unsure: set[Reference] = field(default_factory=set)
+    #: Rests of contracts that were lost while nobody had them: the calls for them are void.
+    _void: list[Goal] = field(default_factory=list)
     _progress_at_us: int | None = None
     _told: tuple[ArmPhase, ArmMode] | None = None
 
@@ -226,6 +228,8 @@ class ArmRobot:
         effects: list[Effect] = [lost_record(one)]
         if one.sub_goal is not None and one.successor:
             effects += self.fleet.winners.let_go(one.sub_goal.task)
+        elif one.sub_goal is not None:
+            self._void.append(one.sub_goal)
         self._forget_rest(one)
         return effects
 
@@ -241,7 +245,9 @@ class ArmRobot:
             (one for one in self.tasks.in_hand.values() if one.sub_goal and one.sub_goal.task == report.task), None
         )
         if one is None:
-            return []
+            # A rest of mine that was awarded once, and whose contract I have lost since: nobody is to bring it there.
+            is_claim = report.phase is TaskPhase.AWARDED and report.task.origin == self.fleet.node_id
+            return self.fleet.winners.remind(report.task, report.sender) if is_claim else []
         assert one.sub_goal is not None
         effects: list[Effect] = []
         if not one.successor and self._may_claim(one, report, now_us):
@@ -251,7 +257,7 @@ class ArmRobot:
             self.fleet.winners.takes(one.sub_goal.task, one.successor, now_us)
             effects.append(stage_record(one))
             self._call_at_us.pop(one.task, None)
-            effects += self._withdraw_call(one, now_us)
+            effects += self._withdraw_call(one.sub_goal, now_us)
         if report.sender != one.successor:
             is_claim = report.phase is TaskPhase.AWARDED
             return self.fleet.winners.remind(report.task, report.sender) if is_claim else []
@@ -268,10 +274,9 @@ class ArmRobot:
         may_claim = one.task in self._unsure and report.phase is not TaskPhase.FORFEITED
         return may_claim and self.fleet.winners.may_claim(report.task, report.sender, now_us)
 
-    def _withdraw_call(self, one: Undertaking, now_us: int) -> list[Effect]:
+    def _withdraw_call(self, rest: Goal, now_us: int) -> list[Effect]:
         """Close the call for the rest of a goal, where one is open."""
-        assert one.sub_goal is not None
-        said = self.fleet.negotiation.withdraw(call_terms(one.sub_goal), now_us)
+        said = self.fleet.negotiation.withdraw(call_terms(rest), now_us)
         return [item for item in said if not isinstance(item, NegotiationEvent)]
 
     def _on_closed(self, event: Closed, now_us: int) -> list[Effect]:
@@ -303,6 +308,8 @@ class ArmRobot:
     def _manage(self, now_us: int) -> list[Effect]:
         """Call for rests that nobody has, and ask sub-contractors that have had the part for long (row C17)."""
         effects: list[Effect] = []
+        while self._void:
+            effects += self._withdraw_call(self._void.pop(), now_us)
         for task, due_us in list(self._call_at_us.items()):
             one = self.tasks.in_hand.get(task)
             if one is None or one.sub_goal is None:

@@ -138,6 +138,10 @@ class CallsClosed(_CallRule):
             # A caller whose clock is behind may name a deadline that is over when the call is heard.
             held_us = self._held_us.get(seen.call.sender, 0)
             due_us = max(seen.due_us, seen.event.time_us, self.picture.clock_settles_us, held_us)
+            if due_us <= self.picture.spoiled_until_us:
+                # It may have closed it by a word that came to nothing: its bidders end by their own clocks.
+                seen.is_reported = True
+                continue
             late = lived_us - due_us > CLOSED_WITHIN_US
             if late and self.picture.is_alive(seen.call.sender, seen.boot):
                 seen.is_reported = True

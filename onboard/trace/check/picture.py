@@ -96,6 +96,14 @@ class BusPicture:
         """Whether the site is known."""
         return self._site is not None
 
+    @property
+    def spoiled_until_us(self) -> int:
+        """Until then, us of the log, somebody may have spoken between a machine's words and their seal: they are void.
+
+        Only what is proved is judged where seals are required; 0 where all that is said counts.
+        """
+        return self.excused_us if self._site is not None and self._site.seals == "required" else 0
+
     def waited_us(self, since_us: int, now_us: int) -> int:
         """How long something has been due, for rules of liveness: from ``since_us``, or from the end of all faults.
 
