@@ -3,6 +3,10 @@
 from dataclasses import replace
 from functools import cache
 
+import pytest
+
+from bus_sim.faults.arm import arm
+from bus_sim.faults.injection import parse_injection
 from bus_sim.systems.car_park.plant.customer import VisitOutcome
 from onboard.config.site import parse_site, site_digest
 from onboard.contract.codes import CallResult, Operation, TaskPhase
@@ -10,7 +14,7 @@ from onboard.contract.messages import Award, CallForProposals, CarAt, Reference,
 from onboard.core.site import Station
 from onboard.systems.car_park.fetch_costs import fetch_us, moved_from
 from onboard.systems.car_park.place_costs import GAIN_US
-from onboard.systems.car_park.quiet_moves import QUIET_US
+from onboard.systems.car_park.quiet_moves import PATIENCE_US, QUIET_US
 from onboard.systems.car_park.site import CarPark, PlacePolicy, car_park
 from tests.system.scene import Scene, play, stays
 
@@ -51,8 +55,12 @@ def site(*, quiet_moves: bool = True) -> CarPark:
 
 
 @cache
-def scene(*times_s: tuple[float, float | None], quiet_moves: bool = True, limit_s: float = 900) -> Scene:
-    found = play(site(quiet_moves=quiet_moves), stays(*times_s), limit_s=limit_s)
+def scene(
+    *times_s: tuple[float, float | None], quiet_moves: bool = True, limit_s: float = 900, faults: tuple[str, ...] = ()
+) -> Scene:
+    injections = [parse_injection(fault) for fault in faults]
+    park, coming = site(quiet_moves=quiet_moves), stays(*times_s)
+    found = play(park, coming, limit_s=limit_s, plant=lambda simulation: arm(simulation, injections))
     found.assert_sound()
     asked = [one.visit.outcome for one in found.simulation.plant.street.customers if one.visit.asked_us is not None]
     assert asked == [VisitOutcome.SERVED] * len(asked)
@@ -120,3 +128,35 @@ def test_who_asks_for_a_car_that_is_under_way_gets_it_from_where_it_is_left() ->
     us, fetched = found.first(CallForProposals, lambda one: one.operation is Operation.RETRIEVE)
     assert us < left_us + 2_000_000
     assert fetched.from_station == places(found, CAR)[-1].number
+
+
+@pytest.mark.parametrize(
+    "crash",
+    [
+        "crash:target=MR1,at_s=240,restart_s=10",
+        "crash:target=IOC1,at_s=258,restart_s=20",
+    ],
+)
+def test_a_move_that_a_crash_falls_into_ends_all_the_same(crash: str) -> None:
+    found = scene((0, None), (100, 400), faults=(crash,))
+    ((_, call),) = moves(found)
+    assert told(found, call.task)[-1] is TaskPhase.DONE
+    assert len(places(found, CAR)) == 2
+
+
+def test_a_steward_that_missed_the_award_ends_the_move() -> None:
+    """It lets nobody have the car, and its compartment takes the task back; whoever asks for it is served."""
+    found = scene((0, None), (100, 400), faults=("crash:target=ER1,at_s=234.5,restart_s=10",))
+    ((_, call),) = moves(found)
+    void_us, _ = found.first(Award, lambda one: (one.task, one.result) == (call.task, CallResult.WITHDRAWN))
+    assert void_us < 300_000_000
+    assert TaskPhase.LOADED not in told(found, call.task)
+
+
+def test_nobody_waits_for_a_move_for_ever() -> None:
+    crash = parse_injection("crash:target=MR1,at_s=240,restart=no")
+    coming = stays((0, None), (100, None), (600, None))
+    found = play(site(), coming, limit_s=650, plant=lambda simulation: arm(simulation, [crash]), extra_s=0)
+    ((called_us, call),) = moves(found)
+    void_us, _ = found.first(Award, lambda one: (one.task, one.result) == (call.task, CallResult.WITHDRAWN))
+    assert abs(void_us - called_us - PATIENCE_US) < 1_000_000

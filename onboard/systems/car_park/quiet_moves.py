@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from onboard.contract.codes import CallResult, KindCode, LegAction, Operation, Reason, TaskPhase
 from onboard.contract.constants import NOBODY
-from onboard.contract.messages import CallForProposals, Itinerary, Message, Reference, TaskReport
+from onboard.contract.messages import CallForProposals, Itinerary, Message, Reference, TaskReport, TokenRefusal
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.negotiation import EVENT_TYPES, Closed
 from onboard.core.serial import from_bus_ms
@@ -41,6 +41,8 @@ LOOK_AGAIN_US = 30_000_000
 AHEAD_US = 2 * 3_600_000_000
 #: So often a car is moved at most: each time is a risk for it, and metres.
 MOST_MOVES = 2
+#: A move that is not over by then is taken back, us: the longest ways of the shipped sites take half of it.
+PATIENCE_US = 300_000_000
 #: A car for whose move nobody bid, or whose robot gave it back, is left alone for so long, us.
 LEAVE_ALONE_US = 600_000_000
 
@@ -65,6 +67,7 @@ class QuietMoves:
     stays: Stays = field(default_factory=Stays)
     free: FreePlaces = field(init=False)
     _quiet_from_us: int | None = None
+    _called_us: int = 0
     _moved: dict[Reference, int] = field(default_factory=dict)
     _alone_until_us: dict[Reference, int] = field(default_factory=dict)
 
@@ -95,6 +98,10 @@ class QuietMoves:
         if isinstance(message, CallForProposals) and message.operation in (Operation.PARK, Operation.RETRIEVE):
             self._quiet_from_us = now_us + self._rest_us
             return [] if moved_from(self.park, message) else self.give_up(now_us)
+        if isinstance(message, TokenRefusal) and self.task is not None:
+            # Who keeps the car was off when it was awarded, and lets nobody have it.
+            is_unknown = self.task.is_unknown_to(message, self.fleet.mirror)
+            return self._leave_alone(now_us) if is_unknown else []
         if not isinstance(message, TaskReport) or message.task.origin != self.fleet.node_id:
             return []
         is_lost = message.phase is TaskPhase.FORFEITED
@@ -135,6 +142,12 @@ class QuietMoves:
     def _is_move(self, task: Reference) -> bool:
         return self.task is not None and self.task.task == task
 
+    def _leave_alone(self, now_us: int) -> list[Effect]:
+        """This move comes to nothing: it is taken back, and its car is left alone for a while."""
+        assert self.task is not None
+        self._alone_until_us[self.task.car] = now_us + LEAVE_ALONE_US
+        return self.give_up(now_us)
+
     def _over(self, *, is_done: bool, now_us: int) -> None:
         assert self.task is not None
         car, self.task = self.task.car, None
@@ -144,8 +157,10 @@ class QuietMoves:
     # --- what is offered ---------------------------------------------------------------------------------------
 
     def next_wake(self) -> int | None:
-        """When it has been quiet for long enough, bus us."""
-        return self._quiet_from_us if self.park.quiet_moves and self.task is None else None
+        """When it has been quiet for long enough, or a move takes too long, bus us."""
+        if not self.park.quiet_moves:
+            return None
+        return self._quiet_from_us if self.task is None else self._called_us + PATIENCE_US
 
     def review(self, phase: BayPhase, now_us: int, *, is_empty: bool) -> list[Effect]:
         """Offer a move where nobody waits, or take one back where somebody does."""
@@ -154,6 +169,8 @@ class QuietMoves:
         if phase is not BayPhase.FREE or not is_empty or self.tickets or self.calls.in_hand():
             self._quiet_from_us = None
             return self.give_up(now_us)
+        if self.task is not None and now_us >= self._called_us + PATIENCE_US:
+            return self._leave_alone(now_us)
         is_due = self._quiet_from_us is not None and now_us >= self._quiet_from_us
         if is_due or self._quiet_from_us is None:
             self._quiet_from_us = now_us + self._rest_us
@@ -192,6 +209,7 @@ class QuietMoves:
 
     def _call_for(self, best: Gain, now_us: int) -> list[Effect]:
         name, number = self.memory.next_reference(self.fleet)
+        self._called_us = now_us
         self.task = BayTask(name, Operation.PARK, best.car, self.fleet.mirror.cars[best.car].wheelbase_mm)
         sink = open_end(self.park.place_class.get(best.source.number, ANY_CLASS))
         terms = self.task.terms(best.source.number, sink, self.calls.floor)
