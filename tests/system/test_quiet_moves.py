@@ -120,6 +120,12 @@ def test_whoever_drives_in_meanwhile_comes_first() -> None:
     assert TaskPhase.LOADED in told(found, third)
 
 
+def test_where_calls_come_often_no_car_is_moved() -> None:
+    times = (0, None), (60, None), (100, None), (230, None), (450, None)
+    assert moves(scene(*times[:3], times[4])) != []
+    assert moves(scene(*times)) == []
+
+
 def test_who_asks_for_a_car_that_is_under_way_gets_it_from_where_it_is_left() -> None:
     found = scene((0, None), (100, 250))
     ((_, call),) = moves(found)

@@ -34,6 +34,9 @@ from onboard.ways.reservations import FOREVER
 #: From the last call that was heard until a car is moved, us; each compartment waits for so much longer than the one
 #: before it, in the order of their node-IDs, so that it hears what those before have called for.
 QUIET_US, STAGGER_US = 10_000_000, 2_000_000
+#: With so many customers' calls in so long a time, us, no car is moved: a move takes 90 s, and whoever calls meanwhile
+#: waits for its robot, or behind it in the alley: at 16 calls an hour nothing was gained (docs/figures.md).
+BUSY_CALLS, BUSY_US = 4, 1_800_000_000
 #: With nothing to move it is looked again after this, us: a car becomes due, or a robot has done its work.
 LOOK_AGAIN_US = 30_000_000
 #: A car is moved when it is expected to be fetched within so long, us: an earlier move is as good, but its place may be
@@ -68,6 +71,8 @@ class QuietMoves:
     free: FreePlaces = field(init=False)
     _quiet_from_us: int | None = None
     _called_us: int = 0
+    #: The last tasks that somebody waited for, here or elsewhere, and since when: as many as make it busy.
+    _wanted: deque[tuple[Reference, int]] = field(default_factory=lambda: deque(maxlen=BUSY_CALLS))
     _moved: dict[Reference, int] = field(default_factory=dict)
     _alone_until_us: dict[Reference, int] = field(default_factory=dict)
 
@@ -97,7 +102,10 @@ class QuietMoves:
         self.stays.hear(message, now_us)
         if isinstance(message, CallForProposals) and message.operation in (Operation.PARK, Operation.RETRIEVE):
             self._quiet_from_us = now_us + self._rest_us
-            return [] if moved_from(self.park, message) else self.give_up(now_us)
+            if moved_from(self.park, message):
+                return []
+            self._note(message.task, now_us)
+            return self.give_up(now_us)
         if isinstance(message, TokenRefusal) and self.task is not None:
             # Who keeps the car was off when it was awarded, and lets nobody have it.
             is_unknown = self.task.is_unknown_to(message, self.fleet.mirror)
@@ -142,6 +150,10 @@ class QuietMoves:
     def _is_move(self, task: Reference) -> bool:
         return self.task is not None and self.task.task == task
 
+    def _note(self, task: Reference, now_us: int) -> None:
+        if all(task != known for known, _ in self._wanted):
+            self._wanted.append((task, now_us))
+
     def _leave_alone(self, now_us: int) -> list[Effect]:
         """This move comes to nothing: it is taken back, and its car is left alone for a while."""
         assert self.task is not None
@@ -168,6 +180,8 @@ class QuietMoves:
             return []
         if phase is not BayPhase.FREE or not is_empty or self.tickets or self.calls.in_hand():
             self._quiet_from_us = None
+            for task in self.calls.in_hand():
+                self._note(task.task, now_us)
             return self.give_up(now_us)
         if self.task is not None and now_us >= self._called_us + PATIENCE_US:
             return self._leave_alone(now_us)
@@ -175,6 +189,9 @@ class QuietMoves:
         if is_due or self._quiet_from_us is None:
             self._quiet_from_us = now_us + self._rest_us
         if not is_due or self.task is not None or not self.fleet.tokens.is_synced:
+            return []
+        if len(self._wanted) == BUSY_CALLS and now_us < self._wanted[0][1] + BUSY_US:
+            self._quiet_from_us = max(self._quiet_from_us, self._wanted[0][1] + BUSY_US)
             return []
         at_work = sum(_is_at_work(plan, now_us) for plan in self.fleet.mirror.itineraries.values())
         best = max(self._gains(now_us), default=None) if at_work <= self._most_at_work else None
