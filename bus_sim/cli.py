@@ -21,6 +21,7 @@ from bus_sim.publish import PublishError, check_mqtt
 from bus_sim.serve.bridge import parse_bus_specs
 from bus_sim.serve.socketcand import ServeError
 from bus_sim.session import run_site
+from bus_sim.site_words import with_words
 from bus_sim.sites import SiteNotFoundError, find_site, layout_names, site_names, site_text
 from bus_sim.systems.registry import UnknownSystemError, own_commands, simulated_of
 from bus_sim.systems.system import SimulatedSystem
@@ -28,6 +29,7 @@ from bus_sim.virtual_time import DeadlockError, StandstillError
 from onboard import __version__
 from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
+from onboard.config.site import parse_site
 from onboard.config.site_change import added_machines
 from onboard.config.site_report import site_report
 from onboard.core.site import Site
@@ -173,6 +175,13 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         help="a fault, such as omission:receivers=11,probability=0.01,seed=7 or crash:target=MR1,at_s=80 (repeatable)",
     )
     how.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="TABLE.KEY=VALUE",
+        help="in the stead of what the site file says, such as negotiation.place=cost (repeatable; docs/site-file.md)",
+    )
+    how.add_argument(
         "--scenario",
         type=Path,
         metavar="FILE",
@@ -311,11 +320,24 @@ def _run(args: argparse.Namespace) -> int:
         raise OptionError(f"--for {args.limit_s:g}: must be seconds above 0")
     if args.scenario is not None:
         return _run_scenario(args)
-    site = find_site(args.site or DEFAULT_SITE)
-    summary = run_site(site, _options(args, site))
+    site, text = _site(args)
+    summary = run_site(site, _options(args, site, text))
     if args.json is not None:
         args.json.write_text(json.dumps(summary.to_json(), indent=2) + "\n", encoding="utf-8")
     return 0 if summary.is_good else 1
+
+
+def _site(args: argparse.Namespace) -> tuple[Site, str]:
+    """The site that is run, and the text of its file, with what ``--set`` says."""
+    name = args.site or DEFAULT_SITE
+    site, text = find_site(name), site_text(name)
+    if not args.set:
+        return site, text
+    try:
+        text = with_words(text, args.set)
+    except ValueError as error:
+        raise OptionError(str(error)) from error
+    return parse_site(text, f"{Path(name).stem}.toml"), text
 
 
 #: What each command does with its options; they return the exit status.
@@ -388,12 +410,15 @@ _WHO_COMES = (
 )
 
 
-def _options(args: argparse.Namespace, site: Site) -> RunOptions:
-    """What was asked for. Raises ``OptionError`` and ``DemandError`` for what does not go together."""
+def _options(args: argparse.Namespace, site: Site, text: str) -> RunOptions:
+    """What was asked for, of a site whose file has this ``text``.
+
+    Raises ``OptionError`` and ``DemandError`` for what does not go together.
+    """
     system, faults, speed = simulated_of(site), _faults(args), _speed(args.speed)
     try:
         parse_bus_specs(args.bus, 500_000, [machine.name for machine in site.machines.values()])
-        processes = process_plan(args, site, args.site or DEFAULT_SITE, faults)
+        processes = process_plan(args, site, text, faults)
         mqtt = check_mqtt(args.mqtt) if args.mqtt is not None else None
     except ValueError as error:
         raise OptionError(str(error)) from error
@@ -429,7 +454,7 @@ def _options(args: argparse.Namespace, site: Site) -> RunOptions:
         buses=tuple(args.bus),
         processes=processes,
         mqtt=mqtt,
-        site_text=site_text(args.site or DEFAULT_SITE) if mqtt is not None else "",
+        site_text=text if mqtt is not None else "",
         web=_web(args),
         web_token=args.web_token,
     )

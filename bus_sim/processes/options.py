@@ -8,7 +8,6 @@ from bus_sim.faults import controllers
 from bus_sim.faults.arm import ACTIONS
 from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.processes.plan import PowerChange, ProcessPlan, parse_moments, spans_of
-from bus_sim.sites import site_text
 from onboard.core.site import Site
 
 #: Where the buses are served unless ``--serve`` says so: a free port of this host.
@@ -40,8 +39,11 @@ def add_processes(group: argparse._ArgumentGroup) -> None:
     )
 
 
-def process_plan(args: argparse.Namespace, site: Site, name: str, faults: Sequence[AnyFault]) -> ProcessPlan | None:
-    """What the options ask for; None for all controllers in one process. Raises ``ValueError`` with one line."""
+def process_plan(args: argparse.Namespace, site: Site, text: str, faults: Sequence[AnyFault]) -> ProcessPlan | None:
+    """What the options ask for; None for all controllers in one process. ``text`` is that of the site file.
+
+    Raises ``ValueError`` with one line.
+    """
     moments = [moment for change in PowerChange for moment in parse_moments(change, getattr(args, change.value))]
     if not args.processes:
         if moments or args.process_dir is not None:
@@ -60,4 +62,4 @@ def process_plan(args: argparse.Namespace, site: Site, name: str, faults: Sequen
         if isinstance(fault, Injection) and ACTIONS.get(fault.kind) in vars(controllers).values():
             raise ValueError(f"--fault {fault}: acts inside a controller of this process; use --kill and --join")
     spans_of(moments, [one.name for one in site.machines.values() if one.name not in args.without])
-    return ProcessPlan(site_text(name), tuple(moments), args.process_dir)
+    return ProcessPlan(text, tuple(moments), args.process_dir)

@@ -34,6 +34,10 @@ class TaskHistory:
         """Whether it was done or refused."""
         return self.phase in TASKS_OVER
 
+    def is_aside(self, name: Reference) -> bool:
+        """Whether a task of this ``name`` parks what is inside already; who comes in gives its name to the task."""
+        return self.operation is Operation.PARK and self.load not in (None, name)
+
     @property
     def is_waiting(self) -> bool:
         """Whether somebody waits for its end; a sub-task is nobody's until it is awarded."""

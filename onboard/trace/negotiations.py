@@ -97,7 +97,7 @@ class NegotiationFold:
 
     def _on_done(self, statement: TaskTold, time_us: int) -> None:
         task = statement.task
-        if task is None or task.operation not in TASKS:
+        if task is None or task.operation not in TASKS or task.is_aside(statement.report.task):
             return
         done = self.counts.parked_us if task.operation is Operation.PARK else self.counts.fetched_us
         done.append(time_us)

@@ -159,7 +159,7 @@ class SiteView:
         assert task is not None, "who is first tells of a task that is known"
         if report.phase is TaskPhase.DONE:
             self._count_done(task, time_us)
-            self.parked += task.operation is Operation.PARK
+            self.parked += task.operation is Operation.PARK and not task.is_aside(report.task)
             self.fetched += task.operation is Operation.RETRIEVE
         words = self.words.report(task.operation, report.phase, task.load or report.task, report.station)
         if words:

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from bus_sim.cli import main
-from bus_sim.systems.car_park.compare.plays import POLICIES
+from bus_sim.systems.car_park.compare import command
+from bus_sim.systems.car_park.compare.plays import MIP, POLICIES
 
 
 def test_p56_one_command_makes_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -32,11 +33,23 @@ def test_a_window_of_a_day_counts_only_its_own_customers(tmp_path: Path, capsys:
     assert [row["wait_in"]["count"] for row in rows] == [2] * len(POLICIES)
 
 
+def test_choices_of_places_are_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told = tmp_path / "table.json"
+    monkeypatch.setattr(command, "POLICIES", {MIP: POLICIES[MIP]})
+    words = ["--parts", "random", "--seeds", "3", "--cars", "1", "--jobs", "1", "--place", "nearest,random"]
+    assert main(["compare", "small", *words, "--json", str(told)]) == 0
+    nearest, drawn = json.loads(told.read_text(encoding="utf-8"))["random"]["rows"]
+    assert [(row["policy"], row["place"]) for row in (nearest, drawn)] == [(MIP, "nearest"), (MIP, "random")]
+    assert nearest["loaded_m"] == 0 < drawn["loaded_m"], "the place beside the bay, or any"
+    assert nearest["empty_m"] > 0
+
+
 @pytest.mark.parametrize(
     ("options", "remedy"),
     [
         (["--seeds", "5-1"], "first and last such as 1-5"),
         (["--seeds", "one"], "first and last such as 1-5"),
+        (["--place", "far"], "some of nearest, cost, stay, balanced, random"),
         (["--parts", "nights"], "some of random, day, small, stored"),
         (["--parts", "random", "--random", "0", "1"], "must be above 0"),
     ],

@@ -3,7 +3,7 @@
 import pytest
 
 from onboard.config.problems import ConfigError
-from onboard.systems.car_park.site import RestAt, RideCalls
+from onboard.systems.car_park.site import PlacePolicy, RestAt, RideCalls
 from tests.sites import one_floor
 
 
@@ -31,6 +31,7 @@ def test_robots_wait_in_the_nearest_refuge_unless_the_site_says_where_calls_are_
     [
         ('rides = "never"', '"never"'),
         ('rest_at = "home"', '"home"'),
+        ('place = "far"', '"far"'),
         ("sub_call_percent = 90", "from 20 to 80"),
         ("ride = 1", "ride"),
     ],
@@ -39,3 +40,17 @@ def test_a_mistake_is_told_with_its_line(line: str, told: str) -> None:
     with pytest.raises(ConfigError, match=r"test\.toml:\d+: negotiation\.") as caught:
         one_floor(extra=f"[negotiation]\n{line}\n")
     assert told in str(caught.value)
+
+
+def test_cars_stand_where_they_are_soonest_unless_the_site_says_otherwise() -> None:
+    assert one_floor().place is PlacePolicy.NEAREST
+    for place in PlacePolicy:
+        site = one_floor(extra=f'[negotiation]\nplace = "{place.value}"\n')
+        assert site.place is place
+        assert (site.digest == one_floor().digest) is (place is PlacePolicy.NEAREST), "who chooses otherwise is strange"
+
+
+def test_cars_stay_where_they_are_unless_the_site_says_otherwise() -> None:
+    assert not one_floor().quiet_moves
+    site = one_floor(extra="[negotiation]\nquiet_moves = true\n")
+    assert site.quiet_moves and site.digest != one_floor().digest

@@ -53,6 +53,8 @@ class BayCalls:
     on_won: Callable[[BayTask], None]
     job: BayTask | None = None
     ahead: BayTask | None = None
+    #: A car that is moved while nobody waits (``quiet_moves.py``): it needs no bay, and is never called anew.
+    move: BayTask | None = None
     #: Whether rights were made anew and customers are to hear that no ticket is known any more; None: they never were.
     forgot: bool | None = None
     unsaid: UnsaidParkings = field(init=False)
@@ -126,7 +128,8 @@ class BayCalls:
         if not is_robot:
             return []
         if task is None:
-            return bay_task.withdrawal(self.fleet.node_id, report)
+            is_moved = self.move is not None and self.move.task == name
+            return [] if is_moved else bay_task.withdrawal(self.fleet.node_id, report)
         if report.phase is TaskPhase.DONE and task.operation is Operation.RETRIEVE and report.sender == task.winner:
             return self._fetch_anew(task, now_us) if report.station != self.station.number else []
         if report.phase is TaskPhase.AWARDED and not task.winner and task.retry_at_us is not None and not task.call:

@@ -11,6 +11,7 @@ from onboard.contract.codes import (
     DeskInput,
     DeskText,
     KindCode,
+    MachineState,
     Operation,
     OperatorAction,
     Reason,
@@ -59,6 +60,10 @@ class BayPhase(Enum):
     HANDOVER = "handover"
     RESERVING = "reserving"
     ENTERING = "entering"
+
+
+#: What heartbeats tell in a phase, where that is not WORKING.
+STATES = {BayPhase.STARTING: MachineState.STARTING, BayPhase.FREE: MachineState.IDLE}
 
 
 @dataclass
@@ -144,6 +149,11 @@ class BayTask:
     def award(self, sender: int) -> Award:
         """The newest award, to be said again."""
         return Award(sender, self.call, self.winner, self.task, self.version, CallResult.AWARDED, Reason.NONE)
+
+    def refusal(self, sender: int, station: int) -> list[Effect]:
+        """What is said of its end where nobody came to park its car, and the driver has left with it."""
+        told = TaskReport(sender, self.task, TaskPhase.REFUSED, station, self.reason)
+        return [Send(told)] if self.operation is Operation.PARK else []
 
     def remind(self, sender: int, node: int) -> list[Effect]:
         """Who was lost and comes back believing that the task is its own hears whose it is, or that nobody has it.

@@ -22,7 +22,6 @@ from onboard.contract.codes import (
     Operation,
     OperatorAction,
     Reason,
-    TaskPhase,
     TokenKind,
 )
 from onboard.contract.constants import OUTSIDE
@@ -42,7 +41,7 @@ from onboard.contract.messages import (
 )
 from onboard.core.authority import TokenKey, station_token
 from onboard.core.behaviour import NEVER_US, OverheardWord
-from onboard.core.effects import Effect, Report, Send
+from onboard.core.effects import Effect, Report
 from onboard.core.negotiation import Awarded, AwardedAgain, Closed, NegotiationEvent
 from onboard.core.site import Station
 from onboard.systems.car_park import bay_task, custody
@@ -136,8 +135,7 @@ class Compartment:
     @property
     def state(self) -> MachineState:
         """STARTING until bay and doors are known, then IDLE or WORKING, for heartbeats."""
-        known = {BayPhase.STARTING: MachineState.STARTING, BayPhase.FREE: MachineState.IDLE}
-        return known.get(self.phase, MachineState.WORKING)
+        return bay_task.STATES.get(self.phase, MachineState.WORKING)
 
     @property
     def itinerary_version(self) -> int:
@@ -160,6 +158,9 @@ class Compartment:
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Awards tell who may fetch a stored car; a car given into my custody is stated anew; an operator's press."""
+        return self.pipeline.moves.hear(message, now_us) + self._heard(message, now_us)
+
+    def _heard(self, message: Message, now_us: int) -> list[Effect]:
         answered, lost = self.desks.hear(message, now_us)
         if answered or lost is not None:
             given_up, waited = self.calls.give_up(lost, self.phase, now_us)
@@ -188,7 +189,7 @@ class Compartment:
             return self.desks.closed(event, now_us)
         task = self.calls.named(event.call.task) if isinstance(event, Closed) else None
         if not isinstance(event, Closed) or task is None:
-            return []
+            return self.pipeline.moves.closed(event, now_us) if isinstance(event, Closed) else []
         if event.result is CallResult.AWARDED:
             return self.calls.won_by(task, event.winner, event.call.call)
         if event.result is CallResult.REJECTED:
@@ -224,8 +225,7 @@ class Compartment:
         effects = self.calls.review(now_us) + self.desks.review(now_us)
         if self.doors is None or self.bay is None:
             return effects
-        effects += self._table[self.phase](now_us) + self.pipeline.look_ahead(self.phase, now_us)
-        effects += self.pipeline.outage.review(self.phase, now_us)
+        effects += self._table[self.phase](now_us) + self.pipeline.look_ahead(self.phase, self.bay, now_us)
         return effects + (self.promises.review(self.phase, now_us) if self._park.promises else [])
 
     def next_wake(self) -> int | None:
@@ -355,8 +355,8 @@ class Compartment:
         effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm, found))
         if is_called:
             effects += self.calls.has_come(bay.wheelbase_mm)
-        stated = custody.state(self.fleet, car, self.station.number, bay.wheelbase_mm)
-        effects += [*stated, self.outputs.print_ticket(car)]
+        effects += custody.state(self.fleet, car, self.station.number, bay.wheelbase_mm)
+        effects.append(self.outputs.print_ticket(car))
         if not is_called:
             effects += self.calls.call_for(self.job, now_us)
         self._go(BayPhase.LOCKING)
@@ -467,8 +467,7 @@ class Compartment:
 
     def _left(self, job: BayTask) -> list[Effect]:
         """The car has gone out with its driver, fetched or never parked."""
-        refused = TaskReport(self.fleet.node_id, job.task, TaskPhase.REFUSED, self.station.number, job.reason)
-        effects: list[Effect] = [Send(refused)] if job.operation is Operation.PARK else []
+        effects = job.refusal(self.fleet.node_id, self.station.number)
         effects += custody.state(self.fleet, job.car, OUTSIDE, job.wheelbase_mm)
         return [*effects, self.outputs.show(DeskText.WELCOME, Reference(0, 0)), *self._to_free()]
 

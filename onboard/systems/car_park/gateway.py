@@ -20,6 +20,7 @@ from onboard.history.calls import CallOpened, CallRepeated
 from onboard.history.history import Fact, History
 from onboard.history.loads import LoadTold
 from onboard.history.system import SystemFact
+from onboard.systems.car_park.fetch_costs import moved_from
 from onboard.systems.car_park.history import PromiseTold, car_park_history
 from onboard.systems.car_park.site import CarPark
 from onboard.trace.view import SiteView
@@ -88,7 +89,8 @@ class CarParkOrders(NoBusOrders):
         if call.sender != order.request.node or call.depth:
             return None
         if order.request.car is None:
-            return call.task if call.operation is Operation.PARK and order.was_said else None
+            is_entry = call.operation is Operation.PARK and moved_from(self._park, call) is None
+            return call.task if is_entry and order.was_said else None
         is_it = call.operation is Operation.RETRIEVE and call.car == order.request.car
         return call.task if is_it else None
 

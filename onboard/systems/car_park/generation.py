@@ -6,10 +6,10 @@ others' present and foreseen tasks (rows P21, P28), unlike that of a lathe. Wher
 chooses the place itself and evaluates all its solutions (row P46).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import Criterion, Grade, LegAction, Operation
+from onboard.contract.codes import Criterion, Grade, Operation
 from onboard.contract.messages import CallForProposals, Itinerary, Stamp
 from onboard.core.negotiation import CallKey, NeededAnswers, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
@@ -18,7 +18,8 @@ from onboard.systems.car_park.ahead import Ahead, Checked, key_of
 from onboard.systems.car_park.alternatives import Alternative, Solution, can_be_told
 from onboard.systems.car_park.charging import Charging
 from onboard.systems.car_park.clearance import MAX_EXPANSIONS, Clearance, Seen
-from onboard.systems.car_park.fetching import to_fetch_from
+from onboard.systems.car_park.free_places import FreePlaces
+from onboard.systems.car_park.place_costs import PlaceCosts
 from onboard.systems.car_park.program import (
     MAX_STEPS,
     STAMP_AHEAD_US,
@@ -46,8 +47,6 @@ HANDLING_OVERHEAD_US = 400_000
 #: A customer has left the compartment this long after the call: walking out takes 4 to 8 s; so that the real
 #: days of the tests finish no later than bid.
 CUSTOMER_US = 9_500_000
-#: How long past its planned end another robot's work still keeps its place promised: it may be late.
-PROMISE_GRACE_US = 60_000_000
 #: From so many places on, the way to taking the car is searched once for all of them: for fewer, a search for each
 #: costs less.
 FEW_PLACES = 3
@@ -76,11 +75,15 @@ class CarParkGeneration:
     effort: Effort = field(default_factory=Effort)
     clearance: Clearance = field(init=False)
     charging: Charging = field(init=False)
+    free: FreePlaces = field(init=False)
+    costs: PlaceCosts = field(init=False)
     #: What is worked out for bids that stand best, where searches are sliced.
     ahead: Ahead = field(init=False)
 
     def __post_init__(self) -> None:
         self.ahead = Ahead(self.effort)
+        self.free = FreePlaces(self.site, self.machine.node_id, self.mirror, self.program, self.tentative)
+        self.costs = PlaceCosts(self.site)
         self.charging = Charging(self.site, self.mirror, self.machine.node_id)
         self.clearance = Clearance(self.site, self.mirror, self.machine.node_id, self.effort)
 
@@ -299,13 +302,14 @@ class CarParkGeneration:
         self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], reservations: Reservations
     ) -> Search[tuple[Solution | None, list[Alternative]]]:
         kept, segment, start_us = start
-        bounds = yield from self._bounds(call, now_us, start, reservations)
-        best, alternatives = None, list[Alternative]()
+        bounds, costs = yield from self._bounds(call, now_us, start, reservations)
+        best, best_us, alternatives = None, 0, list[Alternative]()
         # Places on both sides of a segment are reached and served alike.
         routes: dict[Segment, Route | None] = {}
         for bound_us, _, place in bounds:
-            if best is not None and bound_us >= best.finish_us:
-                alternatives.append(Alternative(place, None, bound_us))
+            later_us = costs.get(place.number, 0)
+            if best is not None and bound_us >= best_us:
+                alternatives.append(Alternative(place, None, bound_us - later_us))
                 continue
             if place.segment not in routes:
                 route = yield from self._route(call, place, segment, start_us, now_us, reservations)
@@ -315,15 +319,17 @@ class CarParkGeneration:
                 alternatives.append(Alternative(place, None))
                 continue
             alternatives.append(Alternative(place, route.finish_us))
-            if best is None or route.finish_us < best.finish_us:
-                steps = self._steps(call, place, route)
+            if best is None or route.finish_us + later_us < best_us:
+                steps, best_us = self._steps(call, place, route), route.finish_us + later_us
                 best = Solution(kept, segment, start_us, steps, route.finish_us, place)
         return best, alternatives
 
     def _bounds(
         self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], reservations: Reservations
-    ) -> Search[list[tuple[int, int, Station]]]:
-        """Places that may be chosen, each with a time before which it cannot be finished, the most promising first.
+    ) -> Search[tuple[list[tuple[int, int, Station]], Mapping[int, int]]]:
+        """Places that may be chosen, the most promising first, and what they cost beside the finish, by their numbers.
+
+        Each with a time before which it cannot be finished, and that cost on it.
 
         Where there is a choice of places to leave the car at, the search up to taking it is common to all: it is made
         once, and only the way from there is counted as free. No route to a place takes the car sooner, as it is a
@@ -336,11 +342,13 @@ class CarParkGeneration:
             take, _ = self._visits(call, places[0], start_us)
             route = yield from self._plan(reservations, segment, start_us, (take,), now_us)
             if route is None:
-                return [(FOREVER, 0, places[0])]
+                return [(FOREVER, 0, places[0])], {}
             taken_us = route.finish_us
         bounds = self._lower_bounds(call, places, segment, start_us, taken_us)
         yield len(bounds)
-        return sorted((bounds[one.segment], n, one) for n, one in enumerate(places))
+        costs = self.costs.of(call, places, now_us)
+        found = ((bounds[one.segment] + costs.get(one.number, 0), n, one) for n, one in enumerate(places))
+        return sorted(found), costs
 
     def _start(self, call: CallForProposals, now_us: int, *, behind_bids: bool = True) -> tuple[int, Segment, int]:
         kept, segment, start_us = self._free_from(now_us, behind_bids=behind_bids)
@@ -459,26 +467,9 @@ class CarParkGeneration:
     def _candidates(self, call: CallForProposals, now_us: int) -> list[Station]:
         """Stations that the bidder may choose: free places nobody is on the way to, or the one that the call names."""
         car_class = open_class(call)
-        return self._all_candidates(call) if car_class is None else self.free_places(now_us, car_class, key_of(call))
-
-    def free_places(self, now_us: int, car_class: int, bid: CallKey | None = None) -> list[Station]:
-        """Places for a class of car at which none stands and that nobody has promised, in the site's order."""
-        promised = self._promised(now_us, bid)
-        free = [place for place in self.mirror.free_places() if place.number not in promised]
-        return self.site.best_for(car_class, to_fetch_from(self.site, free))
-
-    def _promised(self, now_us: int, bid: CallKey | None) -> set[int]:
-        """Places at which somebody's plan, or mine, will work: two parkings never aim at one place (row P42)."""
-        promised = {
-            Station(leg.track, leg.to_index, leg.side).number
-            for node, itinerary in self.mirror.itineraries.items()
-            if node != self.machine.node_id
-            for leg in itinerary.legs
-            if leg.action is LegAction.WORK and from_bus_ms(leg.end_ms, now_us) > now_us - PROMISE_GRACE_US
-        }
-        promised |= {work.station.number for work in self.program.works()}
-        promised |= {solution.place.number for key, solution in self.tentative.items() if key != bid}
-        return promised
+        if car_class is None:
+            return self._all_candidates(call)
+        return self.costs.nearer(call, self.free.of(now_us, car_class, key_of(call)))
 
     def _steps(self, call: CallForProposals, place: Station, route: Route) -> tuple[CarStep, ...]:
         source, sink = self.ends(call, place)

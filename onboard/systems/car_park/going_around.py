@@ -302,7 +302,28 @@ class GoingAround:
             if effects:
                 return effects
             self._place_at_us = now_us + RETRY_US
+        for work in self.places.moved():
+            effects = self._take_at(work, now_us)
+            if effects:
+                return effects
+            self._place_at_us = now_us + RETRY_US
         return []
+
+    def _take_at(self, work: StationWork, now_us: int) -> list[Effect]:
+        """Fetch a car from where it stands by now; nothing while there is no way there."""
+        was = next(one for one in self.program.works() if one._replace(station=work.station) == work)
+        in_hand = self.program.step is not None and self.program.step.work == was
+        kept, origin, start_us = self.turning([work.call.task] if in_hand else (), now_us)
+        works = self._ahead(self.program.works(), kept)
+        moved = [work if one == was else one for one in works]
+        steps = self.generation.reroute(origin, start_us, moved, now_us) if was in works else None
+        if steps is None:
+            return []
+        if self.shuttle.work == was:
+            self.shuttle.drop()
+        self._heard += 1
+        told = Report(f"car {work.car.number} is fetched from {work.station}: it stands there by now")
+        return [told, *self.take_up(kept, steps, moved, now_us)]
 
     def _choose_for(self, work: StationWork, now_us: int) -> list[Effect]:
         """Nothing where there is no other place, or no way there, now: it waits at its own then."""

@@ -88,10 +88,12 @@ class ShuttleWork:
 
     def drop(self) -> None:
         """The handling in hand, which was not begun, is not to be: its rights are asked for no more."""
-        if self.work is not None:
-            for key in self._rights():
-                self.fleet.tokens.forget(key)
+        self._ask_no_more()
         self.work, self.phase = None, HandlingPhase.DONE
+
+    def _ask_no_more(self) -> None:
+        for key in self._rights() if self.work is not None else ():
+            self.fleet.tokens.forget(key)
 
     @property
     def is_home(self) -> bool:
@@ -118,6 +120,9 @@ class ShuttleWork:
         if self._resuming:
             return self._resume(self.work, now_us)
         if self.phase is HandlingPhase.ACQUIRE:
+            if self._is_elsewhere(self.work):
+                self._ask_no_more()
+                return []
             effects = self._acquire(now_us)
             is_taken = self.work.handling is CarHandling.LEAVE and custody.others_in(
                 self.fleet.mirror, self.work.station, self.work.car
@@ -147,6 +152,11 @@ class ShuttleWork:
     def _rights(self) -> list[TokenKey]:
         assert self.work is not None
         return [station_token(self.work.station), car_token(*self.work.car)]
+
+    def _is_elsewhere(self, work: StationWork) -> bool:
+        """Whether a car that is to be taken stands at another station by its custodian's word: nothing is here."""
+        stands = self.fleet.mirror.car_station(work.car) if work.handling is CarHandling.TAKE else None
+        return stands is not None and stands != work.station
 
     def _permit(self) -> Permit:
         return authorised(self.fleet.motion, self._rights())

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from onboard.contract.codes import DeskText, Operation, Reason
 from onboard.contract.constants import ANY_STATION, NOBODY
-from onboard.contract.messages import Reference
+from onboard.contract.messages import BayState, Reference
 from onboard.core.effects import Effect, Send
 from onboard.systems.car_park import bay_task, custody
 from onboard.systems.car_park.bay_calls import BayCalls
@@ -20,6 +20,7 @@ from onboard.systems.car_park.bay_memory import BayMemory, ahead_record
 from onboard.systems.car_park.bay_task import BayPhase, BayTask
 from onboard.systems.car_park.outage import Outage
 from onboard.systems.car_park.outputs import BayOutputs
+from onboard.systems.car_park.quiet_moves import QuietMoves
 from onboard.systems.car_park.site import ANY_CLASS, CallAt, CarPark
 from onboard.ways.mirror import WayFleet
 from onboard.ways.site import BayUse
@@ -59,8 +60,10 @@ class Pipeline:
     #: Who asked for the bay though nothing is known of a task for it.
     _wanted_by: int = NOBODY
     outage: Outage = field(init=False)
+    moves: QuietMoves = field(init=False)
 
     def __post_init__(self) -> None:
+        self.moves = QuietMoves(self.fleet, self.park, self.calls, self.memory, self.tickets)
         self.outage = Outage(self.fleet, self.calls, self.outputs, self.tickets)
 
     @property
@@ -69,7 +72,11 @@ class Pipeline:
         return self.park.call_at is CallAt.ARRIVAL
 
     def next_wake(self, phase: BayPhase) -> int | None:
-        """When whoever comes in has not pressed the key, a driver who was invited has not come, or no robot does."""
+        """When whoever comes in has not pressed the key, an invited driver has not come, no robot does, or all rest."""
+        due = [one for one in (self._next_look(phase), self.moves.next_wake()) if one is not None]
+        return min(due, default=None)
+
+    def _next_look(self, phase: BayPhase) -> int | None:
         if phase is BayPhase.ENTERING:
             return self.entering_until_us
         if phase is not BayPhase.FREE:
@@ -157,7 +164,12 @@ class Pipeline:
         ahead = self.calls.ahead = BayTask(task, Operation.RETRIEVE, car, wheelbase_mm)
         return [number, ahead_record(task, car, wheelbase_mm), *self.calls.won_by(ahead, robot, 0)]
 
-    def look_ahead(self, phase: BayPhase, now_us: int) -> list[Effect]:
+    def look_ahead(self, phase: BayPhase, bay: BayState, now_us: int) -> list[Effect]:
+        """Call for who is next, tell who waits in vain, and use the time while nobody is here or waits."""
+        effects = self._look_ahead(phase, now_us) + self.outage.review(phase, now_us)
+        return effects + self.moves.review(phase, now_us, is_empty=not (bay.load_kg or bay.person_inside))
+
+    def _look_ahead(self, phase: BayPhase, now_us: int) -> list[Effect]:
         """Call for the next car while the bay still works, once it is known when it can take it."""
         self._looked_us = now_us
         if self.calls.forgot and phase is BayPhase.FREE:

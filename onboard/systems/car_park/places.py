@@ -47,9 +47,15 @@ class PlaceChoice:
             and (custody.others_in(self.fleet.mirror, work.station, work.car) or self._is_anothers(work.station))
         ]
 
+    def moved(self) -> list[StationWork]:
+        """Cars to be taken that stand at another place by now, which nobody knew when they were called for."""
+        takes = [one for one in self.generation.program.works() if one.handling is CarHandling.TAKE]
+        stands = ((one, custody.place_of(self.fleet, one.car)) for one in takes if not self._is_begun(one))
+        return [one._replace(station=place) for one, place in stands if place is not None and place != one.station]
+
     def instead(self, work: StationWork, now_us: int) -> list[Station]:
         """Free places that nobody has promised, the nearest to where the car was to be left first."""
-        free = self.generation.free_places(now_us, class_of_end(work.call.to_station) or ANY_CLASS)
+        free = self.generation.free.of(now_us, class_of_end(work.call.to_station) or ANY_CLASS)
         return nearest(free, work.station.segment)
 
     def _is_begun(self, work: StationWork) -> bool:

@@ -22,6 +22,7 @@ from onboard.core.effects import Effect
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.clearance import MAX_EXPANSIONS
+from onboard.systems.car_park.fetch_costs import met_us, moved_from
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.going_around import GoingAround
 from onboard.systems.car_park.program import MAX_STEPS, Program, steps_of
@@ -80,13 +81,15 @@ class Resting:
 
     def hear(self, message: Message, now_us: int) -> None:
         """A call tells where robots are needed, a plan where one will stand, a level whether others bid."""
+        self.generation.costs.hear(message, now_us)
         if not self.is_on:
             return
         if isinstance(message, BatteryLevel):
             self.generation.charging.hear(message, now_us)
         if isinstance(message, CallForProposals) and message.operation in (Operation.PARK, Operation.RETRIEVE):
             self._due_us = now_us + self._rest_us
-            if message.attempt == 1 and class_of_end(message.from_station) is None:
+            is_customers = moved_from(self.park, message) is None
+            if message.attempt == 1 and class_of_end(message.from_station) is None and is_customers:
                 here = Station.from_number(message.from_station).segment
                 self._heard.extend([here] if roads_of(self.park).knows(here) else [])
         elif isinstance(message, Itinerary) and message.grade is Grade.FIRM and self._due_us is None:
@@ -155,10 +158,10 @@ class Resting:
         demand = Counter(self._heard)
         others = list(self._others())
         roads = roads_of(self.park)
-        met = {one: sorted(roads.shortest_us(other, one) for other in others) for one in demand}
+        met = {one: [roads.shortest_us(other, one) for other in others] for one in demand}
 
         def mean_us(place: Segment) -> int:
-            return sum(count * _met_us(roads.shortest_us(place, one), met[one]) for one, count in demand.items())
+            return sum(count * met_us((*met[one], roads.shortest_us(place, one))) for one, count in demand.items())
 
         if not demand:
             return None
@@ -182,9 +185,3 @@ class Resting:
         found = open_refuges(self.park, self.fleet.mirror.others_standing())
         beside = [(one, {one._replace(index=one.index - 1), one._replace(index=one.index + 1)}) for one in found]
         return sorted(one for one, both in beside if one in demand or not both <= found)
-
-
-def _met_us(mine_us: int, others_us: list[int]) -> int:
-    """How long a call waits for its robot on average, where each is busy every second time."""
-    times = sorted((*others_us, mine_us))
-    return sum(time_us >> place for place, time_us in enumerate(times, start=1))

@@ -86,7 +86,7 @@ def _free_place(
     fleet: WayFleet, generation: CarParkGeneration, here: Segment, car: Reference, now_us: int
 ) -> Station | None:
     """The nearest free place that takes whatever car and that there is a way to now; else the nearest."""
-    near = nearest(generation.free_places(now_us, ANY_CLASS), here)
+    near = nearest(generation.free.of(now_us, ANY_CLASS), here)
     ways = (
         one for one in near if generation.reroute(here, now_us, [_leaving(fleet, car, one, now_us)], now_us) is not None
     )

@@ -131,6 +131,20 @@ class DeskPolicy(Enum):
     OWN = "own"
 
 
+class PlacePolicy(Enum):
+    """Which of the free places a car is parked in.
+
+    NEAREST: where it stands soonest. COST: by that and by what its fetch will cost. STAY: near for short stays, far for
+    long ones, by what was heard of stays. BALANCED: in the alley that is least full. RANDOM: in any, drawn by its name.
+    """
+
+    NEAREST = "nearest"
+    COST = "cost"
+    STAY = "stay"
+    BALANCED = "balanced"
+    RANDOM = "random"
+
+
 @dataclass(frozen=True, kw_only=True)
 class CarPark(WaySite):
     """A robotized car park (rows P30 to P33)."""
@@ -153,6 +167,9 @@ class CarPark(WaySite):
     call_at: CallAt = CallAt.ARRIVAL
     rest_at: RestAt = RestAt.NEAREST
     desk: DeskPolicy = DeskPolicy.ANY
+    place: PlacePolicy = PlacePolicy.NEAREST
+    #: Whether cars are brought nearer to where they are fetched while nobody waits.
+    quiet_moves: bool = False
     #: Whether a bid brings its tentative itinerary: to be seen, as in the paper; nobody plans around it.
     tells_offers: bool = False
     #: Whether a compartment tells who asks for a car when it will be there.

@@ -28,6 +28,7 @@ from onboard.core.serial import is_newer, successor
 from onboard.core.site import Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.bay_memory import BayMemory, job_record, winner_record
+from onboard.systems.car_park.site import car_park
 from onboard.ways.mirror import WayFleet
 from onboard.ways.tokens import car_token
 
@@ -63,6 +64,7 @@ class Stewardship:
     _since_us: int = 0
 
     def __post_init__(self) -> None:
+        self._park = car_park(self.fleet.site)
         self.fleet.tokens.before_taking = self._before_taking
         self.fleet.mirror.on_forgotten.append(self._forget)
 
@@ -96,6 +98,8 @@ class Stewardship:
                 if car is not None and self._is_news(car, message):
                     self._unheard_us[car] = now_us
                     return self.won(car, message.winner, message.task, message.task_version)
+            case Award() if message.result is CallResult.WITHDRAWN and self._park.quiet_moves:
+                return self.call_off(message.task)
             case TokenGrant() if message.token_kind is TokenKind.CAR and message.holder == self.fleet.node_id:
                 return self._state_anew(custody.car_of(message), message.version)
         return []
@@ -129,6 +133,13 @@ class Stewardship:
         if report.task != task or report.phase is not TaskPhase.AWARDED or winner:
             return []
         return self.won(car, report.sender, task, successor(version, TASK_VERSION_BITS))
+
+    def call_off(self, task: Reference) -> list[Effect]:
+        """Nobody is to move a car any more; who has a right to it already does so all the same, or gives it back."""
+        mine = [(car, version) for car, (one, version) in self.tasks.items() if one == task and self._is_untouched(car)]
+        for car, _ in mine:
+            self._say_at_us.pop(car, None)
+        return [effect for car, version in mine for effect in self.won(car, NOBODY, task, version)]
 
     def winner_of(self, car: Reference, task: Reference) -> tuple[int, int]:
         """Who may fetch a car for ``task``, 0 for nobody, and its version; what was won for another does not count."""

@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -15,16 +16,18 @@ from bus_sim.systems.car_park.compare.optimum import OptimumError, is_available
 from bus_sim.systems.car_park.compare.plays import POLICIES, Play, Wanted, play_wanted
 from bus_sim.systems.car_park.compare.small_table import SmallTable, solve_case
 from bus_sim.systems.car_park.compare.stored_cases import GapTable, StoredCase, stored_cases
-from bus_sim.systems.car_park.compare.table import ComparisonTable, tabulate
+from bus_sim.systems.car_park.compare.table import ComparisonTable, named, tabulate
 from bus_sim.systems.car_park.day import ParkingDay, asked_inside, brought_in, check_together, choose_demand
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.mapping import table_form
 from bus_sim.systems.car_park.window import choose_window
 from onboard.core.site import Site
-from onboard.systems.car_park.site import CarPark
+from onboard.systems.car_park.site import CarPark, PlacePolicy
 
 #: What the command can compare on.
 PARTS = ("random", "day", "small", "stored")
+#: How places can be chosen.
+PLACES = tuple(one.value for one in PlacePolicy)
 #: Where the optimum is looked for: one compartment, two robots.
 SMALL_SITE = "small"
 #: Small cases solved at most: a proof can take half a minute.
@@ -77,6 +80,13 @@ def add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         metavar="PART,...",
         help=f"which of {', '.join(PARTS)} (default: all)",
     )
+    compare.add_argument(
+        "--place",
+        default="",
+        metavar="POLICY,...",
+        help=f"by which places are chosen, each of these with each who decides: {', '.join(PLACES)} "
+        "(default: as the site file says)",
+    )
     add_where_options(compare)
     compare.add_argument("--json", type=Path, metavar="FILE", help="write all tables as JSON too")
 
@@ -84,6 +94,7 @@ def add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
 def run_compare(args: argparse.Namespace) -> int:
     """Make the tables; the exit status. Raises ``DemandError`` for a person's mistake."""
     seeds, parts, engine = _seeds(args.seeds), _parts(args.parts), engine_of(args, chunk=1)
+    places = _places(args.place)
     site = find_site(args.site)
     if not isinstance(site, CarPark):
         raise DemandError(f"{args.site}: a {site.system}, and only car parks are compared; name a car park")
@@ -94,9 +105,9 @@ def run_compare(args: argparse.Namespace) -> int:
             print("no optimum: OR-Tools is not installed; pip install 'onboard-fleet[optimum]'\n", flush=True)
             continue
         if part == "random":
-            found[part] = compare_random(site, seeds, args.cars, tuple(args.random), engine)
+            found[part] = compare_random(site, seeds, args.cars, tuple(args.random), engine, places)
         elif part == "day":
-            found[part] = compare_day(site, args, engine)
+            found[part] = compare_day(site, args, engine, places)
         elif part == "stored":
             found[part] = _solve_stored(engine)
         else:
@@ -111,11 +122,21 @@ def run_compare(args: argparse.Namespace) -> int:
 
 
 def compare_random(
-    site: Site, seeds: range, cars: int, interval_s: tuple[float, float], engine: Engine = map
+    site: CarPark,
+    seeds: range,
+    cars: int,
+    interval_s: tuple[float, float],
+    engine: Engine = map,
+    places: Sequence[str] = ("",),
 ) -> ComparisonTable:
     """All policies on random arrivals. Raises ``DemandError`` for intervals that make no sense."""
     demands = {seed: Demand.by_mean(*interval_s, seed, count=cars) for seed in seeds}
-    wanted = [Wanted(site, demands[seed], policy, seed) for seed in seeds for policy in POLICIES]
+    wanted = [
+        Wanted(site, demands[seed], policy, seed, None, place)
+        for seed in seeds
+        for place in places
+        for policy in POLICIES
+    ]
     plays = _all_played(wanted, engine)
     title = (
         f"{site.name}: {cars} cars in and out at intervals of {interval_s[0]:g} s +- {interval_s[1]:g} s, "
@@ -124,7 +145,9 @@ def compare_random(
     return tabulate(title, plays)
 
 
-def compare_day(site: CarPark, args: argparse.Namespace, engine: Engine = map) -> ComparisonTable:
+def compare_day(
+    site: CarPark, args: argparse.Namespace, engine: Engine = map, places: Sequence[str] = ("",)
+) -> ComparisonTable:
     """All policies on a window of a real day: what comes before is played too, and not counted."""
     check_together(args)
     inside, overnight = asked_inside(args)
@@ -136,7 +159,8 @@ def compare_day(site: CarPark, args: argparse.Namespace, engine: Engine = map) -
         print(remark, file=sys.stderr, flush=True)
     seed = 1
     before = Demand(tuple(stay for stay in demand.stays if stay.arrival_us < window.end_us), demand.zero)
-    plays = _all_played([Wanted(site, before, policy, seed, window) for policy in POLICIES], engine)
+    wanted = [Wanted(site, before, policy, seed, window, place) for place in places for policy in POLICIES]
+    plays = _all_played(wanted, engine)
     return tabulate(f"{site.name}: {window.described(demand)}", plays)
 
 
@@ -169,16 +193,17 @@ def _solve_stored(engine: Engine) -> GapTable:
 
 
 def _all_played(wanted: list[Wanted], engine: Engine) -> list[Play]:
-    """All plays in the order of the seeds, then of the policies, whoever played them."""
+    """All plays in the order in which they were wanted, whoever played them."""
     results = shown(engine(play_wanted, wanted), len(wanted), "plays", Console(stderr=True))
-    order = {name: number for number, name in enumerate(POLICIES)}
-    return sorted(map(_told, results), key=lambda one: (one.seed, order[one.policy]))
+    order = {(one.seed, one.place, one.policy): number for number, one in enumerate(wanted)}
+    return sorted(map(_told, results), key=lambda one: order[one.seed, one.place, one.policy])
 
 
 def _told(one: Play) -> Play:
     waits_us = one.in_us + one.out_us
     mean_s = sum(waits_us) / len(waits_us) / 1e6 if waits_us else 0.0
-    print(f"seed {one.seed}, {one.policy}: waiting {mean_s:.1f} s, {one.left} not served", file=sys.stderr, flush=True)
+    told = f"seed {one.seed}, {named(one.policy, one.place)}: waiting {mean_s:.1f} s, {one.left} not served"
+    print(told, file=sys.stderr, flush=True)
     return one
 
 
@@ -187,6 +212,13 @@ def _seeds(text: str) -> range:
     if not first.isdecimal() or (dash and not last.isdecimal()) or (dash and int(last) < int(first)):
         raise DemandError(f"--seeds {text}: must be one number, or first and last such as 1-5")
     return range(int(first), int(last or first) + 1)
+
+
+def _places(text: str) -> list[str]:
+    places = text.split(",") if text else [""]
+    if text and not set(places) <= set(PLACES):
+        raise DemandError(f"--place {text}: must be some of {', '.join(PLACES)}")
+    return list(dict.fromkeys(places))
 
 
 def _parts(text: str) -> list[str]:

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from bus_sim.options import RunOptions
@@ -17,7 +17,9 @@ from bus_sim.systems.car_park.plant.customer import Customer, VisitOutcome
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.systems.car_park.window import DayWindow
 from bus_sim.virtual_time import VirtualTimeLoop
+from onboard.config.site import site_digest
 from onboard.core.site import Site
+from onboard.systems.car_park.site import CarPark, PlacePolicy
 from onboard.trace.indicators import Indicators
 from onboard.ways.site import way_site
 
@@ -62,6 +64,8 @@ class Play:
     gone_us: tuple[int, ...] = ()
     refused: int = 0
     bounds: WaitBounds = field(default_factory=WaitBounds)
+    #: The choice of places, where several are compared; else empty.
+    place: str = ""
 
 
 def play(site: Site, demand: Demand, policy: str, seed: int, window: DayWindow | None = None) -> Play:
@@ -81,16 +85,23 @@ def play(site: Site, demand: Demand, policy: str, seed: int, window: DayWindow |
 class Wanted(NamedTuple):
     """What is to be played, as one value that another process can be sent."""
 
-    site: Site
+    site: CarPark
     demand: Demand
     policy: str
     seed: int
     window: DayWindow | None = None
+    #: By which the site chooses places, where several are compared; empty: by its own.
+    place: str = ""
 
 
 def play_wanted(wanted: Wanted) -> Play:
     """Play what was wanted to its end; raises ``KeyError`` as ``play`` does."""
-    return play(*wanted)
+    site = wanted.site
+    if wanted.place:
+        site = replace(site, place=PlacePolicy(wanted.place))
+        site = replace(site, digest=site_digest(site))
+    found = play(site, wanted.demand, wanted.policy, wanted.seed, wanted.window)
+    return replace(found, place=wanted.place)
 
 
 class _Run:

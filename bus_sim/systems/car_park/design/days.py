@@ -49,10 +49,10 @@ def days_of(args: Namespace, site: CarPark) -> Days:
     day = ParkingDay(args.sessions, args.counts, table_form(args), inside, overnight, args.day)
     whole = choose_demand(day, site)
     remarks = list(whole.remarks)
-    plans = _by_day(whole)
+    plans = by_day(whole)
     if len(plans) < 2:
         found = [
-            DayPlan(f"seed {seed}", _played(choose_demand(day, site, seed), site), seed)
+            DayPlan(f"seed {seed}", played(choose_demand(day, site, seed), site), seed)
             for seed in range(1, args.days + args.unseen + 1)
         ]
         return Days(found[: args.days], found[args.days :], remarks)
@@ -67,12 +67,12 @@ def days_of(args: Namespace, site: CarPark) -> Days:
         )
     # Spread over the table, and drawn so that both kinds are of all seasons.
     chosen = random.Random("design days").sample(range(len(plans)), wanted + args.unseen)
-    played = [plans[number]._replace(demand=_played(plans[number].demand, site)) for number in chosen]
-    by_date = sorted(played[:wanted], key=lambda one: one.label), sorted(played[wanted:], key=lambda one: one.label)
+    found = [plans[number]._replace(demand=played(plans[number].demand, site)) for number in chosen]
+    by_date = sorted(found[:wanted], key=lambda one: one.label), sorted(found[wanted:], key=lambda one: one.label)
     return Days(*by_date, remarks)
 
 
-def _by_day(demand: Demand) -> list[DayPlan]:
+def by_day(demand: Demand) -> list[DayPlan]:
     """Each working day of a demand by itself; all days where there is no working day."""
     if demand.zero is None:
         return []
@@ -95,7 +95,7 @@ def _shifted(stay: Stay, by_us: int) -> Stay:
     return replace(stay, arrival_us=stay.arrival_us - by_us, departure_us=leaves_us if is_fetched else None)
 
 
-def _played(demand: Demand, site: CarPark) -> Demand:
+def played(demand: Demand, site: CarPark) -> Demand:
     """Without cars that the gate refuses: they wait for nothing. Those inside at the start come before."""
     fitting = tuple(stay for stay in demand.stays if not broken_limits(stay.car, site))
     return brought_in(replace(demand, stays=fitting), site)

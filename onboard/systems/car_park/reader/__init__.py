@@ -13,7 +13,7 @@ from onboard.systems.car_park.reader.constants import read_constants
 from onboard.systems.car_park.reader.machines import read_fleet, read_stewards
 from onboard.systems.car_park.reader.positions import BASE
 from onboard.systems.car_park.reader.whole import check_whole, sound_tracks
-from onboard.systems.car_park.site import CallAt, CarPark, DeskPolicy, RestAt, RideCalls
+from onboard.systems.car_park.site import CallAt, CarPark, DeskPolicy, PlacePolicy, RestAt, RideCalls
 from onboard.ways.site import BayUse, charted
 
 
@@ -37,6 +37,8 @@ def read(root: TomlTable, common: Common) -> CarPark:
     call_at = CallAt(negotiation.choice("call_at", [one.value for one in CallAt], "arrival"))
     rest_at = RestAt(negotiation.choice("rest_at", [one.value for one in RestAt], "nearest"))
     desk = DeskPolicy(negotiation.choice("desk", [one.value for one in DeskPolicy], "any"))
+    place = PlacePolicy(negotiation.choice("place", [one.value for one in PlacePolicy], "nearest"))
+    quiet_moves = negotiation.flag("quiet_moves", default=False)
     tells_offers = negotiation.choice("offers", ["kept", "told"], "kept") == "told"
     promises = negotiation.flag("promises", default=False)
     power = root.table("battery")
@@ -66,6 +68,8 @@ def read(root: TomlTable, common: Common) -> CarPark:
         call_at=call_at,
         rest_at=rest_at,
         desk=desk,
+        place=place,
+        quiet_moves=quiet_moves,
         tells_offers=tells_offers,
         promises=promises,
         bay_uses={bay.node: bay.use for bay in bays if bay.use is not BayUse.BOTH},
