@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from onboard.contract.change import SiteNext
 from onboard.contract.codes import CONTRACT_VERSION, MachineState, Reason
 from onboard.contract.constants import NOBODY, Speakers
 from onboard.contract.messages import (
@@ -57,8 +58,8 @@ from onboard.holon.witness import Doubt, Witness
 MAX_ROUNDS = 100
 #: All that is heard of a machine with another contract or site: the stop, who it is, and where it stands.
 _HEARD_FROM_STRANGERS = (EmergencyStop, Heartbeat, Progress)
-#: All that a machine hears while it is apart: what may end that, who lives, and why others do not act.
-_WHILE_APART = (EmergencyStop, Go, Halted, Heartbeat, Regeneration)
+#: All that a machine hears while it is apart: what may end that, who lives and who counts, why others stand.
+_WHILE_APART = (EmergencyStop, Go, Halted, Heartbeat, Regeneration, SiteNext)
 
 
 class Holon:

@@ -2,7 +2,8 @@
 
 An operator names both digests (``SiteNext``) every two seconds. A machine that has one of them takes the other for its
 own as well, says so, and so again every ten seconds. It is over when the operator says so, or is not heard for
-``FORGOTTEN_US``. What else may differ between the two files is the operator's business (onboard/config/site_change.py).
+``FORGOTTEN_US``; until then no other change counts. What may differ between the two files is the operator's business
+(onboard/config/site_change.py).
 """
 
 from collections.abc import Callable
@@ -52,12 +53,14 @@ class SiteChange:
         other = word.next_digest if word.site_digest == self.own else word.site_digest
         if other == self.own:
             return []
-        if word.change_phase is not ChangePhase.ANNOUNCED:
-            return self._end("it is over") if other == self.other else []
-        self.until_us = now_us + FORGOTTEN_US
-        if other == self.other:
+        if self.other not in (0, other):
             return []
-        self.other, self.say_us = other, now_us
+        if word.change_phase is not ChangePhase.ANNOUNCED:
+            return self._end("it is over") if self.other and word.change_phase is ChangePhase.OVER else []
+        self.until_us = now_us + FORGOTTEN_US
+        if self.other:
+            return []
+        self.other, self.say_us = other, max(now_us, self.say_us)
         return [Report(f"a change of site: {other:04X} counts as {self.own:04X}"), *self.wake(now_us)]
 
     def wake(self, now_us: int) -> list[Effect]:

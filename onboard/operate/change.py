@@ -8,6 +8,8 @@ from onboard.operate.park import Park
 
 #: The change is announced so often, us: machines forget it after five of these.
 EVERY_US = 2_000_000
+#: States of machines that do not take part.
+_NOT_YET = (MachineState.STARTING, MachineState.OBSTACLE, MachineState.STOPPED)
 
 
 class ChangeCommand(OperatorCommand):
@@ -22,6 +24,7 @@ class ChangeCommand(OperatorCommand):
         #: Machines that count both, and machines that take part by the new file.
         self._counting: set[int] = set()
         self._changed: set[int] = set()
+        self._starting: set[int] = set()
 
     def preview(self, now_us: int) -> list[str]:
         """One line a machine: which file it has."""
@@ -57,8 +60,15 @@ class ChangeCommand(OperatorCommand):
             self._counting.add(node)
             self.tell(f"{name} counts both")
         beat = self.park.machines[node].beat
-        takes_part = beat is not None and beat.site_digest == new and beat.state is not MachineState.STARTING
-        if takes_part and node not in self._changed:
+        is_starting = beat is not None and beat.state is MachineState.STARTING
+        if is_starting and node not in self._starting:
+            # It does not know of the change, and takes whoever has the other file for a stranger until it hears.
+            self._wake_us = now_us
+        self._starting = self._starting | {node} if is_starting else self._starting - {node}
+        takes_part = beat is not None and beat.site_digest == new and beat.state not in _NOT_YET
+        if not takes_part:
+            self._changed.discard(node)
+        elif node not in self._changed:
             self._changed.add(node)
             left = [self.park.name(one) for one in self.park.machines if one not in self._changed]
             self.tell(f"{name} takes part by the new file" + (f"; to come: {', '.join(left)}" if left else ""))

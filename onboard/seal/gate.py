@@ -14,8 +14,9 @@ from onboard.contract.messages import EmergencyStop, Heartbeat, Message
 from onboard.contract.seal import Seal, SealAnswer, SealChallenge, SealFault, SealTo, SealWord
 from onboard.core.frame import Frame
 from onboard.seal.heard import (
+    MOST_TWIN_SEALS,
     MOST_WAITING,
-    TWINS_AFTER_US,
+    TWIN_SEALS_US,
     WAITS_US,
     HeardNode,
     WaitingFrame,
@@ -84,6 +85,7 @@ class Gate:
         self._ask_again_us = 0
         self._told: dict[tuple[int, SealWord], int] = {}
         self._tell_us = 0
+        self._twins_until_us, self._twin_seals = 0, 0
 
     # --- out ---------------------------------------------------------------------------------------------------
 
@@ -239,6 +241,7 @@ class Gate:
         heard = self._nodes.get(seal.sender)
         if heard is None:
             return [], []
+        looks_deeper: bool | None = None
         for number in self._numbers(seal.sender, heard, seal.counter):
             found = self._fitting(seal, number, heard.waiting)
             if found is not None:
@@ -246,7 +249,9 @@ class Gate:
             if heard.free is not None and self._fitting(seal, number, [heard.free]):
                 heard.proved(number, now_us)
                 return [], []
-            found = self._among_twins(seal, number, heard, now_us)
+            if looks_deeper is None:
+                looks_deeper = self._may_look_deeper(heard, now_us)
+            found = self._first(seal, number, readings_among_twins(list(heard.waiting))) if looks_deeper else None
             if found is not None:
                 return self._take_up(seal.sender, heard, number, found, now_us), []
         if heard.last is None:
@@ -388,13 +393,14 @@ class Gate:
         """What of the frames that wait the seal is over, under that number; None where that is nothing."""
         return self._first(seal, number, readings(list(waiting)))
 
-    def _among_twins(self, seal: Seal, number: int, heard: HeardNode, now_us: int) -> Sequence[WaitingFrame] | None:
-        """The same where others have spoken more than once in its sender's name; not tried again at once in vain."""
-        if now_us < heard.twins_us:
-            return None
-        found = self._first(seal, number, readings_among_twins(list(heard.waiting)))
-        heard.twins_us = now_us + TWINS_AFTER_US if found is None else 0
-        return found
+    def _may_look_deeper(self, heard: HeardNode, now_us: int) -> bool:
+        """Whether it is to be tried which of the frames that wait are another's: for so many seals in a while only."""
+        if len(heard.waiting) < 3:
+            return False
+        if now_us >= self._twins_until_us:
+            self._twins_until_us, self._twin_seals = now_us + TWIN_SEALS_US, 0
+        self._twin_seals += 1
+        return self._twin_seals <= MOST_TWIN_SEALS
 
     def _first(
         self, seal: Seal, number: int, sequences: Iterable[Sequence[WaitingFrame]]

@@ -19,8 +19,9 @@ WAITS_US = 500_000
 UNHEARD_US = 5 * UNSEALED_FOR_US // 2
 #: Frames of one node that may be another's twins of those before them, where a seal is over none of the usual ones.
 _MOST_TWINS = 6
-#: So long after that was tried in vain it is not tried again, us: whoever says false seals shall not keep a board busy.
-TWINS_AFTER_US = 50_000
+#: That is tried for so many seals in this time, us, whoever they are of: false seals shall not keep a board busy. One
+#: takes up to 0.6 ms here, so this is at most a fortieth of the time, and a fourth on a board ten times slower.
+MOST_TWIN_SEALS, TWIN_SEALS_US = 4, 100_000
 #: Challenges of mine that a node may still answer.
 _NONCES = 3
 
@@ -64,8 +65,6 @@ class HeardNode:
     misfits: int = 0
     ask_us: int = 0
     patience_us: int = 0
-    #: When it may be tried next which of the frames that wait are another's, us.
-    twins_us: int = 0
     _told: tuple[int, ...] = ()
     _sealed_us: int = 0
 
@@ -106,7 +105,7 @@ def readings_among_twins(waiting: Sequence[WaitingFrame]) -> Iterator[Sequence[W
     """What a seal may be over where others spoke more than once before it, in its sender's name.
 
     First without those that say anew what one of the two before them said, which is what they are that flip a bit or
-    repeat; then of the last ones, as those of before may wait for nothing, without any one or two. At most 63 and 219
+    repeat; then of the last ones, as those of before may wait for nothing, without any one or two. At most 63 and 202
     sequences, none of more than ``MOST_SEALED`` frames.
     """
     whole = len(waiting)

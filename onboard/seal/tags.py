@@ -1,6 +1,7 @@
 """The tag of a seal: 48 bits of BLAKE2s (RFC 7693) under a key, over number, taker, nonce and the frames sealed.
 
-48 bits, as MAVLink 2 signs with: at 1,760 seals a second, a full bus of 500 kbit/s, a guess succeeds in 2,500 years.
+48 bits, as MAVLink 2 signs with. A full bus of 500 kbit/s carries 1,760 seals a second; each is tried over 23 sequences
+of frames at most, and 40 of them over 265 more (heard.py): a guess succeeds once in 175 years.
 """
 
 import struct

@@ -20,6 +20,7 @@ from onboard.core.site import Station
 from onboard.holon.holon import Holon
 from onboard.systems.car_park.program import CarHandling, StationWork
 from onboard.systems.car_park.recovery import award_record, handled_record
+from onboard.systems.car_park.site import CarPark
 from onboard.systems.registry import factory_for
 from tests.sites import one_floor
 
@@ -52,9 +53,9 @@ MOVED_US = 20_000_000
 class Board:
     """One robot that was started again, with what its devices and the others say."""
 
-    def __init__(self, *entries: Entry) -> None:
-        factory = factory_for(SITE, KindCode.ROBOT)
-        self.holon = Holon(SITE, SITE.machines[ROBOT], factory, boot=2, entries=entries)
+    def __init__(self, *entries: Entry, site: CarPark = SITE) -> None:
+        factory = factory_for(site, KindCode.ROBOT)
+        self.holon = Holon(site, site.machines[ROBOT], factory, boot=2, entries=entries)
         self.said: list[Effect] = list(self.holon.start(0))
         self.said += self.holon.receive(BusTime(STEWARD, 0), 0)
         self.holon.tokens.trust()

@@ -1,4 +1,4 @@
-"""A car may stand elsewhere than where it was called for: its robot fetches it from there, and nowhere else."""
+"""Where cars are moved while nobody waits one may stand elsewhere than it was called for: it is fetched from there."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ from onboard.contract.messages import CarAt, Itinerary, TokenRequest
 from onboard.core.effects import Send
 from onboard.core.site import Station
 from onboard.systems.car_park.recovery import award_record
-from tests.kinds.board import BAY, BOOT, CALL, PLACE, STEWARD, TASK, Board
+from tests.kinds.board import BAY, BOOT, CALL, PLACE, SITE, STEWARD, TASK, Board
 
 ELSEWHERE = Station(1, 11, Side.FAR)
 FETCH = replace(CALL, operation=Operation.RETRIEVE, from_station=PLACE.number, to_station=BAY.number)
@@ -17,7 +17,7 @@ GOES_ON_US = 3_000_000
 
 def fetching() -> Board:
     """It stands before PLACE, and has won to fetch a car from there."""
-    board = Board(BOOT, award_record(FETCH, PLACE, BAY, 1).entry)
+    board = Board(BOOT, award_record(FETCH, PLACE, BAY, 1).entry, site=replace(SITE, quiet_moves=True))
     board.hears(CarAt(STEWARD, TASK, PLACE.number, 1, 2_700))
     board.stands(PLACE.index)
     board.shuttle(ShuttleMode.HOME)

@@ -31,7 +31,7 @@ MISTAKES = [
     (["clear", "here"], "here: no segment of site small"),
     (["block", "p(1,3)", "--reason", "operater"], '--reason operater: not known; did you mean "operator"?'),
     (["go", "--of", "256"], "256: no machine of site small"),
-    (["change-site", "site.toml"], "site.toml: no machine is added; name the site file that is to come"),
+    (["change-site", "site.toml"], "site.toml: rights of a site of system car-park begin by its file"),
     (["change-site", "gone.toml"], "gone.toml: "),
     (["stop", "--node", "11"], "--node 11: no node-ID of a tool; from 251 to 255"),
 ]

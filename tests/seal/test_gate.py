@@ -127,10 +127,12 @@ def test_somebody_who_says_each_word_a_little_otherwise_does_not_spoil_a_seal(at
         wire.put(said[:1], 1)
         if place in at:
             wire.put([frame._replace(data=frame.data[:-1] + bytes([frame.data[-1] ^ 1]))])
+            # A false seal beside it spoils it no more than that.
+            wire.put([frame_of(Seal(1, 0, 0))])
         wire.put(said[1:], 1)
     wire.put(gate.seal(wire.now_us), 1)
     assert wire.heard[5] == decision
-    assert faults(wire, 5) == {(1, SealWord.UNSEALED): len(at)}
+    assert faults(wire, 5) == {(1, SealWord.UNSEALED): len(at), (1, SealWord.FALSE_SEAL): len(at)}
 
 
 def test_signs_of_life_that_say_nothing_new_go_without_a_seal_for_a_while() -> None:

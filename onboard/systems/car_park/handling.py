@@ -17,6 +17,7 @@ from onboard.core.serial import successor
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.program import CarHandling, HandlingPhase, StationWork
 from onboard.systems.car_park.records import StepRecord
+from onboard.systems.car_park.site import car_park
 from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.travel import Carriage
 from onboard.systems.car_park.unheard import Unheard
@@ -155,7 +156,9 @@ class ShuttleWork:
 
     def _is_elsewhere(self, work: StationWork) -> bool:
         """Whether a car that is to be taken stands at another station by its custodian's word: nothing is here."""
-        stands = self.fleet.mirror.car_station(work.car) if work.handling is CarHandling.TAKE else None
+        if work.handling is not CarHandling.TAKE or not car_park(self.fleet.site).quiet_moves:
+            return False
+        stands = self.fleet.mirror.car_station(work.car)
         return stands is not None and stands != work.station
 
     def _permit(self) -> Permit:

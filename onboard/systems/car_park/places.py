@@ -16,7 +16,7 @@ from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.kept_out import works_at
 from onboard.systems.car_park.program import CarHandling, HandlingPhase, StationWork
-from onboard.systems.car_park.site import ANY_CLASS, class_of_end
+from onboard.systems.car_park.site import ANY_CLASS, car_park, class_of_end
 from onboard.ways.mirror import WayFleet
 
 #: Other places that are tried for a car at one moment: each is a search.
@@ -48,7 +48,12 @@ class PlaceChoice:
         ]
 
     def moved(self) -> list[StationWork]:
-        """Cars to be taken that stand at another place by now, which nobody knew when they were called for."""
+        """Cars to be taken that stand at another place by now, which nobody knew when they were called for.
+
+        Only where cars are moved while nobody waits: elsewhere a call names the place that it means.
+        """
+        if not car_park(self.fleet.site).quiet_moves:
+            return []
         takes = [one for one in self.generation.program.works() if one.handling is CarHandling.TAKE]
         stands = ((one, custody.place_of(self.fleet, one.car)) for one in takes if not self._is_begun(one))
         return [one._replace(station=place) for one, place in stands if place is not None and place != one.station]

@@ -33,6 +33,8 @@ class Cell(Site):
 
     system: ClassVar[str] = "cell"
     demand: ClassVar[frozenset[str]] = frozenset({"goals"})
+    #: What more machines add to while the cell works: a right of a cell is to a part, and begins with who named it.
+    GROWS: ClassVar[frozenset[str]] = frozenset({"machines", "arms"})
     moved_by: ClassVar[Mapping[str, MotionNeeds]] = {"ArmOrder": MotionNeeds.RIGHT, "GripOrder": MotionNeeds.RIGHT}
 
     timing: DeviceTiming
