@@ -46,6 +46,7 @@ READ = {
     "--web-token": "page's token",
     "files": "YAML",
     "log": "log",
+    "old": "site",
     "site": "site",
 }
 #: What is written, handed to a tool of others (openssl, dpkg-deb), the folder of it, or read on a board only: an update

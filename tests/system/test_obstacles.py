@@ -135,6 +135,7 @@ def test_a_machine_with_another_site_or_contract_is_an_obstacle_and_never_bids(
         if controller.holon.node_id == stranger and reason is Reason.OTHER_SITE:
             other = replace(controller.holon.site, digest=controller.holon.site.digest ^ 1)
             controller.holon.site = controller.holon.regeneration.site = other
+            controller.holon.change.own = other.digest
         if controller.holon.node_id == stranger and reason is Reason.OTHER_CONTRACT:
             on_heartbeat = controller.holon._on_heartbeat
             controller.holon._handlers[Heartbeat] = lambda beat, now: on_heartbeat(replace(beat, contract=3), now)
