@@ -39,3 +39,13 @@ def test_changes_are_told_by_version_and_sort() -> None:
     assert sorts <= {"Added", "Changed", "Fixed"}, f"CHANGELOG.md sorts by Added, Changed and Fixed, not by {sorts}"
     marked = re.findall(r"^- (?:Fixed|Changed|Added):.*$", text, re.MULTILINE)
     assert not marked, f"CHANGELOG.md: these belong below the heading that they name: {marked}"
+
+
+def test_a_merge_leaves_no_mark_and_no_line_twice_in_a_row_of_a_decision() -> None:
+    """Both sides of a merge in one document read on as if nothing were wrong."""
+    for path in (*(ROOT / "docs").rglob("*.md"), ROOT / "CHANGELOG.md", ROOT / "README.md"):
+        lines = path.read_text(encoding="utf-8").splitlines()
+        assert not [line for line in lines if line.startswith(("<<<<<<< ", ">>>>>>> "))], path
+    for paragraph in (ROOT / "docs" / "decisions.md").read_text(encoding="utf-8").split("\n\n"):
+        begins = [line[:60] for line in paragraph.splitlines() if len(line) > 60 and not line.startswith("|")]
+        assert len(begins) == len(set(begins)), paragraph[:80]
