@@ -248,8 +248,13 @@ class Witness:
             self._doubt(Reason.JOURNAL_SHORT, *self.tokens.contradicted)
             self.tokens.contradicted = None
             return
-        if not self._has_just_begun(now_us) and not self._missing(now_us):
+        if not self._missing(now_us) and (self._has_all_answered or not self._has_just_begun(now_us)):
             self.tokens.trust()
+
+    @property
+    def _has_all_answered(self) -> bool:
+        """Whether a machine with a past was answered by each other one: nobody is left who might still be heard."""
+        return self.has_past and self._others <= self.answered
 
     def _missing(self, now_us: int) -> set[int]:
         live = self._live(now_us)

@@ -78,6 +78,10 @@ class OrderDesk(ABC, Generic[AnOrder]):
         """Whether an order that its winner does not carry out may go to another: it is not begun, by all I know."""
         return not order.is_begun
 
+    def has_begun(self, node: int, order: AnOrder) -> bool:
+        """Whether a machine told last that it works on an order: then nobody else can do it, whatever was said of it."""
+        return False
+
     def may_be_given_back(self, order: AnOrder) -> bool:
         """Whether its winner may give it back by its word alone."""
         return True
@@ -233,6 +237,9 @@ class OrderDesk(ABC, Generic[AnOrder]):
         """Whether a word about an order counts: by who has it, is named, or may have won it in my earlier life."""
         if order.named or order.state is OrderState.IN_HAND:
             return node == order.winner
+        if self.has_begun(node, order):
+            # It was taken back from who was silent; that it had begun was heard only afterwards.
+            return True
         return order.may_be_won and self.fleet.winners.may_claim(order.task, node, now_us)
 
     def _on_report(self, order: AnOrder, report: TaskReport, now_us: int) -> list[Effect]:

@@ -96,6 +96,28 @@ def test_whoever_is_not_there_is_not_waited_for() -> None:
     assert alice.tokens.holds(KEY)
 
 
+def test_a_machine_that_all_others_have_answered_waits_no_longer() -> None:
+    alice = Machine(ALICE, line("token_held", 3, ALICE))
+    alice.start()
+    alice.knows(STEWARD, BOB)
+    alice.hear(done(STEWARD))
+    assert not alice.tokens.holds(KEY)
+    alice.hear(done(BOB))
+    assert alice.tokens.holds(KEY)
+
+
+def test_a_first_life_listens_for_a_heartbeat_whoever_has_answered() -> None:
+    """Nobody may have heard of an earlier life of it, and who has is not yet heard by all."""
+    alice = Machine(ALICE, boot=1)
+    alice.start()
+    alice.knows(STEWARD, BOB, boot=1)
+    alice.hear(done(STEWARD))
+    alice.hear(done(BOB))
+    assert not alice.witness.is_over
+    alice.wake(START_US + BEAT_US)
+    assert alice.witness.is_over
+
+
 def test_a_machine_that_says_that_it_is_held_apart_is_not_waited_for() -> None:
     alice = Machine(ALICE, line("token_held", 3, ALICE))
     alice.witness.halts = {BOB: Halted(BOB, BOB, Reason.DUPLICATE_NODE_ID, BOB, True, 2)}

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from bus_sim.faults.injection import parse_injection
 from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
 from bus_sim.session import play
@@ -15,7 +16,8 @@ from bus_sim.systems.turning.nc import ProgramError, run_program
 from bus_sim.systems.turning.plant import TurningPlant
 from bus_sim.systems.turning.show import board
 from onboard.contract.codes import Criterion, KindCode, Operation, OrderResult
-from onboard.contract.messages import Bid, CallForProposals
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Award, Bid, CallForProposals
 from onboard.contract.turning import BillBar, LathePhase, LatheProgress, TurningOrder
 from onboard.holon.holon import Holon
 from onboard.systems.turning.checks import RULES
@@ -144,3 +146,21 @@ def test_what_no_lathe_can_make_is_refused() -> None:
     _sound(played)
     assert [one.result for one in _plant(played).entries] == [OrderResult.REFUSED]
     assert not any(isinstance(one, Bid) for _, one in played.messages)
+
+
+def test_what_a_lathe_has_begun_while_it_was_not_heard_is_its_own() -> None:
+    """The desk takes the second order back from who is silent; the lathe begins it before anybody hears it again."""
+    pins = TurningJob(1, 2, 14, 1)
+    site = _site(BatchDemand(0, pins), BatchDemand(5_000, replace(pins, batch=2)))
+    begun_s = next(
+        time_us / 1e6
+        for time_us, one in _play(site).messages
+        if isinstance(one, LatheProgress) and (one.task, one.lathe_phase) == (2, LathePhase.SETTING_UP)
+    )
+    cut = f"partition:members=L3,at_s={begun_s - 15:.3f},for_s=20"
+    played = _play(site, faults=(parse_injection(cut),))
+    _sound(played)
+    assert [(entry.winner, entry.result) for entry in _plant(played).entries] == [(3, OrderResult.DONE)] * 2
+    taken_back = [one.task.number for _, one in played.messages if isinstance(one, Award) and one.winner == NOBODY]
+    assert 2 in taken_back, "else this shows nothing"
+    assert [device.made for device in _plant(played).devices.values()][2] == {1: 3}

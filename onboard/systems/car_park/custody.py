@@ -78,12 +78,21 @@ def replay(fleet: WayFleet, statements: Iterable[CarAt]) -> None:
 
 
 def statements(fleet: WayFleet) -> list[Effect]:
-    """Where each car in my custody is that has not left."""
-    return [
+    """Where each car in my custody is that has not left.
+
+    Whoever has a car's token and has not moved it yet says where it stands: its giver may have lost that since.
+    """
+    mine: list[Effect] = [
         Send(CarAt(fleet.node_id, car, record.station, record.version, record.wheelbase_mm))
         for car, record in fleet.mirror.cars.items()
         if record.custodian == fleet.node_id and record.station != OUTSIDE
     ]
+    for key in [key for key in fleet.tokens.mine() if key.kind is TokenKind.CAR]:
+        car = Reference(key.number >> 16, key.number & 0xFFFF)
+        record = fleet.mirror.cars.get(car)
+        if record is not None and record.custodian != fleet.node_id and fleet.mirror.car_station(car) is not None:
+            mine += state(fleet, car, record.station, record.wheelbase_mm)
+    return mine
 
 
 def before_grant(fleet: WayFleet, grant: TokenGrant) -> list[Effect]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import Final, NamedTuple
 
-from onboard.contract.codes import DriveMode, LegAction, ShuttleMode
+from onboard.contract.codes import DriveMode, Grade, LegAction, ShuttleMode
 from onboard.contract.messages import Reference, ShuttleState, Stamp
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.serial import successor, to_bus_ms
@@ -20,10 +20,11 @@ from onboard.core.token_keys import segment_token
 from onboard.systems.car_park import custody, salvage
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
-from onboard.systems.car_park.program import CarStep, ends_at, standing_itinerary
+from onboard.systems.car_park.program import CarStep, ends_at, standing_itinerary, to_itinerary
 from onboard.systems.car_park.recovery import JournalRecovery, floor_record
 from onboard.systems.car_park.riding import Riding
 from onboard.systems.car_park.travel import Carriage
+from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lift_uses import ride_us
 from onboard.ways.lifts import gate, sill
 from onboard.ways.mirror import WayFleet
@@ -90,6 +91,8 @@ class Starting:
     stage: StartStage = StartStage.UNPLACED
     place: Segment | None = field(default=None, init=False)
     _due_us: int | None = None
+    #: The run to the place that is still under way while the others are heard.
+    _run: CarStep | None = None
 
     def __post_init__(self) -> None:
         self.fleet.slots_told = self.fleet.slots_told or self.recovery.told
@@ -121,6 +124,7 @@ class Starting:
     def _find_place(self, now_us: int) -> list[Effect]:
         """Placed at a mark; between marks first to the nearest one, as far as rights allow, with the shuttle home.
 
+        That it goes there is told once it may: the others hear of it, and it hears them, while it goes.
         In the mouth of a spur, turned towards it, it turns back first: no plan begins or ends there.
         """
         carriage = self.body.carriage
@@ -144,7 +148,38 @@ class Starting:
             if not self.generation.is_held:
                 # It asks first for what it is in: it may have been pushed there while it was off.
                 carriage.go(out or carriage.nearest)
-        return effects + (carriage.advance(now_us) if carriage.goal is not None else [])
+        if carriage.goal is None:
+            return effects
+        effects += carriage.advance(now_us)
+        run = self._run_to_mark(now_us)
+        return effects if run is None else effects + self._tell_place(run.destination, run, now_us)
+
+    def _run_to_mark(self, now_us: int) -> CarStep | None:
+        """The run to the nearest mark once the drive has its order: the place is known then, and others may hear it.
+
+        None where the body is in one slot or across a mouth, or where anything but a run is in hand: then it is placed
+        when it stands.
+        """
+        carriage, goal = self.body.carriage, self.body.carriage.goal
+        if goal is None or goal.track != carriage.track or carriage.target != goal or carriage.way_out is not None:
+            return None
+        assert carriage.sensed is not None
+        off_mm = carriage.sensed.position_mm - carriage.axis.position_mm(goal.index)
+        behind = goal.index + (1 if off_mm > 0 else -1)
+        if behind in carriage.axis.mouths or carriage.axis.slot(behind) not in carriage.occupied():
+            return None
+        if not self._has_only_to_run(goal):
+            return None
+        end_us = now_us + run_duration_us(abs(off_mm), self.fleet.site.carrier)
+        return CarStep(LegAction.TRAVEL, goal.track, behind, goal.index, now_us, end_us)
+
+    def _has_only_to_run(self, goal: Segment) -> bool:
+        """Whether nothing else was begun, and sensors and journal agree."""
+        shuttle, recovery = self.body.shuttle.sensed, self.recovery
+        if not recovery.is_restart or recovery.phase is not None or recovery.ride is not None or shuttle is None:
+            return False
+        is_known = bool(recovery.works) or not shuttle.load_kg
+        return is_known and not self._missing() and not self._contradiction(goal, shuttle)
 
     def _is_told(self, told: tuple[Segment, ...], now_us: int) -> list[Effect]:
         """A journal that is lost knew the floor: who made the rights anew has seen where the carrier stands.
@@ -171,11 +206,18 @@ class Starting:
         self.body.carriage.go(here)
         if not self.recovery.is_restart:
             return self._start_first(here, now_us)
+        return self._tell_place(here, None, now_us)
+
+    def _tell_place(self, here: Segment, run: CarStep | None, now_us: int) -> list[Effect]:
+        """Say where it stands, or will when its ``run`` is over, and hear what the others plan."""
         self._enter(StartEvent.PLACE_AGAIN)
-        self._due_us = now_us + SETTLING_US
+        self.place, self._run, self._due_us = here, run, now_us + SETTLING_US
         program, node = self.generation.program, self.fleet.node_id
         program.version = successor(program.version, 8)
-        told = standing_itinerary(node, program.version, Stamp(to_bus_ms(now_us), node, 0), here, now_us)
+        stamp = Stamp(to_bus_ms(now_us), node, 0)
+        told = standing_itinerary(node, program.version, stamp, here, now_us)
+        if run is not None:
+            told = to_itinerary(node, program.version, Grade.FIRM, stamp, [run])
         self.fleet.mirror.on_itinerary(told, now_us)
         return [Send(told), *self.announce()]
 
@@ -194,23 +236,37 @@ class Starting:
 
     def _settle(self, now_us: int) -> list[Effect]:
         """Ask for what it is in; once the others were heard and the shuttle is at rest, go on where they agree."""
-        if self.body.carriage.standing_at != self.place:
-            # Pushed away meanwhile: what was said of the place is wrong.
+        assert self.place is not None
+        effects = self.body.carriage.advance(now_us)
+        if not self._is_at_place:
+            # Pushed away meanwhile, or may go no farther: what was said of the place is wrong.
             self._enter(StartEvent.PLACE_LOST)
             self.body.carriage.stay()
-            self._due_us = None
-            return self._find_place(now_us)
-        effects = self.body.carriage.advance(now_us)
+            self._due_us = self._run = None
+            return effects + self._find_place(now_us)
         if self._due_us is not None and now_us < self._due_us:
             return effects
         self._due_us = None
         shuttle = self.body.shuttle.sensed
-        if shuttle is None or shuttle.mode not in AT_REST:
+        if shuttle is None or not (shuttle.mode in AT_REST or self._is_in_a_stroke(self.place, shuttle)):
             return effects
-        assert self.place is not None
         effects += self._salvage(self.place, shuttle, now_us)
         why = self._contradiction(self.place, shuttle)
         return effects + (self._hold(why) if why else self._take_part(now_us))
+
+    @property
+    def _is_at_place(self) -> bool:
+        """Whether the carrier stands at the place as told, or still runs there as its drive was ordered."""
+        carriage = self.body.carriage
+        if carriage.standing_at == self.place:
+            self._run = None
+            return True
+        return self._run is not None and carriage.target == self.place
+
+    def _is_in_a_stroke(self, place: Segment, shuttle: ShuttleState) -> bool:
+        """Whether the shuttle still does what the journal has begun here: it is gone on with when that is over."""
+        moves = shuttle.mode is not ShuttleMode.FAULT and self.recovery.phase is not None
+        return moves and self.recovery.is_under_way(place, shuttle) and not self._missing()
 
     def _salvage(self, place: Segment, shuttle: ShuttleState, now_us: int) -> list[Effect]:
         """Where the journal was lost: what sensors and rights say that is in hand."""
@@ -303,7 +359,9 @@ class Starting:
             self.body.riding.begin(step.track, step.to_index)
 
     def _in_hand(self, here: Segment, now_us: int) -> tuple[CarStep, ...]:
-        """The handling or the ride that the restart fell into, as the first step of the new program."""
+        """The run, handling or ride that the start or the restart fell into, as the first step of the new program."""
+        if self._run is not None:
+            return (self._run,)
         ride = self.recovery.ride
         if ride is not None:
             lasts_us = ride_us(self.fleet.site, ride.track, ride.from_index, ride.to_index)

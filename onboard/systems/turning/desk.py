@@ -55,6 +55,8 @@ class JobDesk(OrderDesk[BatchOrder]):
     takers = KindCode.LATHE
 
     _prices: dict[tuple[int, Reference], int] = field(default_factory=dict)
+    #: What each lathe told last to be at work on.
+    _making: dict[int, Reference] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -86,6 +88,9 @@ class JobDesk(OrderDesk[BatchOrder]):
     def _on_progress(self, word: LatheProgress, now_us: int) -> None:
         self.fleet.winners.works(word.sender, (word.manager, word.task, word.made, word.lathe_phase), now_us)
         task = Reference(word.manager, word.task)
+        self._making.pop(word.sender, None)
+        if word.lathe_phase in (LathePhase.SETTING_UP, LathePhase.TURNING):
+            self._making[word.sender] = task
         if word.lathe_phase is not LathePhase.QUEUED and self.fleet.winners.has(task, word.sender):
             self.orders[task].is_begun = True
 
@@ -95,6 +100,10 @@ class JobDesk(OrderDesk[BatchOrder]):
         """A call to lathes; no lathe can make a part for less than its bar and its handling."""
         least_ct = least_cents(turning(self.fleet.site), order.job)
         return replace(call_terms(order.task, order.job), floor=lambda _call, _now_us: least_ct)
+
+    def has_begun(self, node: int, order: BatchOrder) -> bool:
+        """By the lathe's last word of its progress."""
+        return self._making.get(node) == order.task
 
     def stands_us(self, order: BatchOrder) -> int:
         """As long as the slowest lathe takes for one part, setting up included, tells no change."""
