@@ -184,6 +184,8 @@ class OneCustodian(Rule):
             if len(self._loaded) > MOST_CARS:
                 self._loaded.popitem(last=False)
         elif report.phase is TaskPhase.DONE and (report.sender, report.task) in self._loaded:
+            # Said again after a restart it is about a place that may have been named long ago.
+            del self._loaded[report.sender, report.task]
             self._open.append((event, event.time_us))
         elif report.phase is TaskPhase.DONE:
             self.picture.unjudged += 1
