@@ -25,8 +25,8 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import NEVER_US
 from onboard.core.effects import Effect, Send
 from onboard.core.negotiation.bidding import ANY_TIME
-from onboard.core.serial import successor
-from onboard.systems.mapd.auction import Availability, BidWeights, cost, oldest
+from onboard.core.serial import successor, to_bus_ms
+from onboard.systems.mapd.auction import Availability, Backlog, BidWeights, cost
 from onboard.systems.mapd.bidding import Round, UnitGeneration, bid_timing
 from onboard.systems.mapd.calls import CALL_AGAIN_US, mark_of
 from onboard.systems.mapd.driving import Driving
@@ -140,10 +140,10 @@ class UnitRobot(Plain):
             case PathMoves() | PathHead():
                 self._on_path(message)
             case StepTurn() | Award() | CallForProposals() | StepRound():
-                return self._on_desk(message)
+                return self._on_desk(message, now_us)
         return []
 
-    def _on_desk(self, message: StepTurn | Award | CallForProposals | StepRound) -> list[Effect]:
+    def _on_desk(self, message: StepTurn | Award | CallForProposals | StepRound, now_us: int) -> list[Effect]:
         match message:
             case StepTurn():
                 self.turns.hear(message)
@@ -152,6 +152,7 @@ class UnitRobot(Plain):
             case CallForProposals():
                 self.knowledge.on_call(message)
             case StepRound():
+                self.knowledge.on_round(message.step, to_bus_ms(now_us + self.site.bid_window_us))
                 self._on_round(message)
         return []
 
@@ -409,8 +410,8 @@ class UnitRobot(Plain):
     def _preferences(self) -> list[tuple[int, int]]:
         """What each open task would cost, cheapest first: the task-generation function of this system."""
         floor, offer, tasks = self.site.floor, self._offer(), self.knowledge.open_tasks
-        first = oldest(tasks)
-        bids = ((cost(floor, self.rule, offer, task, first), task.number) for task in tasks)
+        backlog = Backlog.of(tasks, len(self.site.robots))
+        bids = ((cost(floor, self.rule, offer, task, backlog), task.number) for task in tasks)
         return sorted((bid, number) for bid, number in bids if bid is not None)
 
     def _offer(self) -> Availability:
