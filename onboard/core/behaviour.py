@@ -121,17 +121,6 @@ class Attentive(Protocol):
         """Whether ``advance`` reads what this word changed in what is believed of others."""
 
 
-@runtime_checkable
-class Selective(Attentive, Protocol):
-    """An attentive behaviour that passes over words of its own system too, and of negotiations."""
-
-    #: Of these ``heeds`` is asked beside the words about others' rights and places.
-    overhears: frozenset[type[Message]]
-
-    def heeds(self, message: Message) -> bool:
-        """Whether ``advance`` or a negotiation of this machine reads what this word changed."""
-
-
 class BehaviourFactory(Protocol):
     """Makes the behaviour of one kind; ``estimator`` is what the negotiation asks for bids."""
 

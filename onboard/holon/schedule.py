@@ -5,11 +5,11 @@ next. ``sweeps`` keeps nothing: every event is followed by every part, so that a
 """
 
 from dataclasses import dataclass, field
-from typing import ClassVar, get_args
+from typing import ClassVar, Protocol, get_args, runtime_checkable
 
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import BusTime, Heartbeat, Message, SyncRequest
-from onboard.core.behaviour import Attentive, Behaviour, Fleet, OverheardWord, Selective
+from onboard.core.behaviour import Attentive, Behaviour, Fleet, OverheardWord
 from onboard.core.mirror import Peer
 from onboard.holon.fixed_times import FixedTimes
 from onboard.holon.presence import SLEPT_BEATS
@@ -17,6 +17,16 @@ from onboard.holon.rights import RightsTalk
 from onboard.holon.taking_part import TakingPart
 
 _OVERHEARD = frozenset(get_args(OverheardWord))
+
+
+@runtime_checkable
+class Selective(Attentive, Protocol):
+    """A behaviour that passes over words of its own system too: of ``overhears`` its ``heeds`` is asked as well."""
+
+    overhears: frozenset[type[Message]]
+
+    def heeds(self, message: Message) -> bool:
+        """Whether ``advance`` or a negotiation of this machine reads what this word changed."""
 
 
 @dataclass
