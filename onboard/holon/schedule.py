@@ -5,7 +5,7 @@ next. ``sweeps`` keeps nothing: every event is followed by every part, so that a
 """
 
 from dataclasses import dataclass, field
-from typing import ClassVar, get_args
+from typing import ClassVar, Protocol, get_args, runtime_checkable
 
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import BusTime, Heartbeat, Message, SyncRequest
@@ -17,6 +17,16 @@ from onboard.holon.rights import RightsTalk
 from onboard.holon.taking_part import TakingPart
 
 _OVERHEARD = frozenset(get_args(OverheardWord))
+
+
+@runtime_checkable
+class Selective(Attentive, Protocol):
+    """A behaviour that passes over words of its own system too: of ``overhears`` its ``heeds`` is asked as well."""
+
+    overhears: frozenset[type[Message]]
+
+    def heeds(self, message: Message) -> bool:
+        """Whether ``advance`` or a negotiation of this machine reads what this word changed."""
 
 
 @dataclass
@@ -51,6 +61,9 @@ class Schedule:
     #: The mirror, the epoch of the rights, whether I send bus time, and which other site counts, as they were then.
     _ground: tuple[int, int, bool, int] | None = None
     _attentive: Attentive | None = field(init=False)
+    _selective: Selective | None = field(init=False)
+    #: Classes of words that may be none of my business.
+    _overheard: frozenset[type[Message]] = _OVERHEARD
 
     def __post_init__(self) -> None:
         self.begins_anew(self.behaviour)
@@ -60,6 +73,8 @@ class Schedule:
         """Another behaviour from now on."""
         self.behaviour = behaviour
         self._attentive = behaviour if isinstance(behaviour, Attentive) and not self.sweeps else None
+        self._selective = behaviour if isinstance(behaviour, Selective) and not self.sweeps else None
+        self._overheard = _OVERHEARD if self._selective is None else _OVERHEARD | self._selective.overhears
         self.changed()
 
     def changed(self) -> None:
@@ -180,7 +195,7 @@ class Schedule:
 
         None of an obstacle is: that it is heard may end that. What bus time changes it says itself (``slewed``).
         """
-        is_candidate = type(message) in _OVERHEARD or self._asks_another(message)
+        is_candidate = type(message) in self._overheard or self._asks_another(message)
         if is_candidate and now_us < self.waits_until_us and message.sender not in self.fleet.mirror.aside:
             return self.fleet.tokens.changes
         if type(message) is not BusTime:
@@ -194,7 +209,10 @@ class Schedule:
         attentive = self._attentive
         if attentive is None or self._asks_another(message):
             return attentive is not None
-        return isinstance(message, OverheardWord) and not attentive.heeds(message)
+        if isinstance(message, OverheardWord):
+            return not attentive.heeds(message)
+        selective = self._selective
+        return selective is not None and type(message) in selective.overhears and not selective.heeds(message)
 
     def _asks_another(self, message: Message) -> bool:
         """Whether somebody else is asked what it knows."""

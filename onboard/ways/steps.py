@@ -29,14 +29,14 @@ def cell_segment(cell: int) -> Segment:
 def path_windows(network: Network[int], start: int, cells: Iterable[int]) -> list[SlotWindow]:
     """What a path takes from step ``start`` on, a cell a step and the last one for ever."""
     found: list[SlotWindow] = []
+    since, last = start, -1
     for step, cell in enumerate(cells, start):
-        segment, from_us = cell_segment(network.takes.get(cell, cell)), step * STEP_US
-        if found and found[-1].segment == segment:
-            found[-1] = found[-1]._replace(to_us=from_us + STEP_US)
-        else:
-            found.append(SlotWindow(segment, from_us, from_us + STEP_US))
-    found[-1] = found[-1]._replace(to_us=FOREVER)
-    return found
+        taken = network.takes.get(cell, cell)
+        if taken != last and step > start:
+            found.append(SlotWindow(cell_segment(last), since * STEP_US, step * STEP_US))
+            since = step
+        last = taken
+    return [*found, SlotWindow(cell_segment(last), since * STEP_US, FOREVER)]
 
 
 class StepTimes:

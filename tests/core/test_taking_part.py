@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, Reason, TokenKind
-from onboard.contract.messages import Halted, Heartbeat, Message, Progress, TokenGrant
+from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, Reason, TaskPhase, TokenKind
+from onboard.contract.messages import Halted, Heartbeat, Message, Progress, Reference, TaskReport, TokenGrant
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import NEVER_US, BehaviourFactory, Fleet, OverheardWord
 from onboard.core.effects import Effect
@@ -49,11 +49,26 @@ class StillFactory(BehaviourFactory):
         return Still(fleet, KindCode.ROBOT)
 
 
+@dataclass
+class Choosy(Still):
+    """Says of reports too which of them it reads."""
+
+    overhears: frozenset[type[Message]] = frozenset((TaskReport,))
+
+    def heeds(self, message: Message) -> bool:
+        return message in self.heeded
+
+
+class ChoosyFactory(StillFactory):
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> Choosy:
+        return Choosy(fleet, KindCode.ROBOT)
+
+
 class Bench:
     """One machine that has heard the same heartbeat of a peer twice."""
 
-    def __init__(self) -> None:
-        self.holon = Holon(SITE, SITE.machines[ME], StillFactory())
+    def __init__(self, factory: BehaviourFactory | None = None) -> None:
+        self.holon = Holon(SITE, SITE.machines[ME], factory or StillFactory())
         assert isinstance(self.holon.behaviour, Still)
         self.still = self.holon.behaviour
         self.now_us = 1_000_000
@@ -166,6 +181,15 @@ def test_whatever_it_may_be_about_asks_the_machine_to_go_on(reason: str) -> None
     bench.marked()
     HEEDED[reason](bench)
     assert bench.hear(MINE if reason == "it gets the right" else AWAY) > 0
+
+
+def test_a_word_of_its_system_asks_only_who_waits_for_it_to_go_on() -> None:
+    report = TaskReport(PEER, Reference(PEER, 1), TaskPhase.AWARDED, 0, Reason.NONE)
+    plain, choosy, waiting = Bench(), Bench(ChoosyFactory()), Bench(ChoosyFactory())
+    waiting.still.heeded.append(report)
+    for bench in (plain, choosy, waiting):
+        bench.marked()
+    assert (plain.hear(report) > 0, choosy.hear(report), waiting.hear(report) > 0) == (True, 0, True)
 
 
 def test_a_machine_that_sweeps_goes_on_after_every_word(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,8 @@ from bus_sim.systems.mapd.importers.mapf import DrawnDemand
 from bus_sim.systems.mapd.published import TOKEN_PASSING
 from bus_sim.systems.mapd.steps import SteppedDay
 from onboard.config.site import parse_site
-from onboard.systems.mapd.auction import Availability, BidWeights, TransportTask, cost, winners
+from onboard.core.serial import to_bus_ms
+from onboard.systems.mapd.auction import Availability, Backlog, BidWeights, TransportTask, cost, winners
 from onboard.systems.mapd.calls import call_of
 from onboard.systems.mapd.floor import grid_floor
 from onboard.systems.mapd.knowledge import Knowledge
@@ -95,16 +96,42 @@ def test_no_task_waits_for_ever_behind_new_ones_that_are_nearer() -> None:
         return winners(floor, BidWeights(), [Availability(11, 0, 0)], tasks)[11][0].number
 
     assert chosen(0) == 2
-    # 28 steps more to the pick-up and 28 more with the load, at 100 and 50, against 2 for each step.
-    assert (chosen(2099), chosen(2101)) == (2, 1)
+    # 28 steps more to the pick-up and 28 more with the load, at 100 and 50, against 20 for each step: half of it, as
+    # there are two tasks for one robot.
+    assert (chosen(419), chosen(421)) == (2, 1)
 
 
-def test_on_the_bus_a_calls_deadline_tells_how_long_it_has_stood() -> None:
+@pytest.mark.parametrize(("tasks", "robots", "later"), [(1, 1, 200), (10, 10, 200), (2, 10, 200), (40, 10, 50)])
+def test_age_counts_less_where_many_would_wait_for_an_old_task(tasks: int, robots: int, later: int) -> None:
+    floor, offer = grid_floor(["........."]), Availability(11, 4, 0)
+    old, young = TransportTask(1, 3, 5, 4), TransportTask(2, 13, 5, 4)
+    backlog = Backlog(3, tasks, robots)
+    assert cost(floor, BidWeights(), offer, old, backlog) == 150
+    assert cost(floor, BidWeights(), offer, young, backlog) == 150 + later
+
+
+def known_calls(*calls: tuple[int, int]) -> Knowledge:
+    """What a robot knows of these calls, by task and deadline in us."""
     known = Knowledge(grid_floor(["." * 8]), (11,), 11, step_ms=500)
-    for number, until_us in ((4, 2_400_000), (9, 12_400_000), (2, 1_400_000)):
+    for number, until_us in calls:
         known.on_call(call_of(1, TransportTask(number, 0, 3, 5), until_us))
-    first = min(task.release for task in known.tasks.values())
-    assert {number: task.release - first for number, task in known.tasks.items()} == {4: 2, 9: 22, 2: 0}
+    return known
+
+
+def test_a_task_is_as_old_as_the_step_in_whose_round_it_was_called_for() -> None:
+    known = known_calls((4, 2_400_000), (9, 2_400_000))
+    known.on_round(7, to_bus_ms(2_410_000))
+    # The step between was a long one, and a call that is told again is no news.
+    for number, until_us in ((4, 2_400_000), (5, 9_400_000)):
+        known.on_call(call_of(1, TransportTask(number, 0, 3, 5), until_us))
+    known.on_round(8, to_bus_ms(9_410_000))
+    assert {number: task.release for number, task in known.tasks.items()} == {4: 7, 9: 7, 5: 8}
+
+
+def test_who_was_started_again_reads_from_deadlines_how_old_tasks_are() -> None:
+    known = known_calls((4, 2_400_000), (9, 12_400_000), (2, 1_400_000))
+    known.on_round(100, to_bus_ms(22_410_000))
+    assert {number: task.release for number, task in known.tasks.items()} == {4: 60, 9: 80, 2: 58}
 
 
 def test_a_task_that_nobody_can_reach_gets_no_bid() -> None:

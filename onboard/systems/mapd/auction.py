@@ -5,7 +5,7 @@ untouched tasks) and also while it still carries something (it then counts from 
 lowest bid of all wins first: it is the one that speaks soonest (design, section 4), and its robot then falls silent.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from onboard.systems.mapd.floor import Floor
@@ -38,27 +38,45 @@ class BidWeights:
     wait: int = 100
     empty: int = 100
     loaded: int = 50
-    #: For each step that a task is younger than the oldest that is open: what is added to no other can wait for ever.
-    younger: int = 2
+    #: For each step that a task is younger than the oldest that is open, so that none waits for ever: this where there
+    #: is no more than a task a robot, a share of it where there are more.
+    younger: int = 20
 
 
-def oldest(tasks: Iterable[TransportTask]) -> int:
-    """The first release of open tasks, 0 where there are none."""
-    return min((task.release for task in tasks), default=0)
+@dataclass(frozen=True, slots=True)
+class Backlog:
+    """What is open: the release of the oldest task, how many tasks, and how many robots there are for them."""
+
+    oldest: int
+    tasks: int
+    robots: int
+
+    @classmethod
+    def of(cls, tasks: Collection[TransportTask], robots: int) -> "Backlog":
+        """That of these open tasks."""
+        return cls(min((task.release for task in tasks), default=0), len(tasks), robots)
 
 
-def cost(floor: Floor, rule: BidWeights, offer: Availability, task: TransportTask, first: int = 0) -> int | None:
-    """The bid for one task, ``first`` being the release of the oldest that is open; None where no way leads.
+#: Where nobody has more to do than one task, and none is older than another.
+NOTHING_OPEN = Backlog(0, 0, 1)
+
+
+def cost(
+    floor: Floor, rule: BidWeights, offer: Availability, task: TransportTask, backlog: Backlog = NOTHING_OPEN
+) -> int | None:
+    """The bid for one task, ``backlog`` being all that is open; None where no way leads.
 
     Steps until the robot is free, steps to the pick-up and steps with the load: by the added service time of all who
     wait, the shortest work goes first (Smith's rule, 1956). Whatever comes later counts as farther by ``younger`` a
-    step: after so many steps no new task is before an old one.
+    step: after so many steps no new task is before an old one. An old task that is done first is waited for by all who
+    come behind it: with n tasks a robot each step of age counts an nth.
     """
     empty = floor.steps_to(task.pickup)[offer.cell]
     loaded = floor.steps_to(task.delivery)[task.pickup]
     if empty >= FAR or loaded >= FAR:
         return None
-    return rule.wait * offer.steps + rule.empty * empty + rule.loaded * loaded + rule.younger * (task.release - first)
+    later = rule.younger * (task.release - backlog.oldest) * backlog.robots // max(backlog.robots, backlog.tasks)
+    return rule.wait * offer.steps + rule.empty * empty + rule.loaded * loaded + later
 
 
 def winners(
@@ -67,11 +85,11 @@ def winners(
     """Task and bid that each robot wins, by robot: lowest bid first, then lower robot, then lower task."""
     bids: dict[int, list[tuple[int, int, int]]] = {}
     by_number: Mapping[int, TransportTask] = {task.number: task for task in tasks}
-    first = oldest(tasks)
+    backlog = Backlog.of(tasks, len(offers))
     for offer in offers:
         own = []
         for task in tasks:
-            bid = cost(floor, rule, offer, task, first)
+            bid = cost(floor, rule, offer, task, backlog)
             if bid is not None:
                 own.append((bid, task.number))
         own.sort(reverse=True)

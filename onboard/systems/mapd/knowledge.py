@@ -3,7 +3,7 @@
 Made of frames alone, so that all have the same once all have heard all frames of a step.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from onboard.contract.mapd import PathHead, PathMoves, StepState
 from onboard.contract.messages import Bid, CallForProposals
@@ -44,6 +44,8 @@ class Knowledge:
     #: Complete paths that do not go with another's as known: mine or the other's is old.
     unfit: dict[int, tuple[PathHead, Path]] = field(default_factory=dict)
     _parts: dict[int, Assembly] = field(default_factory=dict)
+    #: Tasks that were called for since the round before.
+    _undated: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.paths = Paths(self.floor.network)
@@ -51,22 +53,27 @@ class Knowledge:
     # --- tasks and steps ---------------------------------------------------------------------------------------
 
     def on_call(self, call: CallForProposals) -> None:
-        """A task is called for, or told again."""
+        """A task is called for, or told again; how old it is says the next round."""
         number, cells = call.task.number, (call.from_station, call.to_station)
         if max(cells) < self.floor.size:
-            self.tasks.setdefault(number, TransportTask(number, self._release(call), *cells))
+            if number not in self.tasks:
+                self._undated.add(number)
+            self.tasks.setdefault(number, TransportTask(number, 0, *cells))
             self.calls[number] = call
 
-    def _release(self, call: CallForProposals) -> int:
-        """The step of a call's first round by bus time, counted from that of any other call that stands.
+    def on_round(self, step: int, deadline_ms: int) -> None:
+        """The round of a step is told, until that deadline: what was called for with it was released in that step.
 
-        All hear the same deadlines, also who was started again: all know alike which has waited how much longer.
+        What was told again, as to who was started again, was so much earlier as its deadline was.
         """
-        known = next((number for number in self.calls if number in self.tasks), None)
-        if known is None:
-            return 0
-        later_ms = ms_after(call.deadline_ms, self.calls[known].deadline_ms)
-        return self.tasks[known].release + round(later_ms / self.step_ms)
+        undated = [self.calls[number] for number in sorted(self._undated) if number in self.tasks]
+        self._undated.clear()
+        if undated:
+            newest = min(undated, key=lambda call: ms_after(deadline_ms, call.deadline_ms))
+            last = step - max(0, ms_after(deadline_ms, newest.deadline_ms)) // self.step_ms
+            for call in undated:
+                number, sooner_ms = call.task.number, ms_after(newest.deadline_ms, call.deadline_ms)
+                self.tasks[number] = replace(self.tasks[number], release=last - round(sooner_ms / self.step_ms))
 
     def on_state(self, state: StepState) -> bool:
         """A robot's word; True where it is news."""

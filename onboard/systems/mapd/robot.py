@@ -14,6 +14,7 @@ from onboard.contract.messages import (
     Award,
     Bid,
     CallForProposals,
+    Diagnostic,
     Message,
     Reference,
     SyncRequest,
@@ -21,10 +22,11 @@ from onboard.contract.messages import (
     TokenGrant,
 )
 from onboard.core.authority import TokenKey
+from onboard.core.behaviour import NEVER_US
 from onboard.core.effects import Effect, Send
 from onboard.core.negotiation.bidding import ANY_TIME
-from onboard.core.serial import successor
-from onboard.systems.mapd.auction import Availability, BidWeights, cost, oldest
+from onboard.core.serial import successor, to_bus_ms
+from onboard.systems.mapd.auction import Availability, Backlog, BidWeights, cost
 from onboard.systems.mapd.bidding import Round, UnitGeneration, bid_timing
 from onboard.systems.mapd.calls import CALL_AGAIN_US, mark_of
 from onboard.systems.mapd.driving import Driving
@@ -53,8 +55,10 @@ TOKENS_SAID_US = 1_000_000
 
 #: What may let a robot go on; all else, such as others' heartbeats, changes nothing for it.
 _OF_INTEREST = (Bid, StepState, PathMoves, PathHead, StepTurn, Award, CallForProposals, StepRound, TokenGrant)
-
-
+#: What is said so often that a robot is to know whether it waits for it (``UnitRobot.heeds``).
+_OVERHEARD = frozenset(
+    (Bid, StepState, PathMoves, PathHead, StepTurn, Award, CallForProposals, TaskReport, TurnRequest, Diagnostic)
+)
 #: What only the desk says.
 _OF_DESK = (StepTurn, Award, CallForProposals, StepRound)
 
@@ -71,6 +75,8 @@ class UnitRobot(Plain):
     step: int = 0
     task: int = NO_TASK
     round: StepRound | None = None
+    #: See ``Selective``.
+    overhears: frozenset[type[Message]] = _OVERHEARD
     #: Searches made, and those that found nothing better than the former path.
     searches: int = 0
     failures: int = 0
@@ -134,10 +140,10 @@ class UnitRobot(Plain):
             case PathMoves() | PathHead():
                 self._on_path(message)
             case StepTurn() | Award() | CallForProposals() | StepRound():
-                return self._on_desk(message)
+                return self._on_desk(message, now_us)
         return []
 
-    def _on_desk(self, message: StepTurn | Award | CallForProposals | StepRound) -> list[Effect]:
+    def _on_desk(self, message: StepTurn | Award | CallForProposals | StepRound, now_us: int) -> list[Effect]:
         match message:
             case StepTurn():
                 self.turns.hear(message)
@@ -146,6 +152,7 @@ class UnitRobot(Plain):
             case CallForProposals():
                 self.knowledge.on_call(message)
             case StepRound():
+                self.knowledge.on_round(message.step, to_bus_ms(now_us + self.site.bid_window_us))
                 self._on_round(message)
         return []
 
@@ -175,7 +182,7 @@ class UnitRobot(Plain):
         if self.driving.cart.state is None or not (self._is_new or self._is_due(now_us)):
             return []
         self._is_new = False
-        self.state = MachineState.IDLE if self.task == NO_TASK else MachineState.WORKING
+        self.state = self._state_by_task
         effects: list[Effect] = []
         goes_on = True
         while goes_on:
@@ -186,6 +193,41 @@ class UnitRobot(Plain):
                 self.phase, self._ask_us = phase, now_us + ASK_US if phase is GridStepPhase.TURNS else None
             goes_on = deed not in LAST and (deed is not StepDeed.DRIVE or self._has_arrived)
         return effects
+
+    def looks_from(self) -> int:
+        """Never by itself: what it waits for is said, or due."""
+        return NEVER_US
+
+    def heeds(self, message: Message) -> bool:
+        """Whether a word may let it go on, by the phase that it is in; see ``_found`` for what each phase reads."""
+        if self.state is not self._state_by_task:
+            return isinstance(message, _OF_INTEREST)
+        if isinstance(message, Bid | Award) and self._takes_part(message):
+            return True
+        match self.phase:
+            case GridStepPhase.GATHER:
+                # Before the round is told nothing else counts.
+                return self.round is not None and isinstance(message, _OF_INTEREST)
+            case GridStepPhase.BID if isinstance(message, StepTurn | Award):
+                return self.turns.is_complete
+            case GridStepPhase.BID:
+                return isinstance(message, Bid | CallForProposals) and self._prefers_another()
+            case GridStepPhase.TURNS:
+                return self.turns.next_to_plan(self.knowledge.heads) in (0, self.fleet.node_id)
+        return self.fleet.node_id not in self.knowledge.paths.by_robot or isinstance(message, CallForProposals)
+
+    @property
+    def _state_by_task(self) -> MachineState:
+        return MachineState.IDLE if self.task == NO_TASK else MachineState.WORKING
+
+    def _takes_part(self, word: Bid | Award) -> bool:
+        """Whether it takes part in the call that this is about."""
+        initiator = word.initiator if isinstance(word, Bid) else word.sender
+        return self.fleet.negotiation.knows(initiator, word.call)
+
+    def _prefers_another(self) -> bool:
+        """Whether it would take part in another call than it did last."""
+        return self._bids is None or self._bids.preferred not in (None, self._bids.looked_at)
 
     def next_wake(self) -> int | None:
         """When a bid, a question or an order to the body is due."""
@@ -274,18 +316,13 @@ class UnitRobot(Plain):
 
     def _found_in_turns(self) -> tuple[StepFinding, list[int]]:
         """Wait for the paths of those before me, plan if it is my turn, wait for those after me."""
-        me = self.fleet.node_id
-        for robot in self.turns.order:
-            head = self.knowledge.heads.get(robot)
-            if head is not None and head.step == self.step and head.version:
-                continue
-            if robot != me:
-                return StepFinding.MISSING, [robot]
-            missing = self.knowledge.pathless()
-            if self.turns.takes(me) not in (NO_TASK, *self.knowledge.tasks):
-                missing.append(self.site.desk)
-            return StepFinding.MISSING if missing else StepFinding.MY_TURN, missing
-        return StepFinding.ALL_PLANNED, []
+        me, robot = self.fleet.node_id, self.turns.next_to_plan(self.knowledge.heads)
+        if robot != me:
+            return (StepFinding.MISSING, [robot]) if robot else (StepFinding.ALL_PLANNED, [])
+        missing = self.knowledge.pathless()
+        if self.turns.takes(me) not in (NO_TASK, *self.knowledge.tasks):
+            missing.append(self.site.desk)
+        return StepFinding.MISSING if missing else StepFinding.MY_TURN, missing
 
     def _do(self, deed: StepDeed, missing: list[int], now_us: int) -> list[Effect]:
         match deed:
@@ -373,8 +410,8 @@ class UnitRobot(Plain):
     def _preferences(self) -> list[tuple[int, int]]:
         """What each open task would cost, cheapest first: the task-generation function of this system."""
         floor, offer, tasks = self.site.floor, self._offer(), self.knowledge.open_tasks
-        first = oldest(tasks)
-        bids = ((cost(floor, self.rule, offer, task, first), task.number) for task in tasks)
+        backlog = Backlog.of(tasks, len(self.site.robots))
+        bids = ((cost(floor, self.rule, offer, task, backlog), task.number) for task in tasks)
         return sorted((bid, number) for bid, number in bids if bid is not None)
 
     def _offer(self) -> Availability:

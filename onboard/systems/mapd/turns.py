@@ -1,8 +1,9 @@
 """Who plans in a step, after whom and for what: the changes that the round brought, and its awards."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from onboard.contract.mapd import StepTurn
+from onboard.contract.mapd import PathHead, StepTurn
 from onboard.contract.messages import Award
 from onboard.systems.mapd.calls import is_of_step
 from onboard.systems.mapd.fields import NO_TASK
@@ -15,11 +16,15 @@ class Turns:
     step: int
     turns: dict[int, StepTurn] = field(default_factory=dict)
     won: dict[int, int] = field(default_factory=dict)
+    #: Robots in the order of their turns, and how many of them, first ones first, have told their paths.
+    _order: list[int] = field(default_factory=list)
+    _planned: int = 0
 
     def hear(self, turn: StepTurn) -> None:
         """One turn, in any order, also twice; others' steps are passed over."""
-        if turn.step == self.step:
+        if turn.step == self.step and self.turns.get(turn.index) != turn:
             self.turns[turn.index] = turn
+            self._order, self._planned = [one.robot for _, one in sorted(self.turns.items()) if one.robot], 0
 
     def on_award(self, award: Award) -> bool:
         """An award, said before or after the turn; True where it is of this step."""
@@ -36,10 +41,15 @@ class Turns:
             return False
         return all(turn.robot in self.won for turn in self.turns.values() if turn.won)
 
-    @property
-    def order(self) -> list[int]:
-        """Robots that plan, first ones first."""
-        return [turn.robot for _, turn in sorted(self.turns.items()) if turn.robot]
+    def next_to_plan(self, heads: Mapping[int, PathHead]) -> int:
+        """The first robot that has not told a path of this step, by the ``heads`` of all paths; 0 where all have."""
+        while self._planned < len(self._order):
+            robot = self._order[self._planned]
+            head = heads.get(robot)
+            if head is None or head.step != self.step or not head.version:
+                return robot
+            self._planned += 1
+        return 0
 
     def takes(self, robot: int) -> int:
         """The task that a robot has won in this step, ``NO_TASK`` for none."""
