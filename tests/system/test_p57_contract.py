@@ -63,7 +63,7 @@ def test_p57_every_frame_used_is_in_the_dbc_and_in_the_sites_dbc_with_the_same_m
         assert kind is not None, f"{frame.arbitration_id:08X} on {bus} is in no DBC"
         sender = names[frame.arbitration_id & 0xFF]
         assert one is not None, f"{kind.name} of {sender} is not in the site's DBC"
-        assert one.name == f"{sender}_{kind.name}"
+        assert one.name == f"{sender}_{kind.name}" and one.comment == kind.comment
         assert len(frame.data) == kind.length == one.length
         assert bus in (FLEET, sender)
         values = kind.decode(frame.data)
