@@ -50,7 +50,7 @@ format: $(VENV)/.test ## put the sources into ruff's format and mend what ruff c
 models: $(VENV)/.test ## check the Promela models with SPIN, and runs of the controllers against them
 	$(BIN)/python -m pytest tests/models
 
-mutants: $(VENV)/.test ## break the product once for each row of the papers, and see the row's test fail
+mutants: $(VENV)/.test ## break the product twice for each row of the papers, and see a test of its name fail; takes an hour
 	$(BIN)/python -m tests.mutate
 
 bench: $(VENV)/.test ## all figures of bench/, one table each

@@ -1,9 +1,9 @@
 """``python -m tests.drawn ROW ...``: a second mutation of a row, drawn from the function of its first.
 
 The draw is that of ``tests.conform.mutants``, with a seed that was fixed before any was played: the issue's number and
-the row's name. Where nothing can be done to that function, or there is none, it is from the whole file. It is printed
-as the row's table in ``docs/systems/*.toml`` has it (``drawn``). Where the row's test cannot find one ``--skip N``
-passes over the first N of the row's draw; why, is said beside the table.
+the row's name. Behind what can be done to that function comes what can be done to the whole file, and where that is a
+table, to the file that reads it. It is printed as the row's table in ``docs/systems/*.toml`` has it (``drawn``). Where
+nothing could tell one ``--skip N`` passes over the first N of the row's draw; why, is said beside the table.
 """
 
 import argparse
@@ -12,6 +12,7 @@ import json
 import random
 
 from tests.conform.mutants import SEED, change, mutations
+from tests.conform.mutants import Mutation as Drawn
 from tests.project.rows import ROOT, Mutation, read_rows
 
 
@@ -29,10 +30,25 @@ def draw(row: str, skip: int = 0) -> Mutation:
     if around:
         function = max(around, key=lambda one: one.lineno)
         inside = set(range(function.lineno, (function.end_lineno or 0) + 1))
-    every = list(mutations(made.file, inside)) or list(mutations(made.file, set(range(1, whole.count("\n") + 2))))
-    chosen = random.Random(f"{SEED} {row}").sample(every, len(every))[skip]
-    node = list(ast.walk(tree))[chosen.node]
-    return _as_text(made.file, whole, node)
+    first = list(mutations(made.file, inside))
+    rest = [one for one in _of_file(made.file) if one not in first]
+    drawn = random.Random(f"{SEED} {row}").sample(first, len(first))
+    behind = rest or _of_file(_reader(made.file))
+    chosen = [*drawn, *random.Random(f"{SEED} {row}").sample(behind, len(behind))][skip]
+    whole = (ROOT / chosen.file).read_text(encoding="utf-8")
+    return _as_text(chosen.file, whole, list(ast.walk(ast.parse(whole)))[chosen.node])
+
+
+def _of_file(file: str) -> list[Drawn]:
+    return list(mutations(file, set(range(1, (ROOT / file).read_text(encoding="utf-8").count("\n") + 2))))
+
+
+def _reader(file: str) -> str:
+    """The first file of the folder that imports from this one, which is a table without functions."""
+    module = file.removesuffix(".py").replace("/", ".")
+    beside = sorted((ROOT / file).parent.glob("*.py"))
+    found = next(one for one in beside if f"from {module} import" in one.read_text(encoding="utf-8"))
+    return str(found.relative_to(ROOT))
 
 
 def _as_text(file: str, whole: str, node: ast.AST) -> Mutation:

@@ -11,15 +11,16 @@ from bus_sim.run import BusRun
 from bus_sim.site_change import roll_out
 from bus_sim.systems.cell.tree import ContractTree
 from onboard.config.site import site_digest
-from onboard.contract.cell import ArmProgress, PartAt
+from onboard.contract.cell import ArmProgress, GoalStart, PartAt
 from onboard.contract.change import ChangePhase, SiteNext
 from onboard.contract.codes import OrderResult, TaskPhase
 from onboard.contract.messages import Bid, CallForProposals, Heartbeat, Reference, TaskReport
 from onboard.systems.cell.contracts import Goal
 from onboard.systems.cell.geometry import Area, distance_m
+from onboard.systems.cell.robot import ArmRobot
 from onboard.systems.cell.site import Cell
 from tests.cell.playing import Scene, cell, goal_demand
-from tests.cell.witness import ARMS, DESK, arm, metres
+from tests.cell.witness import ARMS, DESK, HOMES, arm, metres
 from tests.cut import Timed, shown_at
 
 
@@ -89,11 +90,12 @@ def _pair(one: Cell, other: Cell) -> tuple[int, int]:
     return one.digest, other.digest
 
 
-def test_c15_the_earlier_deadline_goes_first() -> None:
+@pytest.mark.parametrize("later_s", [0, 400])
+def test_c15_the_earlier_deadline_goes_first(later_s: int) -> None:
     one_robot = (arm(1, (0, 0, 20, 20), (1, 1)),)
     goals = (
         goal_demand((2, 2), (18, 2)),
-        goal_demand((2, 6), (18, 6), at_s=6),
+        goal_demand((2, 6), (18, 6), at_s=6, within_s=later_s),
         goal_demand((2, 4), (18, 4), at_s=7, within_s=200),
     )
     scene = Scene(cell(*goals, arms=one_robot))
@@ -126,6 +128,18 @@ def test_c16_a_bid_begins_where_the_contract_in_hand_ends() -> None:
     assert state.generation.arm.area == Area(0, 0, 20_000, 20_000)
 
 
+def _named_last(run: BusRun[Any]) -> None:
+    """Of the 65,535 names for parts of goals each robot has used all but the last two."""
+    for node in (one.node_id for one in ARMS):
+        behaviour = run.controllers[node].holon.behaviour
+        assert isinstance(behaviour, ArmRobot)
+        behaviour.generation.number = 65_533
+
+
+def _names_end(run: BusRun[Any]) -> None:
+    run.loop.call_at(1.0, _named_last, run)
+
+
 def test_c17_several_goals_of_two_managers_at_once() -> None:
     goals = (
         goal_demand((10, 10), (40, 30)),
@@ -133,9 +147,11 @@ def test_c17_several_goals_of_two_managers_at_once() -> None:
         goal_demand((40, 4), (36, 32)),
         goal_demand((6, 20), (10, 6)),
     )
-    scene = Scene(cell(*goals, desks=(DESK, 10)))
+    scene = Scene(cell(*goals, desks=(DESK, 10)), _names_end)
     scene.assert_sound()
     assert [one.result for one in scene.entries] == [OrderResult.DONE] * 4
+    names = {one.goal for _, one in scene.said(GoalStart) if one.sender in HOMES}
+    assert {1, 65_534, 65_535} <= names, "the first name comes behind the last"
     calls = [(time_us, one) for time_us, one in scene.said(CallForProposals) if one.depth == 0]
     first_bid_us = min(time_us for time_us, one in scene.said(Bid) if one.initiator in (DESK, 10))
     assert sum(time_us < first_bid_us for time_us, _ in calls) == 4
@@ -151,11 +167,13 @@ def test_c17_several_goals_of_two_managers_at_once() -> None:
     }
 
 
-def test_c19_a_goal_that_cannot_be_achieved_is_told_and_nothing_moves() -> None:
+def test_c02_c19_a_goal_that_cannot_be_achieved_is_told_and_nothing_moves() -> None:
+    """No robot joins that could: after three calls in vain the counter is told."""
     apart = (arm(1, (0, 0, 10, 10), (1, 1)), arm(2, (12, 0, 20, 10), (15, 5)))
     scene = Scene(cell(goal_demand((2, 2), (18, 2)), arms=apart))
     scene.assert_sound()
     assert scene.entries[0].result is OrderResult.REFUSED
+    assert len([one for _, one in scene.said(CallForProposals) if one.sender == DESK]) == 3 * 5, "attempts"
     assert scene.view.text(Reference(DESK, 1)) == "The goal can not be achieved\n"
     assert {(one.x_mm, one.y_mm) for _, one in scene.said(ArmProgress)} == {metres(1, 1), metres(15, 5)}
     assert scene.plant.parts.lying == {Reference(DESK, 1): metres(2, 2)}

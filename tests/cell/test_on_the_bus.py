@@ -49,6 +49,9 @@ def test_c03_c05_the_goal_goes_to_all_and_the_best_offer_is_told(scene: Scene) -
     assert all(
         one.holon.negotiation.counters.calls_heard for node, one in scene.played.run.controllers.items() if node < DESK
     )
+    # Who has nothing to say of it counts it as passed over, which the run's figures tell.
+    silent = set(scene.site.arms) - {1}
+    assert all(sum(scene.robot(node).generation.passed_over.values()) > 0 for node in silent)
 
 
 def test_c04_robots_hand_over_inside_their_own_areas(scene: Scene) -> None:

@@ -11,7 +11,7 @@ from bus_sim.systems.cell.show import plan
 from onboard.contract.cell import ArmPhase, ArmProgress, PartAt
 from onboard.contract.codes import CallResult
 from onboard.contract.messages import Award, Bid, CallForProposals, Message
-from onboard.systems.cell.geometry import Area
+from onboard.systems.cell.geometry import Area, Point
 from onboard.web.picture import LivePicture
 from tests.cell.playing import Scene, cell, goal_demand
 from tests.cell.witness import HOMES, arm, metres
@@ -46,7 +46,7 @@ def is_through(way: Sequence[tuple[float, float]], tool: Area) -> bool:
     return any(x0 + 0.01 < x < x1 - 0.01 and y0 + 0.01 < y < y1 - 0.01 for x, y in points)
 
 
-def test_c01_a_robot_goes_round_what_stands_in_its_plane_and_bids_for_that_way() -> None:
+def test_c01_c04_a_robot_goes_round_what_stands_in_its_plane_and_bids_for_that_way() -> None:
     """Straight where nothing stands there, round by the two corners where something does, not at all where none is."""
     straight = carried(played())
     assert is_through(straight, TOOL) and {y for _, y in straight} == {10}
@@ -55,6 +55,7 @@ def test_c01_a_robot_goes_round_what_stands_in_its_plane_and_bids_for_that_way()
         way = carried(said)
         assert way[:1] == [(4, 10)] and way[-1:] == [(14, 10)]
         assert {(6, 4), (10, 4)} <= set(way) and not is_through(way, TOOL)
+        assert all(ALONE[0].area.contains(Point(round(1000 * x), round(1000 * y))) for x, y in way), "and in its area"
         cost = [one.cost for one in said if isinstance(one, Bid)]
         assert cost == [round(1000 * (2 + hypot(2, 6) + 4 + hypot(4, 6)))]
         put = [(one.x_mm, one.y_mm) for one in said if isinstance(one, PartAt) and not one.aboard]

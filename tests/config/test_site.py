@@ -53,6 +53,7 @@ def test_p30_p31_floors_lifts_compartments_and_spurs_become_tracks_and_stations(
     assert len(site.places) == 2 * 2 * 8 - 2
     assert Station(1, 4, Side.NEAR) not in site.places
     assert Station(2, 5, Side.FAR) not in site.places
+    assert [site.machine(one.name) for one in site.machines.values()] == list(site.machines.values()), "by their names"
 
 
 def test_places_are_in_the_order_of_floor_side_and_index() -> None:

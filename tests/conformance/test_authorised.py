@@ -55,7 +55,10 @@ def test_a01_a03_a06_without_the_rights_of_others_nothing_enters_what_is_shared(
     """Every grant is lost: what still moves does so on open ground, within the machine, or in a shaft of its own."""
     monkeypatch.setattr(TokenBook, "on_grant", lost)
     site = site_of(name)
-    for order in orders_in_a_run(name, tmp_path):
+    orders = orders_in_a_run(name, tmp_path)
+    open_ground = [one for one in orders if isinstance(one, MoveOrder) and not is_shared(site, one)]
+    assert bool(open_ground) == isinstance(site, Terminal), "there nobody is asked for a right"
+    for order in orders:
         is_lift = site.machines[order.sender].kind is KindCode.LIFT
         assert is_lift or site.moved_by[type(order).__name__] is not MotionNeeds.RIGHT
         assert not (isinstance(order, MoveOrder) and is_shared(site, order))

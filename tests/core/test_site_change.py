@@ -1,5 +1,7 @@
 """Two site files count as one while an operator says so: who may say it, how long it holds, and how it ends."""
 
+import dataclasses
+
 import pytest
 
 from onboard.contract.change import ChangePhase, SiteNext
@@ -106,3 +108,20 @@ def test_an_end_of_another_change_ends_nothing() -> None:
     made.receive(announced(), SECOND)
     made.receive(SiteNext(OPERATOR, OLD, NEXT ^ 1, ChangePhase.OVER), 2 * SECOND)
     assert counts(made, 3 * SECOND)
+
+
+def test_whose_word_said_nothing_new_is_a_stranger_when_the_change_is_over() -> None:
+    """The same heartbeat again and again, as a machine with nothing to do says it, is judged anew at the end."""
+    made = robot()
+    made.receive(announced(), SECOND)
+    same = dataclasses.replace(beat(OTHER, NEXT), mirror_digest=made.mirror.digest())
+    for half in range(3, 7):
+        woken(made, half * SECOND // 2)
+        made.receive(same, half * SECOND // 2)
+        made.receive(announced(), half * SECOND // 2)
+    assert not made.drops[Reason.OTHER_SITE], "it counts, and says nothing new"
+    woken(made, 3_400_000)
+    made.receive(announced(phase=ChangePhase.OVER), 3_400_000)
+    woken(made, 3_500_000)
+    made.receive(same, 3_500_000)
+    assert made.drops[Reason.OTHER_SITE] == 1 and OTHER in made.presence.foreign

@@ -13,6 +13,7 @@ from bus_sim.sites import find_site
 from bus_sim.systems.graph.plant import GraphPlant
 from bus_sim.systems.stage import SystemStage
 from onboard.contract.codes import KindCode, OrderResult, TokenKind
+from onboard.contract.constants import NOBODY
 from onboard.contract.graph import (
     BodyPlace,
     EdgeNotice,
@@ -28,6 +29,7 @@ from onboard.contract.messages import Bid, CallForProposals, Message, TokenGrant
 from onboard.controller.shell import Controller
 from onboard.systems.graph.checks import RULES
 from onboard.systems.graph.network import Graph, complete, ring
+from onboard.systems.graph.rights import keeper, slot_token
 from onboard.systems.graph.robot import GraphRobot
 from onboard.systems.graph.rules import Rules
 from onboard.systems.graph.site import FactoryGraph
@@ -188,6 +190,10 @@ def test_g16_g19_two_that_meet_head_on_and_one_takes_another_edge() -> None:
     assert way[1:] == [4, *(scene.site.graph.way(4, sent[0].after, goal) or ())]
     other = 43 - robot
     assert len(list(scene.moves(other))) == 3
+    alone = Scene(made(hall(), (3, 5), [(0, "any", (1, 2))], Rules.PAPER))
+    alone.assert_sound()
+    (goes,) = (list(alone.moves(node)) for node in (21, 22) if len(list(alone.moves(node))) > 1)
+    assert len(goes) == 4, "and so does who is called for by no name"
 
 
 def test_g19_who_is_sent_where_is_drawn_alike_in_every_run() -> None:
@@ -223,7 +229,7 @@ def test_g20_the_node_at_the_other_end_is_told_of_a_grant(crowd: Scene) -> None:
     assert granted and granted == told
 
 
-def test_g21_the_last_free_edge_is_kept_and_two_on_a_ring_stick_by_it() -> None:
+def test_g18_g21_the_last_free_edge_is_kept_and_two_on_a_ring_stick_by_it() -> None:
     # The worked counterexample of section 2.4: by the rule both wait for ever; without it neither does.
     orders = [(0, "R1", (2,)), (0, "R2", (1,))]
     scene = Scene(made(ring(6, 5000), (0, 3), orders, Rules.KEEP), limit_s=90)
@@ -244,6 +250,8 @@ def test_g25_no_central_unit_and_any_size() -> None:
     site = made(graph, (0, 6), [(0, "any", (2, 4)), (0, "any", (8, 10))])
     assert {machine.kind for machine in site.machines.values()} == {KindCode.VEHICLE, KindCode.NODE, KindCode.DESK}
     assert set(site.hosts.values()) == {1, 2}
+    assert {keeper(site, slot_token(node, 1)) for node in site.hosts} == {1, 2}
+    assert keeper(site, slot_token(200, 1)) == NOBODY, "what is in no site is kept by nobody"
     Scene(site).assert_sound()
 
 

@@ -1,4 +1,4 @@
-"""The rows of the source papers: what was checked of each, by which test, and a mutation that this test finds.
+"""The rows of the source papers: what was checked of each, by which test, and two mutations that its tests find.
 
 Rows are numbered in the order of the papers: P01 to P60 (Pujo, Ounnar, Zanni 2006; P29 was left free), M01 to M39
 (Le Page, Barras 1995), G01 to G31 (Gnatowski 2010), C01 to C24 (Panescu, Miron 2006). A01 to A06 are of no paper: what
@@ -10,8 +10,8 @@ moves in each system. Each has a table in one of ``docs/systems/*.toml``::
     mutation = { file = "onboard/...", old = "text that is there once", new = "text that breaks the row" }
     drawn = { file = "onboard/...", old = "...", new = "..." }
 
-``drawn``, which not every row has, was drawn by ``tests.drawn`` from the function in which ``mutation`` stands. Where a
-row is not done on purpose its table is ``not_done = "why"``.
+``drawn`` was drawn by ``tests.drawn`` from the function in which ``mutation`` stands. Where a row is not done on
+purpose its table is ``not_done = "why"``.
 """
 
 import ast
@@ -66,9 +66,10 @@ class Row:
     drawn: Mutation | None = None
 
     @property
-    def mutations(self) -> tuple[Mutation, ...]:
-        """Both, those that there are."""
-        return tuple(one for one in (self.mutation, self.drawn) if one is not None)
+    def mutations(self) -> dict[str, Mutation]:
+        """Both, by their keys in the table, those that there are."""
+        both = {"mutation": self.mutation, "drawn": self.drawn}
+        return {key: one for key, one in both.items() if one is not None}
 
 
 def all_names() -> list[str]:
@@ -148,8 +149,9 @@ def _cell(text: str) -> str:
 _HEAD = """\
 # What the papers ask for
 
-Written by `make docs` from `docs/systems/*.toml`. Every row of the four papers has a test named after it, and one
-change of product code that makes this test fail; some have a second one, drawn by a seed from the same function
-(`drawn`, `python -m tests.drawn`). `make mutants` makes each of them in a copy and runs its test. Rows A are of no
-paper: what moves anything in each system, and what lets it.
+Written by `make docs` from `docs/systems/*.toml`. Every row of the four papers has a test named after it, and two
+changes of product code that are to make a test of its name fail: one made by hand, and one drawn by a seed from the
+same function (`drawn`, `python -m tests.drawn`). `make mutants` makes each of them in a copy and runs the tests. What
+was found, and by which, is in `tests/mutate.toml`, what was not in [figures.md](figures.md); the gate plays a minute's
+worth of the found ones again. Rows A are of no paper: what moves anything in each system, and what lets it.
 """

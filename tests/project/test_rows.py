@@ -37,7 +37,7 @@ def test_every_row_is_done_or_says_why_not(name: str) -> None:
     assert row.check
     assert row.test in by_row().get(name, []), f"{row.test} is no test named after {name}"
     assert row.mutation is not None
-    assert [one.mistake for one in row.mutations if one.mistake is not None] == []
+    assert [one.mistake for one in row.mutations.values() if one.mistake is not None] == []
 
 
 def test_no_test_and_no_table_names_a_row_that_is_not_in_the_list() -> None:
@@ -47,7 +47,7 @@ def test_no_test_and_no_table_names_a_row_that_is_not_in_the_list() -> None:
 
 def test_of_two_rows_no_mutation_is_the_same() -> None:
     """One change of the product that does for two rows would say little about either."""
-    made = [one for row in read_rows().values() for one in row.mutations]
+    made = [one for row in read_rows().values() for one in row.mutations.values()]
     assert [one for one in made if made.count(one) > 1] == []
 
 

@@ -223,9 +223,14 @@ def test_p07_who_has_heard_a_better_bid_says_nothing(contested: list[Timed]) -> 
     shown_at(check, contested, CallForProposals, Bid)
 
 
-@pytest.mark.parametrize(("before_ms", "counts"), [(100, True), (4, False)])
-def test_p05_a_bid_behind_the_cut_off_counts_for_nobody(before_ms: int, counts: bool) -> None:
-    """A machine from outside bids better: in time it wins, later the robot does, who has heard it as well."""
+@pytest.mark.parametrize(
+    ("before_ms", "better_ms", "counts"), [(100, 100, True), (4, 100, False), (100, 60_000, False)]
+)
+def test_p05_p07_a_bid_behind_the_cut_off_counts_for_nobody(before_ms: int, better_ms: int, counts: bool) -> None:
+    """A machine from outside bids better: in time it wins, later the robot does, who has heard it as well.
+
+    In time as well, where the bid is better than any machine's could be.
+    """
 
     def before(simulation: Simulation) -> None:
         bus = admitted(simulation).fleet.attach("rival", RIVAL)
@@ -237,7 +242,9 @@ def test_p05_a_bid_behind_the_cut_off_counts_for_nobody(before_ms: int, counts: 
                 deadline_us[message.sender, message.call] = from_bus_ms(message.deadline_ms, time_us)
             if isinstance(message, Bid) and message.sender == 11 and message.call == 257:
                 late_us = deadline_us[message.initiator, message.call] - 1_000 * before_ms
-                for frame in fleet_codec().encode(Bid(RIVAL, message.initiator, message.call, message.cost - 100, 0)):
+                for frame in fleet_codec().encode(
+                    Bid(RIVAL, message.initiator, message.call, message.cost - better_ms, 0)
+                ):
                     simulation.loop.call_at(late_us / 1e6, bus.send, frame)
 
         simulation.observers.append(hear)

@@ -6,11 +6,14 @@ What a task costs is each kind's own (row P21).
 import dataclasses
 import gc
 import itertools
+from collections.abc import Sequence
 from enum import Enum
 from types import BuiltinFunctionType, CodeType, FunctionType, GetSetDescriptorType, MemberDescriptorType, ModuleType
 
 import pytest
 
+from bus_sim.faults.arm import arm
+from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import CallResult, Criterion, Grade, KindCode, LegAction, Operation, TaskPhase
@@ -28,6 +31,7 @@ from onboard.systems.car_park.program import CarStep, Program, to_itinerary
 from onboard.systems.car_park.site import car_park
 from onboard.systems.registry import factory_for
 from onboard.ways.mirror import WayMirror
+from tests.cut import Timed, first_of, shown_at
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays
 
@@ -80,6 +84,20 @@ def test_p01_a_machine_dies_and_the_others_park_the_car(name: str) -> None:
     scene.first(TaskReport, lambda m: m.task == award.task and m.phase is TaskPhase.DONE)
     summary = scene.simulation.plant.street.summary()
     assert (summary.parked, summary.inside) == (1, 1)
+
+
+def test_p01_who_comes_back_is_told_by_each_of_the_others_at_once() -> None:
+    """No role does it for all: each says by itself that it lives, whenever its next word would have been due."""
+    crash = parse_injection(f"crash:target=MR2,at_s={KILLED_S},restart_s=10.3")
+    scene = play(SITE, stays(), plant=lambda simulation: arm(simulation, [crash]), limit_s=1, extra_s=30)
+    back = SITE.machine("MR2").node_id
+
+    def check(heard: Sequence[Timed]) -> None:
+        since_us, _ = first_of(heard, Heartbeat, lambda one: one.sender == back, after_us=15_000_000)
+        others = {one.sender for at_us, one in heard if isinstance(one, Heartbeat) and 0 < at_us - since_us < 300_000}
+        assert others - {back} == set(SITE.machines) - {back}
+
+    shown_at(check, [(one.time_us, one.message) for one in scene.said if one.bus == "fleet"], Heartbeat)
 
 
 # --- row P19 ---------------------------------------------------------------------------------------------------------

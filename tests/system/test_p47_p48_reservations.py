@@ -189,6 +189,23 @@ def test_p10_p47_being_outbid_frees_what_was_pre_engaged() -> None:
     shown(check, outbid, CallForProposals, Bid, Award, Itinerary)
 
 
+def test_p48_what_is_pre_assigned_with_a_bid_comes_before_the_next_one() -> None:
+    """Two calls stand at one moment: the only robot's offer for the second begins with what it offers for the first."""
+
+    def check(said: Sequence[Message]) -> None:
+        kinds = [type(one) for one in said]
+        bids = [one for one in said if isinstance(one, Bid)]
+        assert len(bids) == 2 and Award in kinds
+        first, second = bids
+        assert (first.initiator, second.initiator) == (1, 2) and kinds.index(Award) > said.index(second)
+        offers = [one for one in said if isinstance(one, Itinerary) and one.grade is Grade.TENTATIVE]
+        works = [[leg.to_index for leg in one.legs if leg.action is LegAction.WORK] for one in offers]
+        assert [one[0] for one in works] == [4, 6], "each offer takes the car of its own bay"
+        assert second.cost > first.cost + 25_000, "the second behind the first"
+
+    shown(check, two_bays(0, 0.1), Bid, Award, Itinerary)
+
+
 # --- what others make of it ------------------------------------------------------------------------------------------
 
 

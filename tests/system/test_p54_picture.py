@@ -96,9 +96,13 @@ def test_p54_the_picture_shows_the_plant_as_it_is(run: tuple[Simulation, list[st
             body = world.robots[node]
             assert place.segment == world.standing_position(node)
             assert place.offset_mm == 0 and body.track == place.segment.track
+            assert place.passed >= abs(place.segment.index - machine.home.index), (
+                "segments left behind since it was there"
+            )
         if machine.kind is KindCode.LIFT:
             index = view.history.places.by_node[node].segment.index
             assert SITE.tracks[machine.home.track].joins[index - 1].track == world.platform_floor(node)
+    assert max(place.passed for place in view.history.places.by_node.values()) > 10
     last = pictures[-1]
     for car in view.history.loads.stations:
         assert f"|{car.number:^3}|" in last

@@ -63,7 +63,7 @@ def test_p57_every_frame_used_is_in_the_dbc_and_in_the_sites_dbc_with_the_same_m
         assert kind is not None, f"{frame.arbitration_id:08X} on {bus} is in no DBC"
         sender = names[frame.arbitration_id & 0xFF]
         assert one is not None, f"{kind.name} of {sender} is not in the site's DBC"
-        assert one.name == f"{sender}_{kind.name}"
+        assert one.name == f"{sender}_{kind.name}" and one.comment == kind.comment
         assert len(frame.data) == kind.length == one.length
         assert bus in (FLEET, sender)
         values = kind.decode(frame.data)
@@ -123,7 +123,7 @@ def test_p16_robots_and_lifts_bid_in_the_same_unit_which_is_when_the_work_is_don
     bidders = {kinds[bid.sender] for _, bid in scene.all(Bid)}
     assert bidders == {KindCode.ROBOT, KindCode.LIFT}
     awarded = {(a.sender, a.call): a.winner for _, a in scene.all(Award) if a.result is CallResult.AWARDED}
-    checked = 0
+    checked, winners = 0, set[KindCode]()
     for opened_us, call in scene.all(CallForProposals):
         assert call.criterion is Criterion.FINISH_TIME
         winner = awarded.get((call.sender, call.call))
@@ -131,8 +131,10 @@ def test_p16_robots_and_lifts_bid_in_the_same_unit_which_is_when_the_work_is_don
         if not bids:
             continue
         assert bids[-1].cost * 1000 > opened_us
+        winners.add(kinds[bids[-1].sender])
         if call.operation in (Operation.PARK, Operation.RETRIEVE):
             (done_us,) = (t for t, m in scene.all(TaskReport) if (m.task, m.phase) == (call.task, TaskPhase.DONE))
             assert done_us / 1000 == pytest.approx(bids[-1].cost, abs=20_000)
             checked += 1
     assert checked == 5
+    assert winners == bidders, "what lifts bid is a date as well, by which robots take them"

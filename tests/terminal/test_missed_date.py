@@ -35,7 +35,7 @@ def heads(messages: Sequence[Message]) -> list[tuple[int, int]]:
     return [(one.sender, one.version) for one in messages if isinstance(one, PlanHead)]
 
 
-def test_m16_m31_a_date_about_to_be_missed_makes_one_plan_anew_and_it_is_kept() -> None:
+def test_m16_m31_m35_a_date_about_to_be_missed_makes_one_plan_anew_and_it_is_kept() -> None:
     usual, before = run("S10", "16:04", 15, None)
     held, said = run("S10", "16:04", 15, ("R1", 103, 60))
     assert (usual.is_good, usual.touched, held.is_good, held.touched) == (True, 0, True, 1)

@@ -182,7 +182,7 @@ def _typed(verb: Verb, what: int, count: int = 0, to: str = "S1", source: str = 
     return MissionKey(1, 7, verb, what, count, BY_NAME[source] if source else 0, BY_NAME[to], 0, urgent=False)
 
 
-def test_a_mission_that_comes_in_part_or_twice_is_carried_out_once_and_whole() -> None:
+def test_m05_a_mission_that_comes_in_part_or_twice_is_carried_out_once_and_whole() -> None:
     orders = MissionBook(SITE, 1)
     one, other, end = _typed(Verb.TRANSHIP, box("B3")), _typed(Verb.TRANSHIP, box("B4")), _typed(Verb.END, 0, 2)
     assert (orders.key(one), orders.answer(one)) == (None, None)

@@ -1,5 +1,6 @@
 """The shipped terminal, run once to its end, and what was on its buses."""
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
@@ -189,6 +190,7 @@ def test_m37_the_ends_of_all_plans_are_known_all_the_time_and_move(seen: Seen) -
     shown = "\n".join(line for lines in seen.pictures for line in lines)
     assert "L11: . BLOCKED" in shown or "BLOCKED" in shown
     assert "R1[" in shown and "ends at" in shown and "idle in" in shown
+    assert re.search(r"S\d+: B\d+", shown) and re.search(r"S\d+: -", shown), "what stands where"
 
 
 def test_m30_each_step_is_reported_once_done_and_the_task_at_its_phases(seen: Seen) -> None:

@@ -33,6 +33,16 @@ def test_m20_a_crossing_holds_one_robot_unless_the_site_says_more() -> None:
     assert terminal(more).by_name["C1"].capacity == 2
 
 
+def test_m14_m20_a_lane_is_at_most_5_km_long_and_there_is_something_to_drive_on() -> None:
+    longest = parse_site(TEXT.replace("length_mm = 100_000 ", "length_mm = 5_000_000 "), "long.toml")
+    assert terminal(longest).by_name["L11"].duration_us == 1_000_000_000
+    with pytest.raises(ConfigError, match=r"lanes\[2\].length_mm = 5000001: out of range"):
+        parse_site(TEXT.replace("length_mm = 100_000 ", "length_mm = 5_000_001 "), "long.toml")
+    nothing = TEXT[: TEXT.index("[[lanes]]")]
+    with pytest.raises(ConfigError, match=r"areas: no entity; add \[\[lanes\]\]"):
+        parse_site(nothing, "nothing.toml")
+
+
 def test_m04_m05_m06_missions_as_operators_say_them() -> None:
     load, tranship, urgent = SITE.missions
     assert (load.count, load.type, SITE.entities[load.source].name, SITE.entities[load.target].name) == (

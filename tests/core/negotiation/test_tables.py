@@ -157,7 +157,7 @@ def test_a_call_number_used_anew_after_a_restart_is_a_new_call() -> None:
     assert robot.committed == {CallKey(CALLER, 1)}
 
 
-def test_memory_is_bounded_and_what_is_dropped_is_told() -> None:
+def test_p10_memory_is_bounded_and_what_is_reserved_for_goes_last() -> None:
     robot = bidder()
     for number in range(2, MAX_CALLS + 2):
         robot.receive(a_call(number, task=Reference(CALLER, number)), START_US + 200_000)
