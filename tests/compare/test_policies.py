@@ -1,6 +1,7 @@
 """P56: the joint choice is a strong opponent, and nobody beats a bound. Waiting is what customers saw."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 
 import pytest
@@ -10,6 +11,7 @@ from bus_sim.systems.car_park.compare.plays import MIP, POLICIES, Play, play
 from bus_sim.systems.car_park.compare.policies import AnyFirst, JointChoice, NearestFirst
 from bus_sim.systems.car_park.compare.table import tabulate
 from bus_sim.systems.car_park.demand import Demand
+from onboard.systems.car_park.site import DeskPolicy
 from tests.sites import at_the_key
 from tests.thinned import is_long
 
@@ -52,8 +54,11 @@ def test_p56_the_joint_choice_beats_nearest_first_and_random() -> None:
 
 
 def test_p56_the_joint_choice_is_far_better_where_there_is_more_to_choose() -> None:
-    """Three compartments and four robots: nearest-first and random took 1.3 times as long over ten seeds."""
-    site = at_the_key(find_site("standard"))
+    """Three compartments, four robots, cars asked for at any desk: the others took 1.3 times as long over ten seeds.
+
+    Where a car comes to the compartment beside it, as the shipped site has it, there is less to choose.
+    """
+    site = replace(at_the_key(find_site("standard")), desk=DeskPolicy.ANY)
     seeds, cars, apart_s = ((1, 3), 8, 30.0) if is_long() else ((1,), 5, 20.0)
 
     def mean_of(policy: str) -> float:

@@ -17,6 +17,7 @@ from bus_sim.faults.scenario import FaultScenario, load_scenario
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Arrivals
 from onboard.core.site import Site
+from onboard.systems.car_park.site import CarPark, DeskPolicy
 from tests.thinned import some
 
 SCENARIOS = Path(__file__).parent / "scenarios"
@@ -59,6 +60,8 @@ def test_without_faults_no_checker_finds_anything(name: str) -> None:
 )
 def test_what_a_campaign_once_found_does_not_come_back(name: str) -> None:
     scenario, site = load_scenario(SCENARIOS / f"{name}.toml")
+    # Cars came to the desk that reads their tickets on every site when these were found.
+    site = replace(site, desk=DeskPolicy.ANY) if isinstance(site, CarPark) else site
     report = play(site, scenario)
     assert report.verdict not in FAILURES, report.why()
 

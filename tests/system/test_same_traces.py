@@ -18,7 +18,7 @@ from tests.protocol.examples import EXAMPLES, RUN, lines_of
 RUNS = {
     "level1 --random 40 15 --cars 3": "b505a62bf6e84835",
     "small --random 40 15 --cars 3 --fault crash:target=MR1,at_s=80,restart_s=5": "8277a33938514498",
-    "standard --random 30 15 --cars 3": "f864886864b60469",
+    "standard --random 30 15 --cars 3": "261f63eae6dce974",
     "large --random 30 15 --cars 2": "d521a221e7410b48",
     "graph --for 150": "4949031e170ebb8e",
     "terminal --for 150": "99cccf65bcc7a6c0",
