@@ -79,7 +79,7 @@ class OrderDesk(ABC, Generic[AnOrder]):
         return not order.is_begun
 
     def has_begun(self, node: int, order: AnOrder) -> bool:
-        """Whether a machine told last that it works on an order: then nobody else can do it, whatever was said of it."""
+        """Whether a machine told last that it works on an order: then nobody else can do it."""
         return False
 
     def may_be_given_back(self, order: AnOrder) -> bool:
