@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from bus_sim.cli import main
-from onboard.contract.codes import KindCode, Reason, TokenKind
+from onboard.contract.codes import KindCode, Reason
 from onboard.contract.mapd_device import CartOrder
 from onboard.contract.messages import Halted, Message, Progress, TokenGrant
 from onboard.contract.terminal_device import MoveOrder
@@ -67,19 +67,6 @@ def test_a01_a03_a06_without_the_rights_of_others_nothing_enters_what_is_shared(
         is_lift = site.machines[order.sender].kind is KindCode.LIFT
         assert is_lift or site.moved_by[type(order).__name__] is not MotionNeeds.RIGHT
         assert not (isinstance(order, MoveOrder) and is_shared(site, order))
-
-
-def test_a02_in_a_graph_without_a_place_behind_the_edge_no_robot_is_sent_along_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Edges are granted as ever, places in nodes never: by the site's rules a robot needs both."""
-    granted = TokenBook.on_grant
-
-    def edges_alone(book: TokenBook, grant: TokenGrant, now_us: int) -> list[Effect]:
-        return [] if grant.token_kind is TokenKind.STATION else granted(book, grant, now_us)
-
-    monkeypatch.setattr(TokenBook, "on_grant", edges_alone)
-    assert orders_in_a_run("graph", tmp_path) == []
 
 
 def test_a06_what_is_done_in_a_cell_is_said_to_be_done_at_the_step_behind_the_way_there(tmp_path: Path) -> None:
