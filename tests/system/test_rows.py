@@ -51,7 +51,7 @@ from onboard.holon.holon import Holon
 from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.compartment_factory import CompartmentFactory
 from onboard.systems.car_park.generation import AWARD_LATENCY_US, CarParkGeneration
-from onboard.systems.car_park.program import CarHandling, CarStep, Program, StationWork
+from onboard.systems.car_park.program import MAX_STEPS, CarHandling, CarStep, Program, StationWork
 from onboard.ways.mirror import WayMirror
 from onboard.wire.codec import fleet_codec
 from tests.sites import at_the_key, one_floor
@@ -109,6 +109,15 @@ def test_p36_the_car_is_taken_at_the_moment_that_the_call_names_by_who_waits_the
     assert comes.end_ms < out_ms, "it is there before"
     handling_us = a_robot(Segment(1, 8)).handling_us(site.compartments[1])
     assert takes.end_ms == out_ms + handling_us // 1_000
+
+
+def test_p41_who_could_not_tell_the_plan_behind_a_date_names_none() -> None:
+    """An itinerary has so many legs at most: whose program has no room for four more says nothing."""
+    says = {}
+    for steps in (MAX_STEPS - 4, MAX_STEPS - 3):
+        stands = [CarStep(LegAction.STAND, 1, 8, 8, at * 1_000_000, (at + 1) * 1_000_000) for at in range(2, 2 + steps)]
+        says[steps] = a_robot(Segment(1, 8), stands).lower_bound(a_call(), 1_000_000) is not None
+    assert says == {MAX_STEPS - 4: True, MAX_STEPS - 3: False}
 
 
 def test_p18_a_busy_robot_names_a_later_finishing_date_than_its_idle_twin() -> None:
