@@ -6,12 +6,15 @@ import pytest
 
 from bus_sim.cli import main
 from onboard.contract.codes import KindCode, Reason
-from onboard.contract.messages import Halted, Message, TokenGrant
+from onboard.contract.mapd_device import CartOrder
+from onboard.contract.messages import Halted, Message, Progress, TokenGrant
 from onboard.contract.terminal_device import MoveOrder
 from onboard.core.authority import TokenBook
 from onboard.core.effects import Effect
 from onboard.core.site import MotionNeeds, Site
 from onboard.holon.taking_part import TakingPart
+from onboard.systems.car_park.sill import SillProof
+from onboard.systems.car_park.site import car_park
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.listener import Listener
 from onboard.trace.readers.open_log import Log
@@ -22,16 +25,18 @@ from tests.web.logs import contract
 
 def orders_in_a_run(name: str, folder: Path) -> list[Message]:
     """What was said to devices in a run by which something moves; no machine has stopped for an order of its own."""
-    log, site = folder / "run.log", site_of(name)
+    said, moved_by = said_in_a_run(name, folder), site_of(name).moved_by
+    assert not any(isinstance(message, Halted) and message.reason is Reason.NOT_AUTHORISED for message in said)
+    return [message for message in said if type(message).__name__ in moved_by]
+
+
+def said_in_a_run(name: str, folder: Path) -> list[Message]:
+    """All messages of a run, those between machines and their devices included."""
+    log, listener = folder / "run.log", Listener(contract(site_of(name)))
     main(["run", site_file(name), *CASES[name].moving, "--speed", "max", "--no-web", "--devices", "--trace", str(log)])
-    orders, listener = list[Message](), Listener(contract(site))
     with Log(str(log)) as lines:
-        for raw in lines:
-            message = listener.hear(raw).message
-            if message is not None and type(message).__name__ in site.moved_by:
-                orders.append(message)
-            assert not (isinstance(message, Halted) and message.reason is Reason.NOT_AUTHORISED)
-    return orders
+        heard = [listener.hear(raw).message for raw in lines]
+    return [message for message in heard if message is not None]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -62,6 +67,32 @@ def test_a01_a03_a06_without_the_rights_of_others_nothing_enters_what_is_shared(
         is_lift = site.machines[order.sender].kind is KindCode.LIFT
         assert is_lift or site.moved_by[type(order).__name__] is not MotionNeeds.RIGHT
         assert not (isinstance(order, MoveOrder) and is_shared(site, order))
+
+
+def test_a06_what_is_done_in_a_cell_is_said_to_be_done_at_the_step_behind_the_way_there(tmp_path: Path) -> None:
+    """Steps of one robot's orders never go back: none loads before it is where it is sent."""
+    last = dict[int, int]()
+    for order in orders_in_a_run("mapd", tmp_path):
+        assert isinstance(order, CartOrder)
+        assert order.step >= last.get(order.sender, 0)
+        last[order.sender] = order.step
+    assert last
+
+
+def test_a01_without_the_word_of_a_lift_under_its_gate_no_robot_crosses_a_sill(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With all rights, and the platform there: by what robots say nobody is aboard, but with the words some are."""
+    site = car_park(site_of("car-park"))
+
+    def aboard(folder: Path) -> list[Progress]:
+        told = [one for one in said_in_a_run("car-park", folder) if isinstance(one, Progress)]
+        by_robots = [one for one in told if site.machines[one.sender].kind is KindCode.ROBOT]
+        return [one for one in by_robots if not 1 <= one.index <= site.tracks[one.track].length]
+
+    assert aboard(tmp_path)
+    monkeypatch.setattr(SillProof, "word", lambda proof, lift_track: None)
+    assert aboard(tmp_path) == []
 
 
 def is_shared(site: Site, order: MoveOrder) -> bool:

@@ -229,6 +229,30 @@ def test_g20_the_node_at_the_other_end_is_told_of_a_grant(crowd: Scene) -> None:
     assert granted and granted == told
 
 
+def test_g20_a_kept_edge_that_is_granted_is_told_reserved_and_then_free_once() -> None:
+    """By the keep rule with notices: the notice of the grant ends that of keeping, and nothing else does later."""
+    scene = Scene(made(hall(), (0, 4, 8), busy_orders(hall(), 8, 2), Rules.KEEP_ON_NOTICE), limit_s=200)
+    told = dict[tuple[int, int], list[EdgeState]]()
+    for one in scene.said(EdgeNotice):
+        told.setdefault((one.node, one.other), []).append(one.edge_state)
+    behind = [
+        words[number + 2 : number + 4]
+        for words in told.values()
+        for number in range(len(words))
+        if words[number : number + 2] == [EdgeState.KEPT, EdgeState.RESERVED]
+    ]
+    assert len(behind) >= 3 and all(words[:1] == [EdgeState.FREE] for words in behind)
+    assert [EdgeState.FREE, EdgeState.FREE] not in behind
+
+
+def test_a02_by_the_papers_rules_the_right_to_an_edge_is_enough_to_be_sent_along_it() -> None:
+    """No place in the node behind it is needed: both robots are sent to where they shall go."""
+    graph = complete(4, 5000)
+    scene = Scene(made(graph, (0, 1), [(0, "R1", (2,)), (0, "R2", (3,))], Rules.PAPER), limit_s=90)
+    assert [list(scene.moves(robot))[-1] for robot in (21, 22)] == [2, 3]
+    scene.assert_sound()
+
+
 def test_g18_g21_the_last_free_edge_is_kept_and_two_on_a_ring_stick_by_it() -> None:
     # The worked counterexample of section 2.4: by the rule both wait for ever; without it neither does.
     orders = [(0, "R1", (2,)), (0, "R2", (1,))]

@@ -25,8 +25,31 @@ from tests.system.scene import Scene, play, stays
 LAMBDA, ALPHA = 11, 12
 LEFT, RIGHT = 128, 129
 PLACES, PITCH_MM = 16, 2_400
-#: From the deadline of the call to the end of each of MRalpha's legs, s.
-ALPHA_S = (5, 18, 28, 51, 75, 85, 100, 118, 125, 141)
+#: MRalpha's way in the figure: each leg with its end, s after the deadline of the call.
+FIGURE = (
+    (LegAction.STAND, 2, 6, 6, 5),
+    (LegAction.TRAVEL, 2, 6, 0, 18),
+    (LegAction.RIDE, LEFT, 2, 5, 28),
+    (LegAction.TRAVEL, 5, 0, 12, 51),
+    (LegAction.WORK, 5, 12, 12, 75),
+    (LegAction.TRAVEL, 5, 12, 8, 85),
+    (LegAction.WORK, 5, 8, 8, 100),
+    (LegAction.TRAVEL, 5, 8, PLACES + 1, 118),
+    (LegAction.RIDE, RIGHT, 5, 3, 125),
+    (LegAction.TRAVEL, 3, PLACES + 1, 9, 141),
+)
+#: Another, for the rows' rule alone: over the place where MRlambda stands and back over it.
+OVER_ITS_PLACE = (
+    (LegAction.STAND, 2, 6, 6, 5),
+    (LegAction.TRAVEL, 2, 6, 0, 18),
+    (LegAction.RIDE, LEFT, 2, 1, 24),
+    (LegAction.TRAVEL, 1, 0, 10, 44),
+    (LegAction.WORK, 1, 10, 10, 60),
+    (LegAction.TRAVEL, 1, 10, 0, 80),
+    (LegAction.RIDE, LEFT, 1, 3, 88),
+    (LegAction.TRAVEL, 3, 0, 9, 106),
+)
+Way = tuple[tuple[LegAction, int, int, int, int], ...]
 
 
 def park(clearance: int) -> CarPark:
@@ -48,27 +71,18 @@ def park(clearance: int) -> CarPark:
     return telling(at_the_key(parse_site(text, "figure.toml", crowded=True)))
 
 
-def alpha_plan(deadline_ms: int) -> Itinerary:
+def alpha_plan(deadline_ms: int, way: Way = FIGURE) -> Itinerary:
     """MRalpha's firm itinerary, told when the call is."""
-    way = (
-        (LegAction.STAND, 2, 6, 6),
-        (LegAction.TRAVEL, 2, 6, 0),
-        (LegAction.RIDE, LEFT, 2, 5),
-        (LegAction.TRAVEL, 5, 0, 12),
-        (LegAction.WORK, 5, 12, 12),
-        (LegAction.TRAVEL, 5, 12, 8),
-        (LegAction.WORK, 5, 8, 8),
-        (LegAction.TRAVEL, 5, 8, PLACES + 1),
-        (LegAction.RIDE, RIGHT, 5, 3),
-        (LegAction.TRAVEL, 3, PLACES + 1, 9),
+    legs = tuple(
+        Leg(action, track, from_index, to_index, Side.FAR, deadline_ms + 1_000 * end_s)
+        for action, track, from_index, to_index, end_s in way
     )
-    legs = tuple(Leg(*leg, Side.FAR, deadline_ms + 1_000 * end_s) for leg, end_s in zip(way, ALPHA_S, strict=True))
     return Itinerary(ALPHA, 2, Grade.FIRM, Stamp(deadline_ms - 1_000, 1, 99), legs)
 
 
 @cache
-def played(clearance: int, tells: bool) -> Scene:
-    """One car comes; MRalpha stands on the second floor and, if it ``tells``, has the plan above from then on."""
+def played(clearance: int, way: Way) -> Scene:
+    """One car comes; MRalpha stands on the second floor and, if it has a ``way``, tells it from then on."""
     site = park(clearance)
 
     def words(simulation: Simulation) -> None:
@@ -85,8 +99,8 @@ def played(clearance: int, tells: bool) -> Scene:
             simulation.loop.call_later(1.0, beat)
 
         def hear(message: Message, time_us: int) -> None:
-            if tells and isinstance(message, CallForProposals) and message.sender == 1:
-                say(alpha_plan(message.deadline_ms))
+            if way and isinstance(message, CallForProposals) and message.sender == 1:
+                say(alpha_plan(message.deadline_ms, way))
 
         simulation.observers.append(hear)
         simulation.loop.call_at(0.5, beat)
@@ -106,7 +120,7 @@ def bid_of(scene: Scene) -> tuple[CallForProposals, Bid, Itinerary]:
 
 @pytest.mark.parametrize(("clearance", "waits_at"), [(4, 3), (3, 4)])
 def test_p43_the_bid_waits_a_clearance_before_mralpha_and_follows(clearance: int, waits_at: int) -> None:
-    call, bid, plan = bid_of(played(clearance, True))
+    call, bid, plan = bid_of(played(clearance, FIGURE))
     way = [(leg.action.name, leg.track, leg.to_index) for leg in plan.legs]
     assert way[: way.index(("WORK", 1, 4)) + 1][-1:] == [("WORK", 1, 4)]
     assert way[way.index(("WORK", 1, 4)) + 1 :] == [
@@ -130,21 +144,22 @@ def test_p43_the_bid_waits_a_clearance_before_mralpha_and_follows(clearance: int
 @pytest.mark.parametrize("clearance", [3, 4])
 def test_p28_a_plan_told_and_not_begun_delays_the_bid(clearance: int) -> None:
     """The same call: with MRalpha only standing on its floor the bid is on a free way, 38 s and more sooner."""
-    bids = {tells: bid_of(played(clearance, tells)) for tells in (True, False)}
+    bids = {tells: bid_of(played(clearance, FIGURE if tells else ())) for tells in (True, False)}
     took_ms = {tells: bid.cost - call.deadline_ms for tells, (call, bid, _) in bids.items()}
     assert took_ms[True] > took_ms[False] + 38_000
     free = bids[False][2]
     assert [leg.track for leg in free.legs if leg.action is LegAction.STAND] == [1], "but for the customer's leaving"
 
 
+@pytest.mark.parametrize(("way", "shared"), [(FIGURE, {LEFT, 5}), (OVER_ITS_PLACE, {1})])
 @pytest.mark.parametrize("clearance", [3, 4])
-def test_p40_the_windows_of_both_plans_on_the_bus_never_meet(clearance: int) -> None:
+def test_p40_the_windows_of_both_plans_on_the_bus_never_meet(clearance: int, way: Way, shared: set[int]) -> None:
     site = park(clearance)
-    call, _, plan = bid_of(played(clearance, True))
+    call, _, plan = bid_of(played(clearance, way))
     now_us = from_bus_ms(call.deadline_ms, 0)
-    alpha = itinerary_windows(site, alpha_plan(call.deadline_ms), now_us)
+    alpha = itinerary_windows(site, alpha_plan(call.deadline_ms, way), now_us)
     reservations = Reservations()
     reservations.reserve(ALPHA, alpha, [])
     mine = itinerary_windows(site, plan, now_us)
-    assert {window.segment.track for window in mine} & {window.segment.track for window in alpha} >= {LEFT, 5}
+    assert {window.segment.track for window in mine} & {window.segment.track for window in alpha} >= shared
     assert reservations.conflicts(LAMBDA, mine) == []

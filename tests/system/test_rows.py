@@ -1,6 +1,7 @@
 """Rows of the systems list that need a whole site, or two machines, to be seen."""
 
 import dataclasses
+import itertools
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -31,6 +32,7 @@ from onboard.contract.messages import (
     CarAt,
     DeskOrder,
     DriveState,
+    Itinerary,
     Message,
     OperatorOrder,
     Reference,
@@ -48,8 +50,8 @@ from onboard.core.site import Machine, Segment, Site, Station
 from onboard.holon.holon import Holon
 from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.compartment_factory import CompartmentFactory
-from onboard.systems.car_park.generation import CarParkGeneration
-from onboard.systems.car_park.program import CarHandling, CarStep, Program, StationWork
+from onboard.systems.car_park.generation import AWARD_LATENCY_US, CarParkGeneration
+from onboard.systems.car_park.program import MAX_STEPS, CarHandling, CarStep, Program, StationWork
 from onboard.ways.mirror import WayMirror
 from onboard.wire.codec import fleet_codec
 from tests.sites import at_the_key, one_floor
@@ -84,11 +86,38 @@ def test_p18_a_busy_robot_bids_later_on_the_bus_than_its_idle_twin() -> None:
         scene = play(site, stays(*[(float(number), None) for number in range(cars)]), extra_s=200)
         scene.assert_sound()
         call = scene.all(CallForProposals)[-1][1]
+        if cars == 1:
+            _, plan = scene.first(Itinerary, lambda m: m.sender == 11 and len(m.legs) > 2)
+            assert plan.legs[0].action is LegAction.STAND
+            until_ms = plan.legs[0].end_ms - call.deadline_ms
+            assert until_ms == AWARD_LATENCY_US // 1_000, "nobody is under way before the award can be there"
         (bid,) = (m for _, m in scene.all(Bid) if (m.initiator, m.call) == (call.sender, call.call))
         took_ms[cars] = bid.cost - call.deadline_ms
         done = [report for _, report in scene.all(TaskReport) if report.phase is TaskPhase.DONE]
         assert [report.sender for report in done] == [11] * cars
     assert took_ms[2] > took_ms[1] + 25_000
+
+
+def test_p36_the_car_is_taken_at_the_moment_that_the_call_names_by_who_waits_there() -> None:
+    """At the key a call says when the customer will be out: the car is taken a handling later, to the millisecond."""
+    site = one_floor()
+    scene = play(site, stays((0.0, None)), limit_s=30, extra_s=0)
+    _, call = scene.first(CallForProposals)
+    _, plan = scene.first(Itinerary, lambda m: m.sender == 11 and len(m.legs) > 2)
+    comes, takes = next(pair for pair in itertools.pairwise(plan.legs) if pair[1].action is LegAction.WORK)
+    out_ms = call.deadline_ms + call.ready_ms
+    assert comes.end_ms < out_ms, "it is there before"
+    handling_us = a_robot(Segment(1, 8)).handling_us(site.compartments[1])
+    assert takes.end_ms == out_ms + handling_us // 1_000
+
+
+def test_p41_who_could_not_tell_the_plan_behind_a_date_names_none() -> None:
+    """An itinerary has so many legs at most: whose program has no room for four more says nothing."""
+    says = {}
+    for steps in (MAX_STEPS - 4, MAX_STEPS - 3):
+        stands = [CarStep(LegAction.STAND, 1, 8, 8, at * 1_000_000, (at + 1) * 1_000_000) for at in range(2, 2 + steps)]
+        says[steps] = a_robot(Segment(1, 8), stands).lower_bound(a_call(), 1_000_000) is not None
+    assert says == {MAX_STEPS - 4: True, MAX_STEPS - 3: False}
 
 
 def test_p18_a_busy_robot_names_a_later_finishing_date_than_its_idle_twin() -> None:

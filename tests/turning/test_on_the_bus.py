@@ -10,11 +10,12 @@ from bus_sim.faults.injection import parse_injection
 from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
 from bus_sim.session import play
-from bus_sim.sites import find_site
+from bus_sim.sites import find_site, site_text
 from bus_sim.systems.stage import SystemStage
 from bus_sim.systems.turning.nc import ProgramError, run_program
 from bus_sim.systems.turning.plant import TurningPlant
 from bus_sim.systems.turning.show import board
+from onboard.config.site import parse_site
 from onboard.contract.codes import Criterion, KindCode, Operation, OrderResult
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Award, Bid, CallForProposals
@@ -138,6 +139,17 @@ def test_p59_the_same_holon_drives_lathes(shipped: SystemStage[Any]) -> None:
     assert {type(one.holon) for one in controllers.values()} == {Holon}
     assert {type(one.holon.behaviour) for node, one in controllers.items() if node != 9} == {LatheMachine}
     assert "order 2: 4 x shaft: DONE L2" in board(_plant(shipped))
+
+
+def test_a05_the_last_number_of_a_program_is_loaded_and_run_as_any_other() -> None:
+    """Programs have numbers from 1 to 255; the first task of a desk at node 148 has the last."""
+    text = site_text("turning").replace("node = 9\n", "node = 148\n")
+    site = parse_site(text, "turning.toml")
+    assert isinstance(site, Turning)
+    played = _play(replace(site, orders=(BatchDemand(0, TurningJob(2, 1, 45, 1)),)))
+    _sound(played)
+    assert [entry.result for entry in _plant(played).entries] == [OrderResult.DONE]
+    assert 255 in {lathe.program for lathe in _plant(played).devices.values()}
 
 
 def test_what_no_lathe_can_make_is_refused() -> None:

@@ -3,13 +3,14 @@
 import itertools
 import random
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from onboard.contract.codes import CallResult, Criterion, Reason
 from onboard.contract.messages import Bid, CallForProposals, Message
 from onboard.core.negotiation import CallKey, SpeakingSlot, beats, cost_difference
-from tests.core.negotiation.fleet import CALLER, TIMING, Bus, Costs, Machine, caller, fleet, terms
+from tests.core.negotiation.fleet import CALLER, START_US, TIMING, Bus, Costs, Machine, a_call, caller, fleet, terms
 
 #: Costs in ms after the deadline: near the floor, where delays differ, and far from it, where they hardly do.
 COSTS = st.one_of(st.integers(0, 3_000), st.integers(0, 200_000))
@@ -48,6 +49,18 @@ def test_p08_bids_strictly_improve_on_the_wire(costs: dict[int, int], latency_us
     bus.run(1.2)
     assert bus.assigned() == [min(costs, key=lambda node: (costs[node], node))]
     assert all(better(later, earlier) for earlier, later in itertools.pairwise(bus.bids()))
+
+
+@pytest.mark.parametrize(("before_us", "says"), [(10_000, True), (1_000, True), (0, False)])
+def test_p08_a_better_bid_is_said_until_two_guards_before_the_deadline(before_us: int, says: bool) -> None:
+    """Who can better what was heard does so until a bid might be heard behind the cut-off, and not from then on."""
+    (call, last_us) = a_call(), START_US + TIMING.call_window_us - 2 * TIMING.deadline_guard_us
+    machine, now_us = Machine(11, Costs({1: 0})), last_us - before_us
+    said = machine.receive(call, now_us)
+    due_us = machine.next_wake()
+    if due_us is not None and due_us < last_us:
+        said = machine.wake(due_us)
+    assert [one.sender for one in said if isinstance(one, Bid)] == [11][:says]
 
 
 def test_p08_without_slots_equal_bids_cross_on_the_wire() -> None:
