@@ -1,9 +1,9 @@
 """A place is one robot's: who has lost its place to another leaves its car elsewhere, and nobody brings a second."""
 
 from onboard.contract.codes import Grade, KindCode, LegAction, Reason, ShuttleMode
-from onboard.contract.messages import CarAt, Itinerary, Reference, Stamp
+from onboard.contract.messages import CarAt, Itinerary, Progress, Reference, Stamp
 from onboard.core.authority import station_token
-from onboard.core.effects import Halt, Record
+from onboard.core.effects import Record
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.core.site import Station
 from onboard.holon.holon import Holon
@@ -69,21 +69,31 @@ def test_the_older_plan_stays_where_it_is() -> None:
     assert places_of(board.plans[-1]) == [PLACE]
 
 
-def test_work_that_is_long_over_promises_no_place_and_nobody_goes_to_and_fro_between_two() -> None:
-    """A robot that has had nothing to do since says its last plan; on `large` three halted by it, a car each 15 s."""
+def test_work_that_is_behind_another_promises_no_place() -> None:
+    """A robot that has had nothing to do since keeps its last plan."""
     board = carrying()
     leave = StationWork(CarHandling.LEAVE, PLACE, RIVAL, 2_700, CALL)
-    over = [
+    over = CarStep(LegAction.WORK, 1, PLACE.index, PLACE.index, -81_000_000, -80_000_000, leave)
+    goes = CarStep(LegAction.TRAVEL, 1, PLACE.index, 12, -80_000_000, -79_000_000)
+    plan = to_itinerary(OTHER, 1, Grade.FIRM, Stamp(BUS_MS_MODULUS - 90_000, OTHER, 0), [over, goes])
+    before = len(board.plans)
+    board.hears(Progress(OTHER, 1, 1, 1, 12, 0, 0), plan)
+    board.lives(board.now_us + 1)
+    assert {(PLACE,)} == {tuple(places_of(one)) for one in board.plans[before - 1 :]}
+
+
+def test_who_finds_no_place_that_is_not_promised_keeps_its_own_and_goes_to_and_fro_between_none() -> None:
+    """Late work keeps a place for its robot, and keeps nobody from choosing it: robots of `large` halted by that."""
+    board = carrying()
+    leave = StationWork(CarHandling.LEAVE, PLACE, RIVAL, 2_700, CALL)
+    late = [
         CarStep(LegAction.WORK, 1, place.index, place.index, -81_000_000, -80_000_000, leave._replace(station=place))
         for place in SITE.places
     ]
-    stands = CarStep(LegAction.TRAVEL, 1, SITE.places[-1].index, 12, -80_000_000, -79_000_000)
-    stamp = Stamp(BUS_MS_MODULUS - 90_000, OTHER, 0)
     before = len(board.plans)
-    board.hears(to_itinerary(OTHER, 1, Grade.FIRM, stamp, [*over, stands]))
+    board.hears(to_itinerary(OTHER, 1, Grade.FIRM, Stamp(BUS_MS_MODULUS - 90_000, OTHER, 0), late))
     board.lives(board.now_us + 1)
-    assert {(PLACE,)} == {tuple(places_of(plan)) for plan in board.plans[before - 1 :]}
-    assert not [one for one in board.said if isinstance(one, Halt)]
+    assert {(PLACE,)} == {tuple(places_of(one)) for one in board.plans[before - 1 :]}
 
 
 def test_a_place_in_which_another_car_is_put_meanwhile_is_lost() -> None:

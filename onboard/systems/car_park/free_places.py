@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from onboard.contract.codes import LegAction
-from onboard.contract.messages import Itinerary
 from onboard.core.negotiation import CallKey
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Station
@@ -16,20 +15,6 @@ from onboard.ways.mirror import WayMirror
 
 #: How long past its planned end another robot's work still keeps its place promised: it may be late.
 PROMISE_GRACE_US = 60_000_000
-
-
-def promises(itinerary: Itinerary, station: Station, now_us: int) -> bool:
-    """Whether a plan will work at a station, or should have done so a moment ago; ``now_us`` is bus time in us."""
-    return station.number in _worked_at(itinerary, now_us)
-
-
-def _worked_at(itinerary: Itinerary, now_us: int) -> set[int]:
-    """Stations at which a plan still has work, by number."""
-    return {
-        Station(leg.track, leg.to_index, leg.side).number
-        for leg in itinerary.legs
-        if leg.action is LegAction.WORK and from_bus_ms(leg.end_ms, now_us) > now_us - PROMISE_GRACE_US
-    }
 
 
 @dataclass
@@ -50,8 +35,13 @@ class FreePlaces:
 
     def _promised(self, now_us: int, bid: CallKey | None) -> set[int]:
         """Places at which somebody's plan, or mine, will work: two parkings never aim at one place (row P42)."""
-        others = [one for node, one in self.mirror.itineraries.items() if node != self.node_id]
-        promised = {number for one in others for number in _worked_at(one, now_us)}
+        promised = {
+            Station(leg.track, leg.to_index, leg.side).number
+            for node, itinerary in self.mirror.itineraries.items()
+            if node != self.node_id
+            for leg in itinerary.legs
+            if leg.action is LegAction.WORK and from_bus_ms(leg.end_ms, now_us) > now_us - PROMISE_GRACE_US
+        }
         promised |= {work.station.number for work in self.program.works()}
         promised |= {solution.place.number for key, solution in self.tentative.items() if key != bid}
         return promised

@@ -297,7 +297,7 @@ class GoingAround:
         if changed == self._places_seen and not retries:
             return []
         self._places_seen, self._place_at_us = changed, None
-        for work in self.places.lost(now_us):
+        for work in self.places.lost():
             effects = self._choose_for(work, now_us)
             if effects:
                 return effects

@@ -6,13 +6,13 @@ lower stamp; the other leaves its car elsewhere. A place in which a car stands i
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from onboard.contract.messages import Itinerary
 from onboard.core.authority import station_token
 from onboard.core.serial import ranks_before
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park import custody
-from onboard.systems.car_park.free_places import promises
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.kept_out import works_at
@@ -37,20 +37,16 @@ class PlaceChoice:
     generation: CarParkGeneration
     shuttle: ShuttleWork
 
-    def lost(self, now_us: int) -> list[StationWork]:
+    def lost(self) -> list[StationWork]:
         """Cars in hand that cannot be left where it was planned, though there is a choice."""
         return [
-            work for work in self.generation.program.works() if self._may_choose(work) and self._is_lost(work, now_us)
+            work
+            for work in self.generation.program.works()
+            if work.handling is CarHandling.LEAVE
+            and class_of_end(work.call.to_station) is not None
+            and not self._is_begun(work)
+            and (custody.others_in(self.fleet.mirror, work.station, work.car) or self._is_anothers(work.station))
         ]
-
-    def _may_choose(self, work: StationWork) -> bool:
-        is_parked = work.handling is CarHandling.LEAVE and class_of_end(work.call.to_station) is not None
-        return is_parked and not self._is_begun(work)
-
-    def _is_lost(self, work: StationWork, now_us: int) -> bool:
-        return bool(custody.others_in(self.fleet.mirror, work.station, work.car)) or self._is_anothers(
-            work.station, now_us
-        )
 
     def moved(self) -> list[StationWork]:
         """Cars to be taken that stand at another place by now, which nobody knew when they were called for.
@@ -66,20 +62,23 @@ class PlaceChoice:
     def instead(self, work: StationWork, now_us: int) -> list[Station]:
         """Free places that nobody has promised, the nearest to where the car was to be left first."""
         free = self.generation.free.of(now_us, class_of_end(work.call.to_station) or ANY_CLASS)
-        return nearest([place for place in free if not self._is_anothers(place, now_us)], work.station.segment)
+        return nearest([place for place in free if not self._is_anothers(place)], work.station.segment)
 
     def _is_begun(self, work: StationWork) -> bool:
         return self.shuttle.work == work and self.shuttle.phase not in (HandlingPhase.ACQUIRE, HandlingPhase.DONE)
 
-    def _is_anothers(self, station: Station, now_us: int) -> bool:
-        """Whether another has its right, or has promised it before me: what is long over promises nothing."""
+    def _is_anothers(self, station: Station) -> bool:
+        """Whether another that is to work there has its right, or planned so before me."""
         me, mirror = self.fleet.node_id, self.fleet.mirror
         mine = mirror.itineraries.get(me)
         holder = self.fleet.tokens.holder_of(station_token(station))
         if holder == me or mine is None:
             return False
-        rivals = [one for one in mirror.itineraries.values() if one.sender != me and works_at(one, station)]
-        return any(
-            one.sender == holder or (promises(one, station, now_us) and ranks_before(one.stamp, mine.stamp))
-            for one in rivals
-        )
+        rivals = [one for one in mirror.itineraries.values() if one.sender != me and self._will_work(one, station)]
+        return any(one.sender == holder or ranks_before(one.stamp, mine.stamp) for one in rivals)
+
+    def _will_work(self, plan: Itinerary, station: Station) -> bool:
+        """Whether a plan has work there that is not behind its machine by that one's own word."""
+        told = self.fleet.mirror.progress.get(plan.sender)
+        behind = told.leg if told is not None and told.itinerary_version == plan.version else 0
+        return works_at(replace(plan, legs=plan.legs[behind:]), station)
