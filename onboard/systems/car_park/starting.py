@@ -237,13 +237,13 @@ class Starting:
     def _settle(self, now_us: int) -> list[Effect]:
         """Ask for what it is in; once the others were heard and the shuttle is at rest, go on where they agree."""
         assert self.place is not None
-        effects = self.body.carriage.advance(now_us)
         if not self._is_at_place:
             # Pushed away meanwhile, or may go no farther: what was said of the place is wrong.
             self._enter(StartEvent.PLACE_LOST)
             self.body.carriage.stay()
             self._due_us = self._run = None
-            return effects + self._find_place(now_us)
+            return self._find_place(now_us)
+        effects = self.body.carriage.advance(now_us)
         if self._due_us is not None and now_us < self._due_us:
             return effects
         self._due_us = None
