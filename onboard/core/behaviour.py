@@ -111,7 +111,7 @@ class Attentive(Protocol):
     """A behaviour that need not be called after every event: it knows what it waits for.
 
     It is called when it is due, and after each event that changed a right of its machine, or of which nothing here is
-    said. What it leaves out is proved by runs in which all is called always (``Holon.sweeps``).
+    said; a heartbeat of a mirror as mine it never hears. Runs in which all is called prove the rest (``sweeps``).
     """
 
     def looks_from(self) -> int:

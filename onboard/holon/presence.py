@@ -8,6 +8,7 @@ more machines speak another contract or know another site than speak its own, it
 """
 
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 
 from onboard.contract.codes import MachineState, Reason
 from onboard.contract.constants import MOBILE_KINDS, NOBODY, STILL
@@ -20,6 +21,8 @@ from onboard.core.site import Machine, Site
 SLEPT_BEATS = 2
 #: How long a machine that woke listens before it takes part, us: the others say what they plan.
 SETTLING_US = 2_000_000
+#: What a heartbeat says of its sender, whatever its mirror shows.
+_LIFE = attrgetter("contract", "site_digest", "boot", "kind", "state", "epoch")
 
 
 @dataclass
@@ -77,11 +80,12 @@ class Presence:
         False, and nothing is noted, where it may be news: the sender or I was not heard for long, or it is an obstacle.
         """
         peer = self.mirror.peers.get(beat.sender)
-        if peer is None or peer.beat != beat or now_us - peer.heard_at_us >= self.patience_us:
+        if peer is None or peer.beat is None or now_us - peer.heard_at_us >= self.patience_us:
             return False
-        if self.active_us is None or self.slept(now_us):
+        if peer.beat is not beat and _LIFE(peer.beat) != _LIFE(beat):
             return False
-        if beat.sender in self.mirror.aside or beat.sender in self.foreign or beat.sender in self.halts:
+        is_known = beat.sender in self.mirror.aside or beat.sender in self.foreign or beat.sender in self.halts
+        if is_known or self.active_us is None or self.slept(now_us):
             return False
         peer.heard_at_us = self.active_us = now_us
         return True

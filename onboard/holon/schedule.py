@@ -161,12 +161,10 @@ class Schedule:
 
     def lives_on(self, beat: Heartbeat, now_us: int) -> bool:
         """Note the time of a sign of life that says nothing new, and nothing else; False where it may be news."""
-        if now_us >= self.waits_until_us:
+        peer, is_quiet = self._unchanged.get(beat.sender), now_us < self.waits_until_us
+        if not is_quiet or peer is None or peer.beat is not beat or now_us - peer.heard_at_us > self._sleeps_after_us:
             self._unchanged.pop(beat.sender, None)
-            return False
-        peer = self._unchanged.get(beat.sender)
-        if peer is None or peer.beat is not beat or now_us - peer.heard_at_us > self._sleeps_after_us:
-            return self._is_unchanged(beat, now_us)
+            return is_quiet and self._is_unchanged(beat, now_us)
         # Who was heard so lately was neither silent nor heard by somebody who slept, or was deaf.
         peer.heard_at_us = now_us
         self.part.presence.active_us = now_us
@@ -175,10 +173,9 @@ class Schedule:
 
     def _is_unchanged(self, beat: Heartbeat, now_us: int) -> bool:
         if not self.part.lives_on(beat, now_us):
-            self._unchanged.pop(beat.sender, None)
             return False
         peer = self._unchanged[beat.sender] = self.fleet.mirror.peers[beat.sender]
-        peer.beat = beat
+        peer.beat, peer.mirror_digest = beat, beat.mirror_digest
         return True
 
     def _keep_unchanged(self) -> None:

@@ -59,14 +59,13 @@ class TakingPart:
     def lives_on(self, beat: Heartbeat, now_us: int) -> bool:
         """Take up a heartbeat that says nothing new to any part of this machine: it falls due as it did before.
 
-        Its sender said the same before, in this epoch, and was admitted; neither it nor I was silent since; it is no
-        obstacle; our mirrors agree; and it is not about who sends bus time. False, and nothing is taken up, elsewhere.
+        Its sender said the same before but for its mirror, in this epoch, and was admitted; neither it nor I was silent
+        since; it is no obstacle; our mirrors agree; and it is not about who sends bus time. False elsewhere.
         """
         if not self.deals or (self.time.clock.is_source and beat.sender < self.time.machine.node_id):
             return False
-        if self.change.strange(beat, self.regeneration.epoch) is not Reason.NONE or not self.witness.agrees(beat):
-            return False
-        if not self.presence.lives_on(beat, now_us):
+        is_usual = self.witness.agrees(beat) and self.change.strange(beat, self.regeneration.epoch) is Reason.NONE
+        if not is_usual or not self.presence.lives_on(beat, now_us):
             return False
         self.holding.heard(now_us)
         return True

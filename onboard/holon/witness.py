@@ -155,8 +155,8 @@ class Witness:
         return node not in self.tokens.asked and self._was_mine(self._apart.get(node, (-1,))[0], now_us)
 
     def agrees(self, beat: Heartbeat) -> bool:
-        """Whether a peer's mirror is as mine."""
-        return beat.mirror_digest == self.mirror.digest()
+        """Whether a peer's mirror is as mine, and was when it said so last."""
+        return beat.mirror_digest == self.mirror.digest() and beat.sender not in self._apart
 
     def heed(self, effects: list[Effect], now_us: int) -> bool:
         """Note my mirror's digest as it is after an event; True where words of mine among ``effects`` changed it."""

@@ -6,8 +6,29 @@ from dataclasses import dataclass, field, replace
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, Reason, TaskPhase, TokenKind
-from onboard.contract.messages import Halted, Heartbeat, Message, Progress, Reference, TaskReport, TokenGrant
+from onboard.contract.codes import (
+    CONTRACT_VERSION,
+    Grade,
+    KindCode,
+    LegAction,
+    MachineState,
+    Reason,
+    Side,
+    TaskPhase,
+    TokenKind,
+)
+from onboard.contract.messages import (
+    Halted,
+    Heartbeat,
+    Itinerary,
+    Leg,
+    Message,
+    Progress,
+    Reference,
+    Stamp,
+    TaskReport,
+    TokenGrant,
+)
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import NEVER_US, BehaviourFactory, Fleet, OverheardWord
 from onboard.core.effects import Effect
@@ -23,16 +44,22 @@ ME, PEER, OTHER = sorted(SITE.machines)[-1], sorted(SITE.machines)[0], sorted(SI
 
 
 @dataclass
-class Still(Plain):
-    """Counts how often it is asked to go on; ``looks``: whether it looks for something."""
+class Counted(Plain):
+    """Counts how often it is asked to go on, and says nothing of what it waits for."""
 
     asked: int = 0
-    looks: bool = False
-    heeded: list[Message] = field(default_factory=list)
 
     def advance(self, now_us: int) -> list[Effect]:
         self.asked += 1
         return []
+
+
+@dataclass
+class Still(Counted):
+    """Says what it waits for; ``looks``: whether it looks for something."""
+
+    looks: bool = False
+    heeded: list[Message] = field(default_factory=list)
 
     def looks_from(self) -> int:
         return 0 if self.looks else NEVER_US
@@ -45,7 +72,7 @@ class StillFactory(BehaviourFactory):
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
         return NoEstimator()
 
-    def behaviour(self, fleet: Fleet, estimator: Estimator) -> Still:
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> Counted:
         return Still(fleet, KindCode.ROBOT)
 
 
@@ -64,13 +91,18 @@ class ChoosyFactory(StillFactory):
         return Choosy(fleet, KindCode.ROBOT)
 
 
+class CountedFactory(StillFactory):
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> Counted:
+        return Counted(fleet, KindCode.ROBOT)
+
+
 class Bench:
     """One machine that has heard the same heartbeat of a peer twice."""
 
     def __init__(self, factory: BehaviourFactory | None = None) -> None:
         self.holon = Holon(SITE, SITE.machines[ME], factory or StillFactory())
-        assert isinstance(self.holon.behaviour, Still)
-        self.still = self.holon.behaviour
+        assert isinstance(self.holon.behaviour, Counted)
+        self.counted = self.holon.behaviour
         self.now_us = 1_000_000
         self.holon.start(self.now_us)
         kind = SITE.machines[PEER].kind
@@ -82,10 +114,16 @@ class Bench:
     def hear(self, message: Message, after_us: int = 10_000) -> int:
         """How often the behaviour was asked to go on because of a message."""
         self.now_us += after_us
-        asked = self.still.asked
+        asked = self.counted.asked
         self.holon.receive(message, self.now_us)
         self.holon.next_wake()
-        return self.still.asked - asked
+        return self.counted.asked - asked
+
+    @property
+    def still(self) -> Still:
+        """The behaviour, one that says what it waits for."""
+        assert isinstance(self.counted, Still)
+        return self.counted
 
     def looks(self) -> None:
         """It begins to look for something."""
@@ -135,6 +173,42 @@ def test_whatever_may_be_news_asks_the_machine_to_go_on(change: str) -> None:
     bench = Bench()
     CHANGES[change](bench)
     assert bench.hear(bench.beat) > 0
+
+
+def new_plan(bench: Bench) -> None:
+    """All hear of a plan, so that all mirrors are others than before, and the peer's next heartbeat says so."""
+    stamp = Stamp(1, OTHER, 0)
+    bench.hear(Itinerary(OTHER, 1, Grade.FIRM, stamp, (Leg(LegAction.STAND, 1, 1, 1, Side.NEAR, 1),)))
+    bench.beat = replace(bench.beat, mirror_digest=bench.holon.mirror.digest())
+
+
+def test_a_heartbeat_of_a_mirror_that_has_changed_as_mine_has_asks_nobody_to_go_on() -> None:
+    bench = Bench()
+    new_plan(bench)
+    assert bench.hear(bench.beat) == 0
+    assert bench.holon.mirror.peers[PEER].mirror_digest == bench.beat.mirror_digest
+    assert bench.holon.mirror.peers[PEER].heard_at_us == bench.holon.time.clock.bus_us(bench.now_us)
+
+
+def test_one_whose_mirror_was_compared_with_mine_is_news_when_it_is_equal_again() -> None:
+    bench = Bench()
+    bench.hear(replace(bench.beat, mirror_digest=4711))
+    bench.marked()
+    assert bench.hear(bench.beat) > 0
+    assert bench.hear(bench.beat) == 0
+
+
+def test_a_behaviour_that_says_nothing_of_what_it_waits_for_hears_of_each_new_mirror() -> None:
+    bench = Bench(CountedFactory())
+    new_plan(bench)
+    assert bench.hear(bench.beat) > 0
+
+
+def test_a_machine_that_says_again_what_it_said_before_another_word_is_believed() -> None:
+    bench = Bench()
+    bench.hear(replace(bench.beat, state=MachineState.WORKING))
+    assert bench.hear(bench.beat) > 0
+    assert bench.holon.mirror.peers[PEER].state is MachineState.IDLE
 
 
 def test_rights_of_another_epoch_are_no_sign_of_life_of_one_that_takes_part() -> None:
