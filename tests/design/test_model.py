@@ -13,7 +13,7 @@ from bus_sim.systems.car_park.design.options import Size, size_of
 from bus_sim.systems.car_park.design.servers import AlleyServer, LiftServer, Stretch
 from bus_sim.systems.car_park.design.ways import ModelTraffic, arrival_us
 from onboard.core.site import Segment
-from onboard.systems.car_park.site import CallAt, CarPark, car_park
+from onboard.systems.car_park.site import CallAt, CarPark, DeskPolicy, car_park
 
 #: The model is to be within this of the plant (issue of the tool).
 WITHIN = 0.15
@@ -67,6 +67,20 @@ def test_a_call_with_the_key_waits_longer() -> None:
     by_key = DayModel(replace(site, call_at=CallAt.KEY), demand, 1).play()
     on_arrival = DayModel(site, demand, 1).play()
     assert sum(by_key.in_us) + sum(by_key.out_us) > sum(on_arrival.in_us) + sum(on_arrival.out_us)
+
+
+def test_a_car_comes_to_the_bay_beside_it_where_the_site_says_so() -> None:
+    site, demand = park("standard"), Demand.by_mean(30, 15, 1, count=12)
+    nearest, anywhere = (
+        DayModel(replace(site, desk=one), demand, 1).play() for one in (DeskPolicy.NEAREST, DeskPolicy.ANY)
+    )
+    assert sum(nearest.out_us) < 0.9 * sum(anywhere.out_us)
+
+
+def test_who_asks_while_no_bay_has_room_is_served_when_one_has() -> None:
+    site, demand = park("standard"), Demand.by_mean(5, 1, 1, count=12)
+    found = DayModel(replace(site, desk=DeskPolicy.NEAREST), demand, 1).play()
+    assert len(found.gone_us) == len(demand.stays)
 
 
 def test_nobody_is_lost_where_a_park_is_filled_and_emptied() -> None:

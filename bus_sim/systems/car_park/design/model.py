@@ -15,8 +15,10 @@ from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.design.fleet import FleetModel, ServedCall
 from bus_sim.systems.car_park.plant.customer import REACTION_US
 from onboard.core.site import Segment, Station
+from onboard.systems.car_park.bay_generation import BEFORE_US, MOST_TAKEN
 from onboard.systems.car_park.pipeline import MOST_OUT, QUEUED_US
 from onboard.systems.car_park.site import CallAt, CarPark, DeskPolicy
+from onboard.ways.roads import roads_of
 from onboard.ways.site import BayUse
 
 #: From a call until its winner's plan is known, us: the call's window, and what is said after it.
@@ -61,6 +63,8 @@ class _BayModel:
     drivers: "deque[_Person]" = field(default_factory=deque)
     askers: "deque[_Person]" = field(default_factory=deque)
     people: int = 0
+    #: Cars that come out here and have not left yet.
+    taken: int = 0
     is_free: bool = True
     open_us: int = 0
     free_from_us: int = 0
@@ -88,6 +92,8 @@ class DayModel:
             _BayModel(node, station.segment, uses.get(node, BayUse.BOTH)) for node, station in site.compartments.items()
         ]
         self._bays.sort(key=lambda one: one.node)
+        #: Who has asked while no bay had room for one more car, where cars come to the bay that suits them.
+        self._waiting: deque[_Person] = deque()
         self._calls_on_arrival = site.call_at is CallAt.ARRIVAL and not site.classes and not site.measures_width
         self._events: list[tuple[int, int, Callable[[int], None]]] = []
         self._number = 0
@@ -127,10 +133,25 @@ class DayModel:
         bay.shown = self._number
         return bay
 
-    def _desk(self, person: _Person) -> _BayModel:
-        """Where a car comes: its own bay where the site says so; of policy ``nearest`` nothing is known here."""
+    def _desk(self, person: _Person, now_us: int) -> _BayModel | None:
+        """Where a car comes by the site's policy; None where no bay has room for one more."""
         is_own = self._site.desk is DeskPolicy.OWN and person.bay is not None and person.bay.use is not BayUse.ENTRY
-        return person.bay if is_own and person.bay is not None else self._choose(BayUse.ENTRY)
+        if is_own:
+            return person.bay
+        if self._site.desk is DeskPolicy.NEAREST and person.place is not None and person.stored_us <= now_us:
+            return self._nearest(person.place.segment)
+        return self._choose(BayUse.ENTRY)
+
+    def _nearest(self, place: Segment) -> _BayModel | None:
+        """The bay whose compartment would win the call for a car there (``BayGeneration``)."""
+        roads = roads_of(self._site)
+        open_to = [one for one in self._bays if one.use is not BayUse.ENTRY and one.taken < MOST_TAKEN]
+
+        def cost_us(bay: _BayModel) -> int:
+            before = len(bay.askers) + (not bay.is_free)
+            return roads.shortest_us(place, bay.front) + before * BEFORE_US
+
+        return min(open_to, key=lambda one: (cost_us(one), one.node), default=None)
 
     # --- people ------------------------------------------------------------------------------------------------
 
@@ -141,9 +162,17 @@ class DayModel:
         self._look(bay, now_us)
 
     def _ask(self, person: _Person, now_us: int) -> None:
-        bay = self._desk(person)
-        bay.people += 1
         person.asked_us = now_us
+        bay = self._desk(person, now_us)
+        if bay is None:
+            self._waiting.append(person)
+        else:
+            self._take(bay, person, now_us)
+
+    def _take(self, bay: _BayModel, person: _Person, now_us: int) -> None:
+        """A bay is to hand out a car."""
+        bay.people += 1
+        bay.taken += 1
         bay.askers.append(person)
         if person.stored_us > now_us:
             self._at(person.stored_us, lambda then_us: self._look(bay, then_us))
@@ -261,6 +290,9 @@ class DayModel:
 
     def _drive_away(self, bay: _BayModel, person: _Person, now_us: int) -> None:
         bay.people -= 1
+        bay.taken -= 1
         self._found.out_us.append(now_us - person.asked_us)
         self._found.gone_us.append(now_us)
         self._set_free(bay, now_us, now_us)
+        while self._waiting and (suits := self._desk(self._waiting[0], now_us)) is not None:
+            self._take(suits, self._waiting.popleft(), now_us)
