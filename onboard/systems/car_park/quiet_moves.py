@@ -51,8 +51,12 @@ LEAVE_ALONE_US = 600_000_000
 
 
 class Gain(NamedTuple):
-    """What moving a car to the best free place saves, us."""
+    """What moving a car to the best free place saves, us. The greatest is moved: of announced ones the first to come.
 
+    ``sooner_us``: how much sooner than ``FOREVER`` its driver said to come; 0 where nothing was said.
+    """
+
+    sooner_us: int
     saved_us: int
     car: Reference
     source: Station
@@ -215,7 +219,8 @@ class QuietMoves:
                 least_us[number] = min(costs, default=FOREVER)
             saved_us = fetch_us(park, source.segment, me) - least_us[number]
             if saved_us >= GAIN_US:
-                found.append(Gain(saved_us, car, source))
+                announced_us = self.stays.announced_us.get(car, FOREVER)
+                found.append(Gain(FOREVER - announced_us, saved_us, car, source))
         return found
 
     def _is_due(self, car: Reference, now_us: int) -> bool:
