@@ -23,7 +23,7 @@ from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import Entry
 from onboard.core.serial import to_bus_ms
 from onboard.holon.holon import Holon
-from onboard.systems.car_park.fetch_times import ASK_AGAIN_US, ASKS, MOST_AHEAD_US
+from onboard.systems.car_park.fetch_times import ASK_AGAIN_US, ASKS, MOST_AHEAD_US, NOTE_APART_US
 from onboard.systems.car_park.records import FetchTimeRecord
 from onboard.systems.car_park.stays import Stays
 from onboard.systems.registry import factory_for
@@ -156,6 +156,15 @@ def test_whoever_asks_for_a_car_that_came_in_here_is_answered_as_often_as_it_ask
     assert desk.hears(asked) == desk.hears(asked) == [at(LATER_S, FetchWord.NOTED)]
     gone = replace(asked, car=Reference(HERE, 9))
     assert desk.hears(gone) == [replace(gone, sender=HERE, fetch_word=FetchWord.NOT_INSIDE)]
+
+
+def test_who_changes_a_time_all_the_time_fills_no_disk() -> None:
+    desk = Desk()
+    for in_s in range(60, 120):
+        desk.hears(at(in_s, FetchWord.ASKED, sender=GATEWAY))
+    assert len(desk.entries) == 1
+    desk.until(desk.now_us + NOTE_APART_US)
+    assert desk.hears(at(LATER_S, FetchWord.ASKED, sender=GATEWAY)) == [at(LATER_S, FetchWord.NOTED)]
 
 
 def test_what_a_driver_says_counts_before_what_others_did_and_only_from_the_compartment_of_the_car() -> None:

@@ -25,6 +25,8 @@ from onboard.ways.mirror import WayFleet
 MOST_AHEAD_US = 7 * 24 * 3_600_000_000
 #: The other compartment is asked so often, so far apart, us, before the customer reads that it is silent.
 ASKS, ASK_AGAIN_US = 3, 1_000_000
+#: Times that come over the bus are noted so far apart, us, as each is a record on the disk; who asks asks again.
+NOTE_APART_US = 500_000
 
 
 @dataclass
@@ -48,6 +50,7 @@ class FetchTimes:
     known: dict[Reference, int] = field(init=False)
     asked: dict[Reference, AskedTime] = field(default_factory=dict)
     _is_learned: bool = False
+    _noted_us: int | None = None
 
     def __post_init__(self) -> None:
         self.known = dict(self.memory.fetch_times)
@@ -73,14 +76,24 @@ class FetchTimes:
             return []
         car, fetch_ms, is_asked = message.car, message.fetch_ms, message.fetch_word is FetchWord.ASKED
         if is_asked and car.origin == self.fleet.node_id:
-            word, noted = self._take(car, fetch_ms, now_us)
-            # Who asks again has not heard the answer.
-            return noted or [self._word(car, fetch_ms, word)]
+            return self._asked_for(car, fetch_ms, now_us)
         one = self.asked.get(car)
         if is_asked or one is None or message.sender != car.origin or one.fetch_ms != fetch_ms:
             return []
         del self.asked[car]
         return [self._answer(car, fetch_ms, message.fetch_word, now_us)]
+
+    def _asked_for(self, car: Reference, fetch_ms: int, now_us: int) -> list[Effect]:
+        if self.fleet.has_no_rights:
+            return []
+        is_soon = self._noted_us is not None and now_us < self._noted_us + NOTE_APART_US
+        is_new = self.known.get(car) != fetch_ms
+        if is_new and is_soon and self._judged(car, from_bus_ms(fetch_ms, now_us), now_us) is FetchWord.NOTED:
+            return []
+        word, noted = self._take(car, fetch_ms, now_us)
+        self._noted_us = now_us if noted else self._noted_us
+        # Who asks again has not heard the answer.
+        return noted or [self._word(car, fetch_ms, word)]
 
     def _take(self, car: Reference, fetch_ms: int, now_us: int) -> tuple[FetchWord, list[Effect]]:
         """Whether a time is noted, and what follows where it was not known."""
