@@ -1,7 +1,8 @@
 """What the choice of places costs those who fetch their cars in the evening, on working days of a table of sessions.
 
 Run: ``python bench/places.py SESSIONS.csv [--site standard] [--days 20] [--policies nearest,cost,...] [--keep FILE]``.
-A policy is a word of ``[negotiation] place``; with ``+moves`` cars are brought nearer in quiet hours as well. The days
+A policy is a word of ``[negotiation] place``; with ``+moves`` cars are brought nearer in quiet hours as well, with
+``+announced`` so and all customers say with their tickets when they will come, off by ``SIGMA_S``. The days
 are fixed by the table alone: so many working days, drawn by ``random.Random("evening peaks")``, and played in the order
 drawn, so that fewer of them are the first of the same. The evening peak is 15:00 to 19:00: who asks for a car then
 counts, from the ticket to driving out, and the metres of all robots in these hours, by customer who came or went. Each
@@ -19,14 +20,16 @@ from typing import NamedTuple
 
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.compare.plays import MIP, play
-from bus_sim.systems.car_park.demand import WHOLE_DAY, Demand
+from bus_sim.systems.car_park.demand import WHOLE_DAY, Announcements, Demand
 from bus_sim.systems.car_park.design.days import DayPlan, by_day, played
 from bus_sim.systems.car_park.window import HOUR_US, DayWindow
 from onboard.systems.car_park.site import CarPark, PlacePolicy, car_park
 
 DAYS, DRAWN_BY = 20, "evening peaks"
 PEAK = DayWindow(15 * HOUR_US, 19 * HOUR_US)
-MOVES = "+moves"
+MOVES, ANNOUNCED = "moves", "announced"
+#: What people say beforehand is off by so much, s, in standard deviation.
+SIGMA_S = 600.0
 BASE = "nearest"
 COLUMNS = (
     "place",
@@ -41,7 +44,7 @@ COLUMNS = (
     "empty",
     "not served, faults",
 )
-POLICIES = (BASE, "cost", "stay", "balanced", "random", "nearest+moves", "cost+moves")
+POLICIES = (BASE, "cost", "stay", "balanced", "random", "nearest+moves", "cost+moves", "nearest+announced")
 
 
 class Evening(NamedTuple):
@@ -68,13 +71,15 @@ def drawn(path: Path | None, site: CarPark, count: int) -> list[DayPlan]:
 
 def asked_for(site: CarPark, policy: str) -> CarPark:
     """The site with a policy's words."""
-    place, plus, _ = policy.partition("+")
-    return replace(site, place=PlacePolicy(place), quiet_moves=bool(plus))
+    place, _, word = policy.partition("+")
+    return replace(site, place=PlacePolicy(place), quiet_moves=word in (MOVES, ANNOUNCED))
 
 
 def evening(site: CarPark, policy: str, day: DayPlan) -> Evening:
     """Play one day up to the end of its peak."""
-    found = play(asked_for(site, policy), day.demand, MIP, day.seed, PEAK)
+    is_said = policy.endswith(f"+{ANNOUNCED}")
+    demand = Announcements(1.0, SIGMA_S).of(day.demand, day.seed) if is_said else day.demand
+    found = play(asked_for(site, policy), demand, MIP, day.seed, PEAK)
     ins, outs = len(found.in_us), len(found.out_us)
     in_s, out_s = sum(found.in_us) / max(1, ins) / 1e6, sum(found.out_us) / max(1, outs) / 1e6
     loaded_mm = found.travel_mm - found.empty_mm

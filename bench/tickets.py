@@ -42,7 +42,7 @@ def at_a_desk(guesses: int, chance: random.Random, codes: TicketCodes) -> Guessi
     node, station = next(iter(site.compartments.items()))
     drops: Counter[Reason] = Counter()
     outputs = BayOutputs(node, MotionAuthority(TokenBook(site, node)), station_token(station), codes)
-    slot, cars, now_us = TicketSlot(outputs, drops), 0, 0
+    slot, cars, now_us = TicketSlot(outputs, drops, lambda *_: []), 0, 0
 
     def fetch(_: DeskInput, __: Reference) -> list[Effect]:
         nonlocal cars

@@ -136,6 +136,14 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         metavar=("MEAN", "SIGMA"),
         help="with --random: intervals at which cars are fetched (default: as they come)",
     )
+    demand.add_argument(
+        "--announce",
+        nargs=2,
+        type=float,
+        metavar=("SHARE", "MINUTES"),
+        help="so large a share of the customers (0 to 1) says at the desk when the car will be fetched, off by this "
+        "standard deviation (default: nobody)",
+    )
     demand.add_argument("--cars", type=int, default=50, metavar="N", help="number of cars with --random (default: 50)")
     _add_when(run.add_argument_group("which part of the day (default: all of it where a site is named)"))
     how = run.add_argument_group("how it runs")

@@ -1,9 +1,9 @@
-"""The wire contract as data: five files of all systems, and what single systems add. This only finds the files."""
+"""The wire contract as data: six files of all systems, and what single systems add. This only finds the files."""
 
 from importlib.resources import files
 
 #: What is no single system's.
-_OF_ALL = ("fleet.dbc", "device.dbc", "seal.dbc", "battery.dbc", "change.dbc")
+_OF_ALL = ("fleet.dbc", "device.dbc", "seal.dbc", "battery.dbc", "change.dbc", "announce.dbc")
 
 
 def fleet_dbc_text() -> str:
@@ -29,6 +29,11 @@ def battery_dbc_text() -> str:
 def change_dbc_text() -> str:
     """Text of the word of a change of site on the fleet bus; said while an operator rolls one out, and never else."""
     return files(__name__).joinpath("change.dbc").read_text(encoding="utf-8")
+
+
+def announce_dbc_text() -> str:
+    """Text of what is said on both buses when a driver announces when the car will be fetched, and never else."""
+    return files(__name__).joinpath("announce.dbc").read_text(encoding="utf-8")
 
 
 def systems() -> list[str]:

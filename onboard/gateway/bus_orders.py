@@ -105,6 +105,12 @@ def refuse_load(body: dict[str, Any]) -> None:
         raise RefusedError("UNSUPPORTED", "loads have no names here", "$.load")
 
 
+def refuse_fetch_at(body: dict[str, Any]) -> None:
+    """Where nothing waits to be fetched. Raises ``RefusedError`` for a transport that announces when."""
+    if "fetch_at" in body:
+        raise RefusedError("UNSUPPORTED", "nothing is fetched later here; order it then", "$.fetch_at")
+
+
 def refuse_charging(body: dict[str, Any], why: str = "nothing is charged here; leave it out") -> None:
     """Raises ``RefusedError`` for a transport that asks for a place to charge."""
     if body.get("charging"):

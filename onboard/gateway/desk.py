@@ -22,6 +22,7 @@ from onboard.history.calls import CallOpened, CallRepeated
 from onboard.history.hands import HandTold
 from onboard.history.history import Fact
 from onboard.history.loads import LoadTold
+from onboard.history.system import SystemFact
 from onboard.history.tasks import TaskTold
 from onboard.ports.broker import Publication
 
@@ -37,7 +38,7 @@ _ERRORS = {
 }
 #: What an order's life tells of its task.
 _OF_TASK = ("task", "car", "promised", "ready", "spread_s", "ready_from", "ready_to")
-_HEARD = (CallOpened, CallRepeated, LoadTold, TaskTold)
+_HEARD = (CallOpened, CallRepeated, LoadTold, TaskTold, SystemFact)
 
 
 class GatewayDesk:

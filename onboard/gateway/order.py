@@ -19,7 +19,8 @@ class OrderRequest:
     ``is_open`` tells that it has a horizon, so that an update is to come (VDA 5050 2.1, section 6.6.4).
 
     ``node`` is the compartment or robot; ``number`` names a visit list on the bus (16 bits); ``urgent`` overtakes;
-    ``charging`` asks for a place at which the car that is parked is charged.
+    ``charging`` asks for a place at which the car that is parked is charged; ``fetch_us`` announces when ``car`` will
+    be fetched, wall time in us since 1970.
     """
 
     what: str
@@ -31,6 +32,7 @@ class OrderRequest:
     base: tuple[str, int] = ("", 0)
     is_open: bool = False
     charging: bool = False
+    fetch_us: int | None = None
 
 
 @dataclass(slots=True)
@@ -86,6 +88,7 @@ class GatewayOrder:
             before_us=self.before_us,
             charging=request.charging,
             giver=self.giver,
+            fetch_us=request.fetch_us,
         ).entry
 
 
@@ -101,6 +104,7 @@ def order_of(record: WishRecord) -> GatewayOrder:
         (record.base, record.sequence),
         record.open,
         record.charging,
+        record.fetch_us,
     )
     return GatewayOrder(
         record.name,

@@ -8,7 +8,6 @@ machines negotiate as ever.
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from datetime import datetime
 from typing import Any
 
 from onboard.contract.codes import TaskPhase
@@ -18,6 +17,7 @@ from onboard.core.serial import is_newer, successor
 from onboard.core.site import Site
 from onboard.gateway.bus_orders import LISTEN_US, BusOrders, RefusedError, is_robot
 from onboard.gateway.inbox import Incoming
+from onboard.gateway.moments import announced_us, moment_us
 from onboard.gateway.order import RANK, GatewayOrder, OrderRequest, order_of, same_content, with_number
 from onboard.gateway.records import OrderPhase, WishRecord
 from onboard.gateway.roles import Roles
@@ -133,10 +133,11 @@ class OrderBook:
             raise RefusedError("NO_ORDER", "an update of an order that is not known", "$.orderUpdateId")
         if len(self.open) >= MOST_OPEN:
             raise RefusedError("TOO_MANY", f"{MOST_OPEN} orders are open")
-        before_us = _moment_us(body.get("before"))
+        before_us = moment_us(body["before"], "$.before") if "before" in body else None
         if before_us is not None and before_us <= wall_us:
             raise RefusedError("TOO_LATE", "is past", "$.before")
-        order = GatewayOrder(name, self._request(incoming), content, before_us, update, giver=incoming.giver)
+        request = self._request(incoming, wall_us)
+        order = GatewayOrder(name, request, content, before_us, update, giver=incoming.giver)
         order.due_us = max(now_us, self._ready_us)
         self.book[name] = order
         outcome.changed.append(order)
@@ -170,9 +171,12 @@ class OrderBook:
         else:
             self._end(order, OrderPhase.DONE, "", "")
 
-    def _request(self, incoming: Incoming) -> OrderRequest:
+    def _request(self, incoming: Incoming, wall_us: int) -> OrderRequest:
         if incoming.kind == TRANSPORT:
             request = self._bus_orders.transport(incoming.body)
+            if "fetch_at" in incoming.body:
+                fetch_us = announced_us(incoming.body["fetch_at"], self._site, wall_us)
+                request = replace(request, fetch_us=fetch_us)
             self._bus_orders.check_role(request, self._roles.get(incoming.giver))
             return self._numbered(request)
         node = next((one.node_id for one in self._site.machines.values() if one.name == incoming.serial), 0)
@@ -305,16 +309,3 @@ def name_of(incoming: Incoming) -> str:
 def _essence(body: dict[str, Any]) -> list[tuple[str, Any]]:
     """What an order says, without what differs when it is sent again."""
     return sorted((key, repr(value)) for key, value in body.items() if key not in ("headerId", "timestamp"))
-
-
-def _moment_us(text: str | None) -> int | None:
-    """Wall time in us since 1970 of ISO 8601 with a time zone. Raises ``RefusedError``."""
-    if text is None:
-        return None
-    try:
-        moment = datetime.fromisoformat(text)
-    except ValueError:
-        moment = None
-    if moment is None or moment.tzinfo is None:
-        raise RefusedError("MALFORMED", "must be ISO 8601 with a time zone, such as 2026-03-01T16:30:00Z", "$.before")
-    return round(moment.timestamp() * 1_000_000)

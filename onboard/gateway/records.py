@@ -27,8 +27,9 @@ class OrderPhase(StrEnum):
 class WishRecord(JournalRecord):
     """A whole order as it stands now; the newest of a ``name`` counts.
 
-    ``before_us`` in wall time since 1970; ``ahead`` are further lists of stops with commas between; ``update`` counts
-    the giver's updates, ``sequence`` is that of the last node released, ``content`` a checksum of what was asked.
+    ``before_us`` and ``fetch_us`` in wall time since 1970; ``ahead`` are further lists of stops with commas between;
+    ``update`` counts the giver's updates, ``sequence`` is that of the last node released, ``content`` a checksum of
+    what was asked.
     """
 
     NAME = "order"
@@ -56,6 +57,7 @@ class WishRecord(JournalRecord):
     before_us: int | None = None
     charging: bool = False
     giver: str = ""
+    fetch_us: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

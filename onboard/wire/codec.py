@@ -21,7 +21,18 @@ from onboard.contract.messages import (
     ItineraryLeg,
     Message,
 )
-from onboard.contract.packing import battery, calls, change, device, plans, presence, rights, seal
+from onboard.contract.packing import (
+    announce,
+    announce_device,
+    battery,
+    calls,
+    change,
+    device,
+    plans,
+    presence,
+    rights,
+    seal,
+)
 from onboard.core.frame import Frame
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.wire.speakers import speakers_of
@@ -40,8 +51,9 @@ _FLEET = (
     *seal.FRAMES,
     *battery.FRAMES,
     *change.FRAMES,
+    *announce.FRAMES,
 )
-_DEVICE = device.FRAMES
+_DEVICE = (*device.FRAMES, *announce_device.FRAMES)
 #: ``Frame`` from a tuple of all its fields: half the time of naming those that are not as usual.
 _frame_of: Callable[[type[Frame], Any], Frame] = tuple.__new__
 

@@ -14,7 +14,15 @@ from cantools.database import Signal as DbcSignal
 from cantools.database.can.database import Database
 from cantools.database.namedsignalvalue import NamedSignalValue
 
-from dbc import battery_dbc_text, change_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text, system_dbc_text
+from dbc import (
+    announce_dbc_text,
+    battery_dbc_text,
+    change_dbc_text,
+    device_dbc_text,
+    fleet_dbc_text,
+    seal_dbc_text,
+    system_dbc_text,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,8 +161,8 @@ CONTROLLER = "Controller"
 
 @cache
 def fleet_layouts(system: str = "") -> tuple[MessageLayout, ...]:
-    """Layouts of the fleet bus: of all four files of all systems, and of what a system adds."""
-    beside = (*seal_layouts(), *battery_layouts(), *change_layouts())
+    """Layouts of the fleet bus: of all files of all systems, and of what a system adds."""
+    beside = (*seal_layouts(), *battery_layouts(), *change_layouts(), *announce_layouts()[0])
     return (*read_layouts(fleet_dbc_text()), *beside, *system_layouts(system)[0])
 
 
@@ -173,17 +181,26 @@ def change_layouts() -> tuple[MessageLayout, ...]:
     return read_layouts(change_dbc_text())
 
 
+def announce_layouts() -> tuple[tuple[MessageLayout, ...], tuple[MessageLayout, ...]]:
+    """What is said of announced times, on the fleet bus and on device buses: in the contract of every site."""
+    return _by_bus(announce_dbc_text())
+
+
 @cache
 def device_layouts(system: str = "") -> tuple[MessageLayout, ...]:
-    """Layouts of ``dbc/device.dbc``, and of what a system adds to the device buses of its machines."""
-    return (*read_layouts(device_dbc_text()), *system_layouts(system)[1])
+    """Layouts of the device buses: of all systems, and of what a system adds."""
+    return (*read_layouts(device_dbc_text()), *announce_layouts()[1], *system_layouts(system)[1])
 
 
 @cache
 def system_layouts(system: str) -> tuple[tuple[MessageLayout, ...], tuple[MessageLayout, ...]]:
     """What a system says beyond the two contracts of all: on the fleet bus, and on device buses."""
     text = system_dbc_text(system) if system else None
-    layouts = read_layouts(text) if text is not None else ()
+    return _by_bus(text) if text is not None else ((), ())
+
+
+def _by_bus(text: str) -> tuple[tuple[MessageLayout, ...], tuple[MessageLayout, ...]]:
+    layouts = read_layouts(text)
     device = tuple(one for one in layouts if CONTROLLER in (*one.senders, *one.receivers))
     return tuple(one for one in layouts if one not in device), device
 

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from dbc import (
+    announce_dbc_text,
     battery_dbc_text,
     change_dbc_text,
     device_dbc_text,
@@ -17,6 +18,7 @@ from dbc import (
 from onboard.wire.dbc_file import (
     MessageLayout,
     SignalLayout,
+    announce_layouts,
     battery_layouts,
     change_layouts,
     device_layouts,
@@ -72,7 +74,8 @@ def _link(name: str) -> str:
 def _value_tables() -> dict[tuple[tuple[int, str], ...], str]:
     """Name of each value table of the two contracts of all (``VAL_TABLE_``), by its content."""
     named: dict[tuple[tuple[int, str], ...], str] = {}
-    for text in (fleet_dbc_text(), device_dbc_text(), seal_dbc_text(), battery_dbc_text(), change_dbc_text()):
+    beside = (seal_dbc_text(), battery_dbc_text(), change_dbc_text(), announce_dbc_text())
+    for text in (fleet_dbc_text(), device_dbc_text(), *beside):
         named |= {choices: name for name, choices in read_annotations(text).tables.items()}
     return {**named, ((0, "NO"), (1, "YES")): "Answer"}
 
@@ -151,7 +154,8 @@ def network_page() -> str:
         *_bus("Seals on the fleet bus", seal_dbc_text(), seal_layouts()),
         *_bus("Batteries on the fleet bus", battery_dbc_text(), battery_layouts()),
         *_bus("A change of site on the fleet bus", change_dbc_text(), change_layouts()),
-        *_bus("Device bus", device_dbc_text(), device_layouts()),
+        *_bus("Device bus", device_dbc_text(), read_layouts(device_dbc_text())),
+        *_bus("Announced times on both buses", announce_dbc_text(), (*announce_layouts()[0], *announce_layouts()[1])),
     ]
     layouts = [*fleet_layouts(), *device_layouts()]
     for system in systems():

@@ -9,6 +9,7 @@ from cantools.database.can import Message as DbcMessage
 
 import dbc
 from dbc import (
+    announce_dbc_text,
     battery_dbc_text,
     change_dbc_text,
     device_dbc_text,
@@ -29,7 +30,7 @@ from tests.wire.samples import CODES, judge_of, message_of, random_value, signal
 
 FOLDER = Path(__file__).parents[2] / "onboard" / "contract"
 TEXTS = {"fleet": fleet_dbc_text(), "device": device_dbc_text(), "seal": seal_dbc_text()}
-TEXTS |= {"battery": battery_dbc_text(), "change": change_dbc_text()}
+TEXTS |= {"battery": battery_dbc_text(), "change": change_dbc_text(), "announce": announce_dbc_text()}
 OF_ALL = tuple(TEXTS)
 TEXTS |= {name: text for name in systems() if (text := system_dbc_text(name)) is not None}
 LAYOUTS = {(file, layout.name): layout for file, text in TEXTS.items() for layout in read_layouts(text)}

@@ -16,7 +16,7 @@ MADE_IN = {
 #: What controllers say to devices by which nothing moves: words to people, a program that is loaded, a question.
 STILL = {
     *("LightOrder", "DeskOrder", "OrderAnswer", "VisitAnswer", "MissionAnswer", "JobAnswer", "TransportAnswer"),
-    *("ProgramText", "ProgramEnd", "StateRequest", "TicketPrint", "DeskPromise"),
+    *("ProgramText", "ProgramEnd", "StateRequest", "TicketPrint", "DeskFetchAnswer", "DeskPromise"),
 }
 
 

@@ -9,6 +9,7 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.systems.car_park.plant.customer import VisitOutcome
 from onboard.config.site import parse_site, site_digest
+from onboard.contract.announce import FetchWord
 from onboard.contract.codes import CallResult, Operation, TaskPhase
 from onboard.contract.messages import Award, CallForProposals, CarAt, Reference, TaskReport
 from onboard.core.site import Station
@@ -166,3 +167,33 @@ def test_nobody_waits_for_a_move_for_ever() -> None:
     ((called_us, call),) = moves(found)
     void_us, _ = found.first(Award, lambda one: (one.task, one.result) == (call.task, CallResult.WITHDRAWN))
     assert abs(void_us - called_us - PATIENCE_US) < 1_000_000
+
+
+@cache
+def announcing(*stays_s: tuple[float, float]) -> Scene:
+    """Cars that nobody fetches yet; their drivers say at the desk when they will come, s."""
+    coming = stays(*((come_s, None) for come_s, _ in stays_s))
+    leaving = [replace(one, announced_us=round(s * 1e6)) for one, (_, s) in zip(coming.stays, stays_s, strict=True)]
+    found = play(site(), replace(coming, stays=tuple(leaving)), limit_s=900, extra_s=500)
+    found.assert_sound()
+    assert {one.visit.announced for one in found.simulation.plant.street.customers} == {FetchWord.NOTED}
+    return found
+
+
+#: Two cars upstairs, of which either is announced for the sooner.
+SECOND_FIRST, THIRD_FIRST = ((0, 20_000), (60, 2_400), (120, 2_700)), ((0, 20_000), (60, 2_700), (120, 2_400))
+
+
+def test_a_car_is_brought_nearer_before_the_time_that_its_driver_has_announced_and_not_hours_before() -> None:
+    assert {call.car for _, call in moves(announcing(*SECOND_FIRST))} == {CAR, Reference(1, 3)}
+    assert moves(announcing((0, 20_000), (60, 20_000), (120, 20_000))) == []
+
+
+def test_of_cars_that_are_announced_the_first_to_be_fetched_is_moved_first() -> None:
+    assert [one.car for _, one in moves(announcing(*SECOND_FIRST))][:1] == [CAR]
+    assert [one.car for _, one in moves(announcing(*THIRD_FIRST))][:1] == [Reference(1, 3)]
+
+
+def test_where_calls_come_often_only_cars_are_moved_that_are_announced_and_due() -> None:
+    found = announcing((0, 20_000), (60, 2_400), (100, 20_000), (230, 20_000), (450, 20_000))
+    assert {call.car for _, call in moves(found)} == {CAR}

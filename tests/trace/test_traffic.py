@@ -18,9 +18,10 @@ from onboard.trace.response import ANYBODY, Stream, fifo_bounds
 from onboard.wire.dbc_file import fleet_layouts
 
 #: Sent by gateways, to those who ask for everything again, or while rights are disputed, regenerated or stood still;
-#: seals and levels of batteries, which only sites that ask for them have; and while a site file is changed.
+#: seals and levels of batteries, which only sites that ask for them have; while a site file is changed; and what
+#: drivers announce.
 NOT_IN_OPERATION = {
-    "BatteryLevel", "SiteNext",
+    "BatteryLevel", "FetchTime", "SiteNext",
     "Go", "Halted", "LeftOut", "OperatorOrder", "Regeneration", "RegenerationState", "SyncDone", "SyncRequest",
     "Seal", "SealAnswer", "SealChallenge", "SealFault", "SealTo",
     "TokenAssigned", "TokenDispute", "TokenGiven", "TokenSeen",

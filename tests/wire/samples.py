@@ -10,14 +10,25 @@ import cantools
 from cantools.database.can import Database
 
 from onboard.contract.base import FrameCode, Message, Reference, Stamp
-from onboard.contract.packing import battery, calls, change, device, plans, presence, rights, seal
+from onboard.contract.packing import (
+    announce,
+    announce_device,
+    battery,
+    calls,
+    change,
+    device,
+    plans,
+    presence,
+    rights,
+    seal,
+)
 from onboard.systems.registry import own_names, part
 from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts
 
 #: Frames that every system has.
 SHARED: tuple[FrameCode, ...] = (
     *presence.FRAMES, *rights.FRAMES, *calls.FRAMES, *plans.FRAMES, *seal.FRAMES, *battery.FRAMES, *change.FRAMES,
-    *device.FRAMES,
+    *announce.FRAMES, *device.FRAMES, *announce_device.FRAMES,
 )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dbc import battery_dbc_text, change_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text
+from dbc import announce_dbc_text, battery_dbc_text, change_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text
 from onboard.contract.codes import (
     Criterion,
     Grade,
@@ -28,8 +28,8 @@ from tests.wire.samples import judge_of, layouts, message_of, random_frames, sig
 
 FLEET_NAMES = {layout.name for layout in fleet_layouts()}
 JUDGES = {
-    True: judge_of(fleet_dbc_text(), seal_dbc_text(), battery_dbc_text(), change_dbc_text()),
-    False: judge_of(device_dbc_text()),
+    True: judge_of(fleet_dbc_text(), seal_dbc_text(), battery_dbc_text(), change_dbc_text(), announce_dbc_text()),
+    False: judge_of(device_dbc_text(), announce_dbc_text()),
 }
 
 CALL = CallForProposals(

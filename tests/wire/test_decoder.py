@@ -9,7 +9,7 @@ from cantools.database.can import Database
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dbc import battery_dbc_text, change_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text
+from dbc import announce_dbc_text, battery_dbc_text, change_dbc_text, device_dbc_text, fleet_dbc_text, seal_dbc_text
 from onboard.contract.codes import Criterion, Grade, KindCode, LegAction, Operation, Reason, Side, TokenKind
 from onboard.contract.messages import (
     CallForProposals,
@@ -37,9 +37,9 @@ BUSES = {
     "fleet": (
         fleet_codec(),
         fleet_layouts(),
-        judge_of(fleet_dbc_text(), seal_dbc_text(), battery_dbc_text(), change_dbc_text()),
+        judge_of(fleet_dbc_text(), seal_dbc_text(), battery_dbc_text(), change_dbc_text(), announce_dbc_text()),
     ),
-    "device": (device_codec(), device_layouts(), judge_of(device_dbc_text())),
+    "device": (device_codec(), device_layouts(), judge_of(device_dbc_text(), announce_dbc_text())),
 }
 
 

@@ -8,7 +8,15 @@ from pathlib import Path
 
 from bus_sim.demand import DemandError
 from bus_sim.systems.car_park.csv_rows import CsvForm, at_most
-from bus_sim.systems.car_park.demand import LEVEL1_DAY, WHOLE_DAY, Demand, Stay, with_more_inside
+from bus_sim.systems.car_park.demand import (
+    LEVEL1_DAY,
+    MINUTE_S,
+    WHOLE_DAY,
+    Announcements,
+    Demand,
+    Stay,
+    with_more_inside,
+)
 from bus_sim.systems.car_park.mapping import table_form
 from bus_sim.systems.car_park.sizes import broken_limits, misfits
 from bus_sim.systems.car_park.window import with_eve
@@ -39,6 +47,8 @@ class ParkingDay:
     #: Mean and deviation of the intervals of arrivals; of departures too, unless ``random_out_s`` tells them.
     random_s: tuple[float, float] | None = None
     random_out_s: tuple[float, float] | None = None
+    #: Who says beforehand when the car will be fetched; None: nobody.
+    announced: Announcements | None = None
     cars: int = 50
     window: str | None = None
     #: Of what was before the window only who is still inside is played, shortly before it.
@@ -53,6 +63,11 @@ def choose_demand(day: ParkingDay, site: Site | None = None, seed: int = 1) -> D
     Unless told otherwise a site with several compartments gets the shipped day of all 52 stalls, any other that of
     level 1, which one compartment can serve.
     """
+    found = _chosen(day, site, seed)
+    return found if day.announced is None else day.announced.of(found, seed)
+
+
+def _chosen(day: ParkingDay, site: Site | None, seed: int) -> Demand:
     if day.by_hand:
         return Demand(())
     if day.one_car_s is not None:
@@ -147,11 +162,24 @@ def asked_day(args: Namespace, *, live: bool) -> ParkingDay:
         one_car_s=args.one_car,
         random_s=tuple(args.random) if args.random is not None else None,
         random_out_s=tuple(args.random_out) if args.random_out is not None else None,
+        announced=_announced(args),
         cars=args.cars,
         window=window,
         short_eve=True,
         by_hand=args.by_hand,
     )
+
+
+def _announced(args: Namespace) -> Announcements | None:
+    if args.announce is None:
+        return None
+    share, minutes = args.announce
+    announced = Announcements(share, minutes * MINUTE_S)
+    announced.check()
+    if args.by_hand:
+        given = f"--announce {share:g} {minutes:g}"
+        raise DemandError(f"{given}: does not go with --by-hand, where key f does it; leave it out")
+    return announced
 
 
 def asked_inside(args: Namespace) -> tuple[int, bool]:

@@ -18,6 +18,7 @@ from bus_sim.systems.car_park.plant.bodies import CarBody, random_car
 from bus_sim.systems.car_park.sessions import ParkingSession, nothing_chosen, read_sessions
 from onboard.systems.car_park.site import CarPark
 
+MINUTE_S, MINUTE_US = 60, 60_000_000
 #: What ships with the simulator, both 2019-07-24 (bus_sim/data/README.md): stalls AG-1F01 to AG-1F14, and all 52.
 LEVEL1_DAY = "acn_jpl_2019-07-24_level1.csv"
 WHOLE_DAY = "acn_jpl_2019-07-24.csv"
@@ -34,6 +35,8 @@ class Stay:
     departure_us: int | None
     car: CarBody
     cancel_us: int | None = None
+    #: When the driver says, on the day, that the car will be fetched; None: says nothing.
+    announced_us: int | None = None
 
 
 @dataclass(frozen=True)
@@ -171,6 +174,31 @@ class Demand:
             raise DemandError(f"stay {stay_s} s: must be 0 or more")
         departure_us = None if stay_s is None else round(stay_s * 1e6)
         return cls((Stay(0, departure_us, car or random_car("car 1", seed)),))
+
+
+@dataclass(frozen=True)
+class Announcements:
+    """``share`` of those who fetch their cars say beforehand when; ``sigma_s`` is how far off they are."""
+
+    share: float
+    sigma_s: float = 0.0
+
+    def check(self) -> None:
+        """Raise ``DemandError`` for a share that is none, or a negative deviation."""
+        if not (0 <= self.share <= 1 and self.sigma_s >= 0):
+            given = f"--announce {self.share:g} {self.sigma_s / MINUTE_S:g}"
+            raise DemandError(f"{given}: the share must be from 0 to 1, the deviation 0 min or more")
+
+    def of(self, demand: Demand, seed: int) -> Demand:
+        """The demand with what is announced: full minutes, as people say them, drawn apart from all else."""
+        return replace(demand, stays=tuple(self._said(stay, seed) for stay in demand.stays))
+
+    def _said(self, stay: Stay, seed: int) -> Stay:
+        chance = random.Random(f"announced:{seed}:{stay.car.name}")
+        is_said, off_us = chance.random() < self.share, chance.gauss(0, self.sigma_s) * 1e6
+        if stay.departure_us is None or not is_said:
+            return stay
+        return replace(stay, announced_us=round((stay.departure_us + off_us) / MINUTE_US) * MINUTE_US)
 
 
 def with_more_inside(demand: Demand, cars: int, seed: int) -> Demand:

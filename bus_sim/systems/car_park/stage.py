@@ -205,7 +205,7 @@ class CarParkStage(SystemStage[Plant]):
         if not self._coming.by_hand:
             return None
         options = self.run.options
-        return ByHand(self._street, options.seed, console, ends_with_pipe=options.web is None)
+        return ByHand(self._street, options.seed, console, ends_with_pipe=options.web is None, zero=self._coming.zero)
 
     def source(self) -> "RunSource":
         """The run as the page shows it, with the local time of its day."""

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dbc import (
+    announce_dbc_text,
     battery_dbc_text,
     change_dbc_text,
     device_dbc_text,
@@ -42,6 +43,8 @@ _ABOUT = {
     "seal": "Seals: proof of who said what on the fleet bus",
     "battery": "What machines with a battery tell of it on the fleet bus",
     "change": "The word of a change of site",
+    "announce": "When a car will be fetched, as its driver says beforehand",
+    "announce_device": "When a car will be fetched, as its driver says beforehand",
     "device": "What a machine says to its own drives, doors and sensors, and they to it",
 }
 
@@ -54,6 +57,7 @@ def contracts() -> tuple[DbcFile, ...]:
     found = [fleet, device, read_contract("seal", seal_dbc_text(), "seal", shared)]
     found.append(read_contract("battery", battery_dbc_text(), "battery", shared))
     found.append(read_contract("change", change_dbc_text(), "change", shared))
+    found.append(read_contract("announce", announce_dbc_text(), "announce", shared))
     for name in systems():
         text = system_dbc_text(name)
         assert text is not None

@@ -24,6 +24,7 @@ from onboard.systems.car_park.records import (
     BayJobRecord,
     CarAtRecord,
     DeskForRecord,
+    FetchTimeRecord,
     NumberRecord,
     ReceivedRecord,
     TicketGoneRecord,
@@ -100,6 +101,7 @@ _READ = (
     CarAtRecord,
     WinnerRecord,
     RetiredRecord,
+    FetchTimeRecord,
     TicketRecord,
     DeskForRecord,
     ReceivedRecord,
@@ -128,6 +130,8 @@ class BayMemory:
     desks: dict[Reference, tuple[Reference, int, int]] = field(default_factory=dict)
     #: Tickets read elsewhere that are served here: their task and its version.
     received: dict[Reference, tuple[Reference, int]] = field(default_factory=dict)
+    #: When cars that came in here will be fetched, as their drivers said, bus ms.
+    fetch_times: dict[Reference, int] = field(default_factory=dict)
     #: The last number that was given to a car or a task; 0 before any.
     number: int = 0
     #: Task, operation, car and wheelbase of the task in hand, or None.
@@ -155,11 +159,14 @@ class BayMemory:
                 self.cars[car] = CarAt(self.node_id, car, record.station, record.version, record.wheelbase_mm)
                 self.winners.pop(car, None)
                 if record.station == OUTSIDE:
+                    self.fetch_times.pop(car, None)
                     self._forget_ticket(car)
             case WinnerRecord():
                 self._take_winner(record)
             case RetiredRecord():
                 self._forget(record.load)
+            case FetchTimeRecord():
+                self.fetch_times[record.car] = record.fetch_ms
             case TicketRecord():
                 queue_ticket(self.tickets, record.car, urgent=record.urgent)
                 self.desks.pop(record.car, None)
@@ -209,7 +216,7 @@ class BayMemory:
 
     def _forget(self, car: Reference) -> None:
         """It left long ago."""
-        for table in (self.cars, self.winners, self.tasks, self.desks):
+        for table in (self.cars, self.winners, self.tasks, self.desks, self.fetch_times):
             table.pop(car, None)
         self._forget_ticket(car)
 

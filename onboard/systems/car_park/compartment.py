@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
+from onboard.contract.announce_device import DeskFetch
 from onboard.contract.codes import (
     CallResult,
     DeskInput,
@@ -90,7 +91,6 @@ class Compartment:
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
         self.outputs = BayOutputs(self.fleet.node_id, self.fleet.motion, station_token(self.station), self.codes)
-        self.slot = TicketSlot(self.outputs, self.fleet.drops)
         self._park = site = car_park(self.fleet.site)
         self._use = site.bay_uses.get(self.fleet.node_id, BayUse.BOTH)
         self._robots = CarParkGeneration(site, self.fleet.machine, self.fleet.mirror, Program(site))
@@ -100,6 +100,7 @@ class Compartment:
         self.calls = BayCalls(self.fleet, self.station, self.stewardship, self.memory, self._robots.floor, self._on_won)
         self.calls.take_up()
         self.pipeline = Pipeline(self.fleet, self._park, self.calls, self.memory, self.tickets, self.outputs)
+        self.slot = TicketSlot(self.outputs, self.fleet.drops, self.pipeline.times.at_desk)
         self.desks = DeskCalls(self.fleet, self._park, self.memory, self.generation, self.outputs, self.tickets)
         self.promises = Promises(self._park, self.generation, self.calls, self.tickets, self.outputs)
         self._table: dict[BayPhase, Callable[[int], list[Effect]]] = {
@@ -152,13 +153,13 @@ class Compartment:
             self.doors = message if isinstance(message, DoorState) else self.doors
             self.bay = message if isinstance(message, BayState) else self.bay
             return self.outputs.again(message, now_us)
-        if isinstance(message, DeskEvent | TicketRead):
+        if isinstance(message, DeskEvent | DeskFetch | TicketRead):
             return self.slot.take(message, now_us, partial(self._at_desk, now_us=now_us))
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Awards tell who may fetch a stored car; a car given into my custody is stated anew; an operator's press."""
-        return self.pipeline.moves.hear(message, now_us) + self._heard(message, now_us)
+        return self.pipeline.hear(message, now_us) + self._heard(message, now_us)
 
     def _heard(self, message: Message, now_us: int) -> list[Effect]:
         answered, lost = self.desks.hear(message, now_us)
@@ -246,6 +247,7 @@ class Compartment:
     def statements(self, now_us: int) -> list[Effect]:
         """The cars in my custody and the tokens that I hold."""
         told = self.desks.statements() + self.promises.statements()
+        told += self.pipeline.times.statements()
         return self.stewardship.car_statements() + self.fleet.tokens.statements() + told
 
     # --- the desk ----------------------------------------------------------------------------------------------

@@ -11,13 +11,14 @@ from dataclasses import dataclass, field
 
 from onboard.contract.codes import DeskText, Operation, Reason
 from onboard.contract.constants import ANY_STATION, NOBODY
-from onboard.contract.messages import BayState, Reference
+from onboard.contract.messages import BayState, Message, Reference
 from onboard.core.effects import Effect, Send
 from onboard.systems.car_park import bay_task, custody
 from onboard.systems.car_park.bay_calls import BayCalls
 from onboard.systems.car_park.bay_generation import DRIVER_US
 from onboard.systems.car_park.bay_memory import BayMemory, ahead_record
 from onboard.systems.car_park.bay_task import BayPhase, BayTask
+from onboard.systems.car_park.fetch_times import FetchTimes
 from onboard.systems.car_park.outage import Outage
 from onboard.systems.car_park.outputs import BayOutputs
 from onboard.systems.car_park.quiet_moves import QuietMoves
@@ -61,9 +62,11 @@ class Pipeline:
     _wanted_by: int = NOBODY
     outage: Outage = field(init=False)
     moves: QuietMoves = field(init=False)
+    times: FetchTimes = field(init=False)
 
     def __post_init__(self) -> None:
         self.moves = QuietMoves(self.fleet, self.park, self.calls, self.memory, self.tickets)
+        self.times = FetchTimes(self.fleet, self.memory, self.outputs, self.moves.stays)
         self.outage = Outage(self.fleet, self.calls, self.outputs, self.tickets)
 
     @property
@@ -71,10 +74,14 @@ class Pipeline:
         """Whether this site calls before the key, and before the bay is locked."""
         return self.park.call_at is CallAt.ARRIVAL
 
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """What is said of cars that are moved while nobody waits, and of when they will be fetched."""
+        return self.moves.hear(message, now_us) + self.times.hear(message, now_us)
+
     def next_wake(self, phase: BayPhase) -> int | None:
         """When whoever comes in has not pressed the key, an invited driver has not come, no robot does, or all rest."""
-        due = [one for one in (self._next_look(phase), self.moves.next_wake()) if one is not None]
-        return min(due, default=None)
+        due = (self._next_look(phase), self.moves.next_wake(), self.times.next_wake())
+        return min((one for one in due if one is not None), default=None)
 
     def _next_look(self, phase: BayPhase) -> int | None:
         if phase is BayPhase.ENTERING:
@@ -166,7 +173,7 @@ class Pipeline:
 
     def look_ahead(self, phase: BayPhase, bay: BayState, now_us: int) -> list[Effect]:
         """Call for who is next, tell who waits in vain, and use the time while nobody is here or waits."""
-        effects = self._look_ahead(phase, now_us) + self.outage.review(phase, now_us)
+        effects = self._look_ahead(phase, now_us) + self.outage.review(phase, now_us) + self.times.review(now_us)
         return effects + self.moves.review(phase, now_us, is_empty=not (bay.load_kg or bay.person_inside))
 
     def _look_ahead(self, phase: BayPhase, now_us: int) -> list[Effect]:

@@ -42,6 +42,9 @@ LOOK_AGAIN_US = 30_000_000
 #: A car is moved when it is expected to be fetched within so long, us: an earlier move is as good, but its place may be
 #: wanted by others until then. Whose driver nothing is known of counts as one who may come at any time.
 AHEAD_US = 2 * 3_600_000_000
+#: The same where its driver has said when, us: people are off by some ten minutes, and a near place that is taken
+#: sooner is not there for who comes before. Such a move is made in busy times too: what it saves is sure, and soon.
+ANNOUNCED_AHEAD_US = 45 * 60_000_000
 #: So often a car is moved at most: each time is a risk for it, and metres.
 MOST_MOVES = 2
 #: A move that is not over by then is taken back, us: the longest ways of the shipped sites take half of it.
@@ -51,8 +54,12 @@ LEAVE_ALONE_US = 600_000_000
 
 
 class Gain(NamedTuple):
-    """What moving a car to the best free place saves, us."""
+    """What moving a car to the best free place saves, us. The greatest is moved: of announced ones the first to come.
 
+    ``sooner_us``: how much sooner than ``FOREVER`` its driver said to come; 0 where nothing was said.
+    """
+
+    sooner_us: int
     saved_us: int
     car: Reference
     source: Station
@@ -190,24 +197,25 @@ class QuietMoves:
             self._quiet_from_us = now_us + self._rest_us
         if not is_due or self.task is not None or not self.fleet.tokens.is_synced:
             return []
-        if len(self._wanted) == BUSY_CALLS and now_us < self._wanted[0][1] + BUSY_US:
+        is_busy = len(self._wanted) == BUSY_CALLS and now_us < self._wanted[0][1] + BUSY_US
+        if is_busy and not self.stays.announced_us:
             self._quiet_from_us = max(self._quiet_from_us, self._wanted[0][1] + BUSY_US)
             return []
         at_work = sum(_is_at_work(plan, now_us) for plan in self.fleet.mirror.itineraries.values())
-        best = max(self._gains(now_us), default=None) if at_work <= self._most_at_work else None
+        best = max(self._gains(now_us, is_busy=is_busy), default=None) if at_work <= self._most_at_work else None
         if best is None:
             self._quiet_from_us = now_us + LOOK_AGAIN_US
             return []
         return self._call_for(best, now_us)
 
-    def _gains(self, now_us: int) -> list[Gain]:
-        """Cars of this compartment that are to be fetched soon, and could stand nearer."""
+    def _gains(self, now_us: int, *, is_busy: bool) -> list[Gain]:
+        """Cars of this compartment that are to be fetched soon, and could stand nearer; in busy times if announced."""
         me, park = self.fleet.node_id, self.park
         least_us: dict[int, int] = {}
         found = []
         for car in list(self.fleet.mirror.cars):
             source = custody.place_of(self.fleet, car) if car.origin == me else None
-            if source is None or not self._is_due(car, now_us):
+            if source is None or not self._is_due(car, now_us) or (is_busy and car not in self.stays.announced_us):
                 continue
             number = park.place_class.get(source.number, ANY_CLASS)
             if number not in least_us:
@@ -215,14 +223,16 @@ class QuietMoves:
                 least_us[number] = min(costs, default=FOREVER)
             saved_us = fetch_us(park, source.segment, me) - least_us[number]
             if saved_us >= GAIN_US:
-                found.append(Gain(saved_us, car, source))
+                announced_us = self.stays.announced_us.get(car, FOREVER)
+                found.append(Gain(FOREVER - announced_us, saved_us, car, source))
         return found
 
     def _is_due(self, car: Reference, now_us: int) -> bool:
         if self._moved.get(car, 0) >= MOST_MOVES or self._alone_until_us.get(car, now_us) > now_us:
             return False
         fetched_us = self.stays.fetched_us(car)
-        return fetched_us is None or fetched_us <= now_us + AHEAD_US
+        ahead_us = ANNOUNCED_AHEAD_US if car in self.stays.announced_us else AHEAD_US
+        return fetched_us is None or fetched_us <= now_us + ahead_us
 
     def _call_for(self, best: Gain, now_us: int) -> list[Effect]:
         name, number = self.memory.next_reference(self.fleet)

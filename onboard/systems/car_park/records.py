@@ -154,6 +154,16 @@ class WinnerRecord(CarRecord):
 
 
 @dataclass(frozen=True, slots=True)
+class FetchTimeRecord(CarRecord):
+    """When the driver of a car that came in here means to come for it, bus ms."""
+
+    NAME = "fetch_time"
+    RULES = (Keep("fetch_time", _CAR),)
+
+    fetch_ms: int
+
+
+@dataclass(frozen=True, slots=True)
 class TicketRecord(JournalRecord):
     """A ticket came, or is this bay's to serve; an urgent one goes before those that wait."""
 
@@ -299,6 +309,7 @@ RECORDS: RecordTypes = (
     FloorRecord,
     CarAtRecord,
     WinnerRecord,
+    FetchTimeRecord,
     TicketRecord,
     DeskForRecord,
     ReceivedRecord,

@@ -1,4 +1,4 @@
-"""How long cars stay, learned from what the bus tells: by the hour in which they came.
+"""How long cars stay, learned from what the bus tells: by the hour in which they came, or as their drivers say it.
 
 The hour is that of bus time in a day of 24 hours: no wall clock is needed, only that people's days are alike. Each
 machine learns by itself, from power-up on, and nothing is said of it; so two may differ, and only in their own choice.
@@ -7,8 +7,10 @@ machine learns by itself, from power-up on, and nothing is said of it; so two ma
 from collections import deque
 from dataclasses import dataclass, field
 
+from onboard.contract.announce import FetchTime, FetchWord
 from onboard.contract.constants import ANY_STATION, OUTSIDE
 from onboard.contract.messages import CarAt, Message, Reference
+from onboard.core.serial import from_bus_ms
 
 HOUR_US = 3_600_000_000
 _HOURS = 24
@@ -25,13 +27,22 @@ class Stays:
     """What one machine has heard of cars that came and went. Times are bus time in us."""
 
     _since_us: dict[Reference, int] = field(default_factory=dict)
+    #: When drivers mean to come for their cars, as the compartments have it at which these came in.
+    announced_us: dict[Reference, int] = field(default_factory=dict)
     _of_hour: dict[int, deque[int]] = field(default_factory=dict)
     _of_all: deque[int] = field(default_factory=lambda: deque(maxlen=MOST_OF_ALL))
     #: Most cars that were inside at one time.
     most: int = 0
 
     def hear(self, message: Message, now_us: int) -> None:
-        """A car is somewhere inside for the first time, or has left."""
+        """A car is somewhere inside for the first time, or has left; or when its driver will come for it."""
+        if isinstance(message, FetchTime):
+            if message.fetch_word is FetchWord.NOTED and message.sender == message.car.origin:
+                self.announced_us.pop(message.car, None)
+                self.announced_us[message.car] = from_bus_ms(message.fetch_ms, now_us)
+                while len(self.announced_us) > MOST_CARS:
+                    del self.announced_us[next(iter(self.announced_us))]
+            return
         if not isinstance(message, CarAt) or message.station == ANY_STATION:
             return
         if message.station != OUTSIDE:
@@ -40,6 +51,7 @@ class Stays:
                 del self._since_us[next(iter(self._since_us))]
             self.most = max(self.most, len(self._since_us))
             return
+        self.announced_us.pop(message.car, None)
         since_us = self._since_us.pop(message.car, None)
         if since_us is not None:
             self._of_hour.setdefault(_hour(since_us), deque(maxlen=MOST_OF_HOUR)).append(now_us - since_us)
@@ -52,7 +64,9 @@ class Stays:
         return sum(stays) // len(stays) if stays else None
 
     def fetched_us(self, car: Reference) -> int | None:
-        """When a car is likely to be fetched; None where nothing is known."""
+        """When a car is likely to be fetched: as its driver said, else as others were; None where nothing is known."""
+        if car in self.announced_us:
+            return self.announced_us[car]
         since_us = self._since_us.get(car)
         stays_us = None if since_us is None else self.expected_us(since_us)
         return None if since_us is None or stays_us is None else since_us + stays_us

@@ -4,6 +4,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from onboard.contract.announce_device import DeskFetch
 from onboard.contract.codes import DeskInput, DeskText, Reason
 from onboard.contract.messages import DeskEvent, Reference, TicketRead
 from onboard.core.effects import Effect, Report
@@ -31,14 +32,16 @@ class TicketSlot:
 
     outputs: BayOutputs
     drops: Counter[Reason]
+    #: What is made of a right ticket whose driver says in how many seconds the car will be fetched; bus us.
+    announced: Callable[[Reference, int, int], list[Effect]]
     _halves: TicketHalves = field(default_factory=TicketHalves)
-    _waiting: DeskEvent | None = None
+    _waiting: DeskEvent | DeskFetch | None = None
     _last: int | None = None
     _wrong_us: deque[int] = field(default_factory=lambda: deque(maxlen=MOST_WRONG))
     _locked_until_us: int | None = None
 
     def take(
-        self, word: DeskEvent | TicketRead, now_us: int, act: Callable[[DeskInput, Reference], list[Effect]]
+        self, word: DeskEvent | DeskFetch | TicketRead, now_us: int, act: Callable[[DeskInput, Reference], list[Effect]]
     ) -> list[Effect]:
         """What ``act`` makes of a key or a car, where this word completes an act that counts; else what is shown.
 
@@ -47,11 +50,15 @@ class TicketSlot:
         found = self._whole(word)
         if found is None:
             return []
-        event, ticket = found
-        refusal = self._refusal(ticket, now_us) if event in _WITH_TICKET else []
-        return refusal or act(event, ticket.car)
+        done, ticket = found
+        refusal = self._refusal(ticket, now_us) if _has_ticket(done) else []
+        if refusal:
+            return refusal
+        if isinstance(done, DeskFetch):
+            return self.announced(ticket.car, done.in_s, now_us)
+        return act(done.event, ticket.car)
 
-    def _whole(self, word: DeskEvent | TicketRead) -> tuple[DeskInput, Ticket] | None:
+    def _whole(self, word: DeskEvent | DeskFetch | TicketRead) -> tuple[DeskEvent | DeskFetch, Ticket] | None:
         if isinstance(word, TicketRead):
             self._halves.take(word)
         elif word.sequence != self._last:
@@ -59,11 +66,11 @@ class TicketSlot:
         act = self._waiting
         if act is None:
             return None
-        code = self._halves.code(act.sequence) if act.event in _WITH_TICKET else 0
+        code = self._halves.code(act.sequence) if _has_ticket(act) else 0
         if code is None:
             return None
         self._waiting, self._last = None, act.sequence
-        return act.event, Ticket(act.car, code)
+        return act, Ticket(act.car, code)
 
     def _refusal(self, ticket: Ticket, now_us: int) -> list[Effect]:
         """Empty for a right ticket at an open slot. Whether a car of this number is here is not told."""
@@ -82,3 +89,7 @@ class TicketSlot:
         self.drops[Reason.NOT_AUTHORISED] += 1
         said = f"{MOST_WRONG} wrong tickets: this desk takes none for {LOCKED_US // 1_000_000} s"
         return [Report(said), self.outputs.show(DeskText.TOO_MANY_TRIES, ticket.car)]
+
+
+def _has_ticket(act: DeskEvent | DeskFetch) -> bool:
+    return isinstance(act, DeskFetch) or act.event in _WITH_TICKET

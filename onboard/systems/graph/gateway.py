@@ -6,7 +6,15 @@ from typing import Any
 from onboard.contract.codes import KindCode
 from onboard.contract.graph import VisitList
 from onboard.contract.messages import Message
-from onboard.gateway.bus_orders import BusOrders, NoBusOrders, OrderMessages, RefusedError, refuse_charging, refuse_load
+from onboard.gateway.bus_orders import (
+    BusOrders,
+    NoBusOrders,
+    OrderMessages,
+    RefusedError,
+    refuse_charging,
+    refuse_fetch_at,
+    refuse_load,
+)
 from onboard.gateway.edge import PhysicalLimits, SystemEdge
 from onboard.gateway.order import GatewayOrder, OrderRequest
 from onboard.gateway.positions import MachinePosition, Tracker
@@ -34,6 +42,7 @@ class GraphOrders(NoBusOrders):
             raise RefusedError("UNSUPPORTED", "this site has no desk that calls for a transport")
         refuse_load(body)
         refuse_charging(body)
+        refuse_fetch_at(body)
         if "car" in body:
             raise RefusedError("UNSUPPORTED", "loads have no names here; say from where to where", "$.car")
         for key in ("from", "to"):

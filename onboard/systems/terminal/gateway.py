@@ -5,7 +5,14 @@ from typing import Any
 
 from onboard.contract.messages import Message
 from onboard.contract.terminal import BoxOrder
-from onboard.gateway.bus_orders import BusOrders, NoBusOrders, OrderMessages, RefusedError, refuse_charging
+from onboard.gateway.bus_orders import (
+    BusOrders,
+    NoBusOrders,
+    OrderMessages,
+    RefusedError,
+    refuse_charging,
+    refuse_fetch_at,
+)
 from onboard.gateway.edge import SystemEdge
 from onboard.gateway.order import GatewayOrder, OrderRequest
 from onboard.gateway.positions import MachinePosition, Tracker
@@ -35,6 +42,7 @@ class TerminalOrders(NoBusOrders):
     def transport(self, body: dict[str, Any]) -> OrderRequest:
         """``load``, a box by its name, ``to`` a station."""
         refuse_charging(body)
+        refuse_fetch_at(body)
         for key in ("load", "to"):
             if key not in body:
                 raise RefusedError("INCOMPLETE", "name the box and the station", f"$.{key}")

@@ -11,6 +11,7 @@ from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.bodies import CarBody
 from bus_sim.systems.car_park.plant.door import Door
 from bus_sim.systems.car_park.plant.world import BayBody, CarParkWorld, WorldChange
+from onboard.contract.announce_device import DeskFetch, DeskFetchAnswer
 from onboard.contract.car_park_device import DeskPromise
 from onboard.contract.codes import DeskInput, DeskText, DoorName, DoorPosition, LightColour
 from onboard.contract.messages import (
@@ -68,6 +69,7 @@ class CompartmentPlant:
         self._watchers: list[Callable[[], None]] = []
         self._desk_watchers: list[Callable[[DeskText, Reference], None]] = []
         self._promise_watchers: list[Callable[[DeskPromise], None]] = []
+        self._answer_watchers: list[Callable[[DeskFetchAnswer], None]] = []
         travel_us = car_park(site).timing.door_us
         self._sees_width = car_park(site).measures_width
         self.doors = {
@@ -131,6 +133,10 @@ class CompartmentPlant:
         """Call ``watcher`` with every promise shown."""
         self._promise_watchers.append(watcher)
 
+    def watch_answers(self, watcher: Callable[[DeskFetchAnswer], None]) -> None:
+        """Call ``watcher`` with what is shown of every announced time."""
+        self._answer_watchers.append(watcher)
+
     # --- what people do at the desk ----------------------------------------------------------------------------
 
     def press_key(self, *, charging: bool = False) -> None:
@@ -150,6 +156,14 @@ class CompartmentPlant:
         """The cancel key with a ticket in the slot: "I want it back at once"."""
         self._desk_event(DeskInput.CANCEL, ticket.car, ticket)
 
+    def announce(self, ticket: Ticket, in_s: int) -> None:
+        """A ticket is shown, and its driver says in how many seconds the car will be fetched."""
+        self._desk_sequence = successor(self._desk_sequence, 8)
+        said = DeskFetch(self.node_id, self._desk_sequence, ticket.car, in_s)
+        self._say_act(said, ticket)
+        for time in range(1, DESK_TIMES):
+            self._timers.call_at(self._timers.now_us() + time * DESK_GAP_US, lambda: self._say_act(said, ticket))
+
     def _desk_event(self, event: DeskInput, car: Reference, ticket: Ticket | None = None) -> None:
         self._desk_sequence = successor(self._desk_sequence, 8)
         said, was_read = DeskEvent(self.node_id, self._desk_sequence, event, car), self._read
@@ -160,7 +174,7 @@ class CompartmentPlant:
         for time in range(1, DESK_TIMES):
             self._timers.call_at(self._timers.now_us() + time * DESK_GAP_US, lambda: self._say_act(said, ticket))
 
-    def _say_act(self, said: DeskEvent, ticket: Ticket | None) -> None:
+    def _say_act(self, said: DeskEvent | DeskFetch, ticket: Ticket | None) -> None:
         if ticket is not None:
             self._say_code(said.sequence, ticket)
         self._link.send(said)
@@ -188,6 +202,9 @@ class CompartmentPlant:
         elif isinstance(message, DeskPromise):
             for watcher in self._promise_watchers:
                 watcher(message)
+        elif isinstance(message, DeskFetchAnswer):
+            for answered in self._answer_watchers:
+                answered(message)
 
     def _obey(self, order: DeskOrder) -> None:
         code = self._halves.code(order.sequence)

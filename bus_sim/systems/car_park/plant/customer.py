@@ -17,6 +17,7 @@ from bus_sim.systems.car_park.plant.compartment import CompartmentPlant
 from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.rules import PlantRule
 from bus_sim.systems.car_park.plant.world import CarParkWorld
+from onboard.contract.announce import FetchWord
 from onboard.systems.car_park.tickets import Ticket
 
 #: From seeing that one may go to going, us: a person's reaction.
@@ -134,6 +135,8 @@ class CustomerVisit:
     ready_us: int | None = None
     gone_us: int | None = None
     promised: WordAtDesk | None = None
+    #: What the desk answered last to a time that was announced; ASKED until then.
+    announced: FetchWord | None = None
 
     @property
     def in_wait_us(self) -> int | None:
@@ -190,6 +193,8 @@ class Customer:
         self._timer: Timer | None = None
         self._tries = 0
         self._leave_us: int | None = None
+        self._announced_us: int | None = None
+        self._answered: Callable[[FetchWord], None] = lambda _: None
         self._refusal = VisitOutcome.SERVED
 
     def begin(self, origin_us: int) -> None:
@@ -197,6 +202,8 @@ class Customer:
         self._timers.call_at(origin_us + self.stay.arrival_us, lambda: self.on(CustomerEvent.ARRIVE))
         if self.stay.departure_us is not None:
             self._leave_us = origin_us + self.stay.departure_us
+        if self.stay.announced_us is not None:
+            self._announced_us = origin_us + self.stay.announced_us
         if self.stay.cancel_us is not None:
             self._timers.call_at(origin_us + self.stay.cancel_us, lambda: self.on(CustomerEvent.CANCEL))
 
@@ -240,6 +247,22 @@ class Customer:
             now_us = self._timers.now_us()
             self.visit.promised = WordAtDesk(now_us, now_us + in_us, spread_us)
 
+    def announce(self, fetch_us: int, answered: Callable[[FetchWord], None] = lambda _: None) -> None:
+        """Say at the desk when the car will be fetched, loop time; ``answered`` is called with what it shows.
+
+        Nothing is said without a ticket, or of a time that is past.
+        """
+        self._answered = answered
+        in_s = (fetch_us - self._timers.now_us()) // 1_000_000
+        if self.ticket is not None and not self.has_lost_ticket and in_s > 0:
+            self.visit.announced = FetchWord.ASKED
+            self._place.announce(self.ticket, in_s)
+
+    def reads_answer(self, word: FetchWord) -> None:
+        """What the desk shows of the time that was announced."""
+        self.visit.announced = word
+        self._answered(word)
+
     @property
     def _place(self) -> CompartmentPlant:
         if self.compartment is None:
@@ -281,6 +304,9 @@ class Customer:
     def _walk_out(self) -> None:
         walk_us = self._draw_us(WALK_S)
         self._wait(walk_us)
+        if self._announced_us is not None:
+            announced_us = self._announced_us
+            self._timers.call_at(self._timers.now_us() + REACTION_US, lambda: self.announce(announced_us))
         if self._leave_us is not None:
             leave_us = max(self._leave_us, self._timers.now_us() + walk_us)
             self._timers.call_at(leave_us - READ_US, self._let_read)

@@ -10,6 +10,7 @@ from bus_sim.systems.car_park.plant.compartment import CompartmentPlant
 from bus_sim.systems.car_park.plant.customer import REACTION_US, Customer, CustomerEvent, CustomerState, VisitOutcome
 from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.world import CarParkWorld
+from onboard.contract.announce_device import DeskFetchAnswer
 from onboard.contract.car_park_device import DeskPromise
 from onboard.contract.codes import DeskText
 from onboard.contract.messages import Reference
@@ -84,6 +85,7 @@ class Street:
             compartment.watch(partial(self._look, node_id))
             compartment.watch_desk(partial(self._read, node_id))
             compartment.watch_promises(self._read_when)
+            compartment.watch_answers(self._read_answer)
 
     def watch(self, watcher: Callable[[Customer], None]) -> None:
         """Call ``watcher`` after each step of a customer, once it is clear who waits where."""
@@ -238,6 +240,11 @@ class Street:
         reader = self._by_ticket.get(word.car)
         if reader is not None:
             reader.reads_when(word.in_ms * 1_000, word.spread_ms * 1_000)
+
+    def _read_answer(self, word: DeskFetchAnswer) -> None:
+        reader = self._by_ticket.get(word.car)
+        if reader is not None:
+            reader.reads_answer(word.fetch_word)
 
     def _at_key(self, node_id: int) -> Customer | None:
         waiting = self._waiting[node_id]
