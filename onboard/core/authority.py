@@ -110,7 +110,6 @@ class TokenBook:
     claimants: Counter[int] = field(default_factory=Counter)
     #: Grows with every change of what is held, given away, wanted or refused here, so that nobody need look twice.
     changes: int = 0
-    _genesis: dict[Key, int] = field(default_factory=dict)
     #: Grants to me from whom I do not believe to hold the token, until that is settled.
     _disputed: dict[TokenKey, TokenGrant] = field(default_factory=dict)
     #: When a word of a class about a token may be said again, so that many who ask are answered once.
@@ -188,7 +187,7 @@ class TokenBook:
         """
         if key in self.leaving or key in self.wanted:
             return False
-        for table in (self.seen, self.held, self.given, self._genesis, self._disputed):
+        for table in (self.seen, self.held, self.given, self._disputed):
             table.pop(key, None)
         self.gifts.discard(key)
         self.beliefs.forget(key)
@@ -373,12 +372,10 @@ class TokenBook:
     # --- inner works -----------------------------------------------------------------------------------------------
 
     def _is_own_at_first(self, key: TokenKey) -> bool:
-        return key not in self.seen and self._first_holder(key) == self.node_id
+        return key not in self.seen and genesis_holder(self.site, key) == self.node_id
 
     def _first_holder(self, key: Key) -> int:
-        if key not in self._genesis:
-            self._genesis[key] = genesis_holder(self.site, TokenKey(*key))
-        return self._genesis[key]
+        return genesis_holder(self.site, key)
 
     def _hold(self, key: TokenKey, version: int) -> None:
         self.held[key] = self.seen[key] = version

@@ -6,6 +6,7 @@ A *segment* is what one body fills, a *station* what stands beside one: resource
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 from onboard.contract.codes import KindCode, Side
@@ -125,6 +126,18 @@ class Site:
     time_zone: str = ""
     #: Proof of who says what: "off", "watch" (wrong words are told), "required" (and dropped). Never negotiated.
     seals: str = "off"
+
+    @cached_property
+    def at_home(self) -> dict[int, int]:
+        """The robot whose home a segment is, by the segment's number; of several the first."""
+        robots = [one for one in self.machines.values() if one.kind is KindCode.ROBOT]
+        return {one.home.number: one.node_id for one in reversed(robots)}
+
+    @cached_property
+    def at_station(self) -> dict[int, int]:
+        """The machine at a station, by the station's number; of several the first."""
+        fixed = [(one.station.number, one.node_id) for one in self.machines.values() if one.station is not None]
+        return dict(reversed(fixed))
 
     def machine(self, name: str) -> Machine:
         """The machine so named. Raises ``KeyError`` where there is none."""

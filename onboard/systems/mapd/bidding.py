@@ -6,8 +6,8 @@ As both sides order by the same cost, that ends in the one stable outcome whatev
 1962): the lowest bid of all has won first, then the lowest among the rest.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from heapq import heapify, heappop
 
 from onboard.contract.messages import Bid, CallForProposals
 from onboard.core.negotiation import Proposal
@@ -45,16 +45,19 @@ class UnitGeneration(NoEstimator):
 
 @dataclass
 class Round:
-    """A round that is open: ``preferences`` are (cost, task), cheapest first; ``begun_us`` when it was heard."""
+    """A round that is open: ``preferences`` are (cost, task) of all open ones; ``begun_us`` when it was heard."""
 
     node_id: int
     begun_us: int
-    preferences: Sequence[tuple[int, int]]
+    #: A heap, without those at which others are better: of a great many tasks few are ever looked at.
+    preferences: list[tuple[int, int]]
     #: The task whose call it takes part in.
     looked_at: int | None = None
     bids: dict[int, list[Bid]] = field(default_factory=dict)
     _best: dict[int, tuple[int, int]] = field(default_factory=dict)
-    _next: int = 0
+
+    def __post_init__(self) -> None:
+        heapify(self.preferences)
 
     def hear(self, bid: Bid) -> None:
         """Another robot's bid, of this round."""
@@ -65,9 +68,9 @@ class Round:
     @property
     def preferred(self) -> int | None:
         """The cheapest task for which nobody is better as far as is known; None where there is none."""
-        while self._next < len(self.preferences):
-            cost, task = self.preferences[self._next]
+        while self.preferences:
+            cost, task = self.preferences[0]
             if (cost, self.node_id) <= self._best.get(task, (cost, self.node_id)):
                 return task
-            self._next += 1
+            heappop(self.preferences)
         return None
