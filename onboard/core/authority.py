@@ -142,7 +142,7 @@ class TokenBook:
 
     def holds(self, key: TokenKey) -> bool:
         """Whether this node is the holder now; a token never seen to move is with its genesis holder."""
-        return self.is_synced and self.is_mine_by_journal(key)
+        return self.is_synced and (key in self.held or self._is_own_at_first(key))
 
     def is_mine_by_journal(self, key: TokenKey) -> bool:
         """Whether this node holds a token if its journal is all that ever was."""

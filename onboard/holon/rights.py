@@ -136,7 +136,7 @@ class RightsTalk:
 
     def _on_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
         key = TokenKey(grant.token_kind, grant.token)
-        if not self._may_move(key, grant.holder) or (self.is_frozen() and grant.holder == self.node_id):
+        if not self._may_move(key, grant.holder) or (grant.holder == self.node_id and self.is_frozen()):
             return []
         self.witness.hear(grant)
         if self.tokens.is_news(key, grant.version) and not self.tokens.holds(key):

@@ -162,11 +162,6 @@ class Reservations:
         """Begin, end and owner of all windows on a segment, by their begins."""
         return self._windows.get(segment, ())
 
-    def first_start(self, owner: int, segment: Segment, now_us: int) -> int | None:
-        """Start of ``owner``'s first window on a segment that is not over at ``now_us``, or None."""
-        starts = [s for s, end_us, holder in self._windows.get(segment, ()) if holder == owner and end_us > now_us]
-        return min(starts) if starts else None
-
     def earliest_other_start(self, owner: int, segment: Segment, now_us: int) -> int | None:
         """Start of anybody else's first window on a segment that is not over at ``now_us``, or None."""
         starts = [s for s, end_us, holder in self._windows.get(segment, ()) if holder != owner and end_us > now_us]

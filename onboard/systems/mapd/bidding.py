@@ -6,8 +6,8 @@ As both sides order by the same cost, that ends in the one stable outcome whatev
 1962): the lowest bid of all has won first, then the lowest among the rest.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from heapq import heapify, heappop
 
 from onboard.contract.messages import Bid, CallForProposals
 from onboard.core.negotiation import Proposal
@@ -19,6 +19,8 @@ from onboard.work.plain import NoEstimator
 HALF_US = 3_000_000
 #: Share of a round's length that the longest delay may take, per cent: the rest is for those who are beaten late.
 DELAY_PERCENT = 60
+#: Tasks are put in order as far as this beyond the cheapest, hundredths of a step.
+SPAN = 1_000
 
 
 def bid_timing(timing: Timing, window_us: int) -> Timing:
@@ -45,19 +47,18 @@ class UnitGeneration(NoEstimator):
 
 @dataclass
 class Round:
-    """A round that is open: ``preferences`` are (cost, task) of all open ones; ``begun_us`` when it was heard."""
+    """A round that was opened at ``begun_us``; ``preferences`` are (cost, task) of what was not looked at yet."""
 
     node_id: int
     begun_us: int
-    #: A heap, without those at which others are better: of a great many tasks few are ever looked at.
-    preferences: list[tuple[int, int]]
+    preferences: Sequence[tuple[int, int]]
     #: The task whose call it takes part in.
     looked_at: int | None = None
     bids: dict[int, list[Bid]] = field(default_factory=dict)
     _best: dict[int, tuple[int, int]] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        heapify(self.preferences)
+    #: Those that are looked at now, cheapest first, and how many of them were; all others are dearer.
+    _near: Sequence[tuple[int, int]] = ()
+    _next: int = 0
 
     def hear(self, bid: Bid) -> None:
         """Another robot's bid, of this round."""
@@ -68,9 +69,18 @@ class Round:
     @property
     def preferred(self) -> int | None:
         """The cheapest task for which nobody is better as far as is known; None where there is none."""
-        while self.preferences:
-            cost, task = self.preferences[0]
-            if (cost, self.node_id) <= self._best.get(task, (cost, self.node_id)):
-                return task
-            heappop(self.preferences)
-        return None
+        while True:
+            while self._next < len(self._near):
+                cost, task = self._near[self._next]
+                if (cost, self.node_id) <= self._best.get(task, (cost, self.node_id)):
+                    return task
+                self._next += 1
+            if not self.preferences:
+                return None
+            self._look_farther()
+
+    def _look_farther(self) -> None:
+        """Of a great many tasks few are ever looked at: only those are put in order."""
+        limit, others = min(self.preferences)[0] + SPAN, self.preferences
+        self._near, self._next = sorted(one for one in others if one[0] <= limit), 0
+        self.preferences = [one for one in others if one[0] > limit]
