@@ -2,11 +2,13 @@
 
     python bench/mapd.py [MAP TASKS] [--robots N] [--rate TASKS_A_STEP] [--rules NAME ...] [--bus]
     python bench/mapd.py --all [--seed N] [--keep FILE] [--rules NAME ...]
+    python bench/mapd.py --great ROBOTS TASKS [--bus [--seconds S]] [--rules NAME ...]
     python bench/mapd.py --write FOLDER [--seed N]
 
 Without files those that ship, beside the times of Token Passing by Ma, Li, Kumar and Koenig (AAMAS 2017). ``--all``
 plays their 35 combinations of robots and tasks a step; what does not ship is drawn, with ``--seed`` all tasks are. With
-``--keep`` what was played is written to a file, and not played again. ``--write`` writes the drawn files. By the
+``--keep`` what was played is written to a file, and not played again. ``--great`` is a floor of 41 rows of 75 with all
+tasks at once; with ``--seconds`` only so much of it is played. ``--write`` writes the drawn files. By the
 robots' decision functions alone, or with ``--bus`` by their controllers on the virtual CAN bus. Service time is in
 steps from release to delivery. Deterministic but for the processor time, which is given for all machines together: on
 board each plans for itself.
@@ -31,7 +33,7 @@ from bus_sim.systems.mapd.importers.mapf import DrawnDemand, import_map
 from bus_sim.systems.mapd.plant import UnitPlant
 from bus_sim.systems.mapd.published import TOKEN_PASSING
 from bus_sim.systems.mapd.steps import SteppedDay
-from bus_sim.systems.mapd.warehouse import RATES, ROBOTS, map_text, task_text
+from bus_sim.systems.mapd.warehouse import RATES, ROBOTS, great_floor, map_text, task_text
 from onboard.config.problems import ConfigError
 from onboard.config.site import parse_site
 from onboard.contract.mapd import StepRound
@@ -71,9 +73,9 @@ class Times:
     def of(cls, site: Mapd, served: dict[int, int], spent_s: float) -> "Times":
         """Of the step at which each task was delivered."""
         release = {task.number: task.release for task in site.tasks}
-        steps = sorted(step - release[number] for number, step in served.items())
-        p95, makespan = percentile(steps, 0.95), max(served.values())
-        return cls(fmean(steps), p95, steps[-1], makespan, len(steps), round(spent_s, 2))
+        steps = sorted(step - release[number] for number, step in served.items()) or [0]
+        p95, makespan = percentile(steps, 0.95), max(served.values(), default=0)
+        return cls(fmean(steps), p95, steps[-1], makespan, len(served), round(spent_s, 2))
 
     def __str__(self) -> str:
         """As one part of a row."""
@@ -112,11 +114,11 @@ def main() -> int:
             _write(args.write, args.seed)
         elif args.all:
             _play_all(args)
-        elif args.files:
-            site = read_site(args.files)
+        elif args.files or args.great:
+            site = read_site(args.files) if args.files else _as_site(site_text(great_floor(*args.great)))
             print(f"{'rule':16}{HEAD}")
             for name in args.rules:
-                print(f"{name:16}{_play(site, RULES[name], on_bus=args.bus)}", flush=True)
+                print(f"{name:16}{_play(site, RULES[name], on_bus=args.bus, seconds=args.seconds)}", flush=True)
         else:
             _play_shipped(args)
     except ConfigError as error:
@@ -131,6 +133,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--robots", type=int, choices=ROBOTS, help="only with so many robots")
     parser.add_argument("--rate", choices=RATES, help="only so many tasks a step")
     parser.add_argument("--rules", nargs="+", choices=RULES, default=list(RULES), help="only these rules")
+    parser.add_argument("--great", nargs=2, type=int, metavar=("ROBOTS", "TASKS"), help="a great floor")
+    parser.add_argument("--seconds", type=float, metavar="S", help="on the bus: of bus time, and no further")
     parser.add_argument("--all", action="store_true", help="all 35 combinations")
     parser.add_argument("--seed", type=int, default=0, help="draw the tasks' ends by it (default: those that ship)")
     parser.add_argument("--keep", type=Path, metavar="FILE", help="with --all: go on where this file ends")
@@ -204,10 +208,10 @@ class Played:
         return f"{self.times}{self.more}"
 
 
-def _play(site: Mapd, rule: Rule, *, on_bus: bool) -> Played:
+def _play(site: Mapd, rule: Rule, *, on_bus: bool, seconds: float | None = None) -> Played:
     began = time.process_time()
     if on_bus:
-        return _on_the_bus(site, began)
+        return _on_the_bus(site, began, seconds)
     day = _alone(site, rule)
     return Played(Times.of(site, day.served, time.process_time() - began))
 
@@ -217,21 +221,25 @@ def _alone(site: Mapd, rule: Rule) -> SteppedDay:
     return SteppedDay(site.floor, homes, site.rests, site.tasks, rule.bids, ends, rule.waits).run()
 
 
-def _on_the_bus(site: Mapd, began: float) -> Played:
+def _on_the_bus(site: Mapd, began: float, seconds: float | None) -> Played:
     """Besides: frames, their share of the bus's time, the longest step, and whether the day alone was the same."""
-    played = play(site, RunOptions(quiet=True))
+    played = play(site, RunOptions(quiet=True, limit_s=seconds))
     spent_s = time.process_time() - began
     plant = played.plant
     assert isinstance(plant, UnitPlant)
     plant.check_steps()
-    assert played.is_good, plant.violations
+    assert not plant.violations, plant.violations
+    assert seconds is not None or played.is_good
     begun_us: dict[int, int] = {}
     for time_us, one in played.messages:
         if isinstance(one, StepRound):
             begun_us.setdefault(one.step, time_us)
     longest_us = max(later - earlier for earlier, later in pairwise(begun_us.values()))
     statistics = played.run.fleet.statistics()
-    same = "as alone" if plant.served == _alone(site, RULES["negotiated"]).served else "NOT as alone"
+    if seconds is not None:
+        same = f"{len(begun_us)} steps"
+    else:
+        same = "as alone" if plant.served == _alone(site, RULES["negotiated"]).served else "NOT as alone"
     loads = f"{100 * statistics.mean_load:.1f} % (worst second {100 * statistics.worst_second_load:.1f} %)"
     each_ms = 1000 * spent_s / len(begun_us) / len(site.homes)
     more = f"  {statistics.frames} frames, load {loads}, longest step {longest_us / 1e6:.2f} s"

@@ -24,7 +24,7 @@ from onboard.contract.messages import (
     TokenSeen,
 )
 from onboard.core.backoff import BackOff
-from onboard.core.belief import Belief, Beliefs, Key
+from onboard.core.belief import Belief, Beliefs
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.journal_records import Entry, records_in
 from onboard.core.records import RetiredRecord, TokenGivenRecord, TokenGoneRecord, TokenHeldRecord, TokenRecord
@@ -110,7 +110,6 @@ class TokenBook:
     claimants: Counter[int] = field(default_factory=Counter)
     #: Grows with every change of what is held, given away, wanted or refused here, so that nobody need look twice.
     changes: int = 0
-    _genesis: dict[Key, int] = field(default_factory=dict)
     #: Grants to me from whom I do not believe to hold the token, until that is settled.
     _disputed: dict[TokenKey, TokenGrant] = field(default_factory=dict)
     #: When a word of a class about a token may be said again, so that many who ask are answered once.
@@ -118,7 +117,7 @@ class TokenBook:
 
     def __post_init__(self) -> None:
         self.backoff = BackOff(self.site.timing.token_repeat_us)
-        self.beliefs = Beliefs(self._first_holder)
+        self.beliefs = Beliefs(lambda key: genesis_holder(self.site, key))
         self._versions = RunVersions(lambda key: self.own_version(key) if self.holds(key) else None)
 
     def replay(self, entries: Iterable[Entry]) -> None:
@@ -143,7 +142,7 @@ class TokenBook:
 
     def holds(self, key: TokenKey) -> bool:
         """Whether this node is the holder now; a token never seen to move is with its genesis holder."""
-        return self.is_synced and self.is_mine_by_journal(key)
+        return self.is_synced and (key in self.held or self._is_own_at_first(key))
 
     def is_mine_by_journal(self, key: TokenKey) -> bool:
         """Whether this node holds a token if its journal is all that ever was."""
@@ -188,7 +187,7 @@ class TokenBook:
         """
         if key in self.leaving or key in self.wanted:
             return False
-        for table in (self.seen, self.held, self.given, self._genesis, self._disputed):
+        for table in (self.seen, self.held, self.given, self._disputed):
             table.pop(key, None)
         self.gifts.discard(key)
         self.beliefs.forget(key)
@@ -373,12 +372,7 @@ class TokenBook:
     # --- inner works -----------------------------------------------------------------------------------------------
 
     def _is_own_at_first(self, key: TokenKey) -> bool:
-        return key not in self.seen and self._first_holder(key) == self.node_id
-
-    def _first_holder(self, key: Key) -> int:
-        if key not in self._genesis:
-            self._genesis[key] = genesis_holder(self.site, TokenKey(*key))
-        return self._genesis[key]
+        return key not in self.seen and genesis_holder(self.site, key) == self.node_id
 
     def _hold(self, key: TokenKey, version: int) -> None:
         self.held[key] = self.seen[key] = version

@@ -6,6 +6,7 @@ A *segment* is what one body fills, a *station* what stands beside one: resource
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 from onboard.contract.codes import KindCode, Side
@@ -125,6 +126,13 @@ class Site:
     time_zone: str = ""
     #: Proof of who says what: "off", "watch" (wrong words are told), "required" (and dropped). Never negotiated.
     seals: str = "off"
+
+    @cached_property
+    def at_first(self) -> tuple[dict[int, int], dict[int, int]]:
+        """Whose home a segment is, and who is at a station, by their numbers; of several machines the first."""
+        machines = list(reversed(self.machines.values()))
+        homes = {one.home.number: one.node_id for one in machines if one.kind is KindCode.ROBOT}
+        return homes, {one.station.number: one.node_id for one in machines if one.station is not None}
 
     def machine(self, name: str) -> Machine:
         """The machine so named. Raises ``KeyError`` where there is none."""

@@ -3,7 +3,7 @@
 from functools import cache
 from typing import NamedTuple
 
-from onboard.contract.codes import KindCode, TokenKind
+from onboard.contract.codes import TokenKind
 from onboard.core.site import Segment, Site, Station
 
 
@@ -25,25 +25,19 @@ def station_token(station: Station) -> TokenKey:
     return TokenKey(TokenKind.STATION, station.number)
 
 
-def genesis_holder(site: Site, key: TokenKey) -> int:
+def genesis_holder(site: Site, key: tuple[TokenKind, int]) -> int:
     """Who holds a token before it first moves, by the site file alone.
 
     A robot holds the segment of its home, a fixed machine its station; the track's steward holds all other segments and
     stations. All else is made by its origin node.
     """
-    if key.kind not in (TokenKind.SEGMENT, TokenKind.STATION):
-        return key.number >> 16
-    if key.kind is TokenKind.SEGMENT:
-        for machine in site.machines.values():
-            if machine.kind is KindCode.ROBOT and machine.home.number == key.number:
-                return machine.node_id
-    else:
-        for machine in site.machines.values():
-            if machine.station is not None and machine.station.number == key.number:
-                return machine.node_id
-    return site.stewards.get(key.number >> 8, 0)
+    kind, number = key
+    if kind > TokenKind.STATION:
+        return number >> 16
+    holder = site.at_first[kind].get(number)
+    return site.stewards.get(number >> 8, 0) if holder is None else holder
 
 
-def may_exist(site: Site, key: TokenKey) -> bool:
+def may_exist(site: Site, key: tuple[TokenKind, int]) -> bool:
     """Whether the site has such a token, so that no frame can fill the book with what nobody ever made."""
     return genesis_holder(site, key) in site.machines

@@ -30,23 +30,31 @@ class Admission:
     speakers: Speakers | None = None
     #: Nodes whose words came to nothing, each with the reason that was told to people.
     _named: set[tuple[int, Reason]] = field(default_factory=set)
-    #: Verdicts by sender and class of message: the site never changes, and new speakers begin them anew.
-    _verdicts: dict[tuple[int, type[Message]], Reason] = field(default_factory=dict)
+    #: What each kind may say: the site never changes, and new speakers begin it anew.
+    _says: dict[KindCode, frozenset[type[Message]]] = field(default_factory=dict)
 
     def listen(self, speakers: Speakers) -> None:
         """From now on only who may say a message is heard with it."""
         self.speakers = dict(speakers)
-        self._verdicts.clear()
+        self._says.clear()
+
+    def says(self, node: int) -> frozenset[type[Message]]:
+        """What a machine of the site may say, by its kind: of some it counts by its track or its run too."""
+        machine = self.site.machines.get(node)
+        if machine is None or self.speakers is None:
+            return frozenset()
+        if machine.kind not in self._says:
+            said = (one for one in self.speakers if self._why_never(node, one) is Reason.NONE)
+            self._says[machine.kind] = frozenset(said)
+        return self._says[machine.kind]
 
     def why_not(self, message: Message) -> Reason:
         """NONE where a message counts; else NOT_OF_SITE, NOT_OF_KIND, or NOT_AUTHORISED for a track of another's.
 
         VALUE_OUT_OF_RANGE for a run that is longer than any.
         """
-        said = message.sender, type(message)
-        verdict = self._verdicts.get(said)
-        if verdict is None:
-            verdict = self._verdicts[said] = self._why_never(*said)
+        is_sayable = type(message) in self.says(message.sender)
+        verdict = Reason.NONE if is_sayable else self._why_never(message.sender, type(message))
         if verdict is Reason.NONE and not singles(message):
             return Reason.VALUE_OUT_OF_RANGE
         if verdict is not Reason.NONE or not isinstance(message, _OF_STEWARDS):

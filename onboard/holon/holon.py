@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from onboard.contract.change import SiteNext
 from onboard.contract.codes import CONTRACT_VERSION, MachineState, Reason
 from onboard.contract.constants import NOBODY, Speakers
 from onboard.contract.messages import (
@@ -24,7 +23,6 @@ from onboard.contract.messages import (
     LeftOut,
     Message,
     Progress,
-    Regeneration,
     SyncRequest,
     TaskReport,
     TokenGrant,
@@ -56,10 +54,6 @@ from onboard.holon.witness import Doubt, Witness
 
 #: Most effects that one event may cause before the holon counts as running away.
 MAX_ROUNDS = 100
-#: All that is heard of a machine with another contract or site: the stop, who it is, and where it stands.
-_HEARD_FROM_STRANGERS = (EmergencyStop, Heartbeat, Progress)
-#: All that a machine hears while it is apart: what may end that, who lives and who counts, why others stand.
-_WHILE_APART = (EmergencyStop, Go, Halted, Heartbeat, Regeneration, SiteNext)
 
 
 class Holon:
@@ -118,7 +112,7 @@ class Holon:
             self.fleet.has_no_rights, self.witness.doubt = True, Doubt(self.holding.why.reason, NOBODY, journal.why)
         self.fixed = FixedTimes(self.time, self.presence, self.holds, self.fleet, self._all_drops)
         #: When ``wake`` is due, and what of it is kept after an event.
-        self.schedule = Schedule(self.part, self.fleet, self.rights, self.fixed, self.behaviour)
+        self.schedule = Schedule(self.part, self.fleet, self.rights, self.fixed, self.behaviour, self.admission)
         self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
         self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
@@ -165,6 +159,7 @@ class Holon:
     def listen(self, speakers: Speakers) -> None:
         """From now on only who may say a message, by the contract of the wire, is heard with it."""
         self.admission.listen(speakers)
+        self.schedule.begins_anew(self.behaviour)
 
     def receive(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the fleet bus, received at ``local_us``; one of a run of tokens is one for each of them."""
@@ -172,47 +167,51 @@ class Holon:
         now_us = self.clock.bus_us(local_us)
         if isinstance(message, Heartbeat) and self.schedule.lives_on(message, now_us):
             return []
-        before = self.schedule.before(message, now_us)
-        if message.sender == self.node_id:
-            self.schedule.changed()
-            return self.holds.on_own_number(message, now_us)
-        why = self.admission.why_not(message)
-        if why is not Reason.NONE:
-            self.drops[why] += 1
-            self.schedule.changed()
-            return self.admission.passed_over(message, why) if self.halted is None else []
+        before = self.schedule.passes_by(message, now_us)
+        is_usual = before is not None
+        if not is_usual:
+            before = self.schedule.before(message, now_us)
+            if message.sender == self.node_id:
+                self.schedule.changed()
+                return self.holds.on_own_number(message, now_us)
+            why = self.admission.why_not(message)
+            if why is not Reason.NONE:
+                self.drops[why] += 1
+                self.schedule.changed()
+                return self.admission.passed_over(message, why) if self.halted is None else []
         self.holding.heard(now_us)
         if isinstance(message, BusTime):
             return self._on_bus_time(message, local_us)
-        if self._is_unheard(message):
+        if is_usual:
+            effects = self._take_up(message, now_us, is_usual=True)
+        elif self.part.is_deaf_to(message, self.drops):
             return []
-        effects = [effect for word in singles(message) for effect in self._take_up(word, now_us)]
+        else:
+            effects = [effect for word in singles(message) for effect in self._take_up(word, now_us)]
         if not effects and self.schedule.is_overheard(message, before):
             return effects
         self.schedule.changed()
         return self._settle(effects, now_us)
 
-    def _is_unheard(self, message: Message) -> bool:
-        """Whether nothing is taken in now, or not of this sender: of another contract or site it is counted."""
-        if self.holding.is_apart and not isinstance(message, _WHILE_APART):
-            return True
-        if message.sender in self.presence.foreign and not isinstance(message, _HEARD_FROM_STRANGERS):
-            self.drops[self.presence.foreign[message.sender][0]] += 1
-            return True
-        return False
+    def _take_up(self, message: Message, now_us: int, *, is_usual: bool = False) -> list[Effect]:
+        """Tell every part of a message: first what all believe, then what this machine does with it.
 
-    def _take_up(self, message: Message, now_us: int) -> list[Effect]:
-        """Tell every part of a message: first what all believe, then what this machine does with it."""
-        effects = self._awake(now_us)
-        if self.presence.is_back(message.sender, now_us):
-            self.fixed.on_return(now_us + self.witness.slot_us, now_us)
+        Where all ``is_usual`` nobody was silent, and that its sender lives is noted.
+        """
+        effects: list[Effect] = []
+        if not is_usual:
+            effects = self._awake(now_us)
+            if self.presence.is_back(message.sender, now_us):
+                self.fixed.on_return(now_us + self.witness.slot_us, now_us)
         self.mirror.hear(message, now_us)
-        self.presence.heard(message.sender, now_us)
+        if not is_usual:
+            self.presence.heard(message.sender, now_us)
         handler = self._handlers.get(type(message))
-        effects += handler(message, now_us) if handler is not None else []
+        if handler is not None:
+            effects += handler(message, now_us)
         if isinstance(message, (Itinerary, Heartbeat)):
             self.presence.heard(message.sender, now_us)
-        effects = effects + self.behaviour.hear(message, now_us)
+        effects += self.behaviour.hear(message, now_us)
         if isinstance(message, (TokenGrant, TokenHeld)):
             proven = self.mirror.settle(TokenKey(message.token_kind, message.token))
             if proven is not None:
@@ -348,10 +347,11 @@ class Holon:
     # --- handlers ----------------------------------------------------------------------------------------------
 
     def _negotiate(self, message: Message, now_us: int) -> list[Effect]:
-        why = self.part.why_no_bid(self.behaviour.state, now_us)
-        if why is not Reason.NONE and isinstance(message, CallForProposals):
-            self.drops[why] += 1
-            return []
+        if isinstance(message, CallForProposals):
+            why = self.part.why_no_bid(self.behaviour.state, now_us)
+            if why is not Reason.NONE:
+                self.drops[why] += 1
+                return []
         return self._carry_out(self.negotiation.receive(message, now_us), now_us)
 
     def _on_itinerary(self, itinerary: Itinerary, now_us: int) -> list[Effect]:

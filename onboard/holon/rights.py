@@ -6,7 +6,6 @@ own (design, section 5).
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
 from typing import Any
 
 from onboard.contract.codes import Reason
@@ -31,8 +30,6 @@ from onboard.holon.witness import Witness
 #: A machine whose view of the order differs from mine is asked to state its own at most this often, us: an answer has
 #: come by then.
 ASK_AGAIN_US = 1_000_000
-#: Tokens of which a machine remembers whether the site has them: more than a large site has.
-MOST_KNOWN = 4096
 
 
 @dataclass
@@ -57,8 +54,6 @@ class RightsTalk:
         self.tokens.drops = self.drops
         self.mirror, self.petitions = self.fleet.mirror, self.fleet.petitions
         self.tokens.claim = self._claim
-        # The site never changes; whoever makes tokens up pushes out what was found before.
-        self._may_exist = lru_cache(maxsize=MOST_KNOWN)(partial(may_exist, self.site))
 
     def handlers(self) -> dict[type[Message], Callable[[Any, int], list[Effect]]]:
         """Handler by message class; each takes the class that it is listed under."""
@@ -141,7 +136,7 @@ class RightsTalk:
 
     def _on_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
         key = TokenKey(grant.token_kind, grant.token)
-        if not self._may_move(key, grant.holder) or (self.is_frozen() and grant.holder == self.node_id):
+        if not self._may_move(key, grant.holder) or (grant.holder == self.node_id and self.is_frozen()):
             return []
         self.witness.hear(grant)
         if self.tokens.is_news(key, grant.version) and not self.tokens.holds(key):
@@ -175,7 +170,7 @@ class RightsTalk:
 
     def _may_move(self, key: TokenKey, holder: int) -> bool:
         """Whether the site has such a token and such a holder, so that nobody fills the book with what cannot be."""
-        if self._may_exist(key) and holder in self.site.machines:
+        if may_exist(self.site, key) and holder in self.site.machines:
             return True
         self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
         return False

@@ -7,16 +7,20 @@ next. ``sweeps`` keeps nothing: every event is followed by every part, so that a
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol, get_args, runtime_checkable
 
+from onboard.contract.codes import TokenKind
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import BusTime, Heartbeat, Message, SyncRequest
 from onboard.core.behaviour import Attentive, Behaviour, Fleet, OverheardWord
 from onboard.core.mirror import Peer
+from onboard.holon.admission import Admission
 from onboard.holon.fixed_times import FixedTimes
 from onboard.holon.presence import SLEPT_BEATS
 from onboard.holon.rights import RightsTalk
 from onboard.holon.taking_part import TakingPart
 
 _OVERHEARD = frozenset(get_args(OverheardWord))
+#: Of a node whose last word may change something.
+_NOBODY: tuple[Peer | None, frozenset[type[Message]]] = None, frozenset()
 
 
 @runtime_checkable
@@ -41,6 +45,7 @@ class Schedule:
     rights: RightsTalk
     fixed: FixedTimes
     behaviour: Behaviour
+    admission: Admission
     #: Whether what is kept here holds, and until when nothing is to be done unless something happens.
     is_known: bool = False
     #: Whether somebody has asked when that is since it was another time.
@@ -56,8 +61,8 @@ class Schedule:
     _rest_of: int | None = None
     #: From when on the behaviour is to see every event.
     _looks_from_us: int = 0
-    #: Who said last what changes nothing, by node.
-    _unchanged: dict[int, Peer] = field(default_factory=dict)
+    #: Who said last what changes nothing, by node, and what it may say.
+    _unchanged: dict[int, tuple[Peer, frozenset[type[Message]]]] = field(default_factory=dict)
     #: The mirror, the epoch of the rights, whether I send bus time, and which other site counts, as they were then.
     _ground: tuple[int, int, bool, int] | None = None
     _attentive: Attentive | None = field(init=False)
@@ -75,6 +80,7 @@ class Schedule:
         self._attentive = behaviour if isinstance(behaviour, Attentive) and not self.sweeps else None
         self._selective = behaviour if isinstance(behaviour, Selective) and not self.sweeps else None
         self._overheard = _OVERHEARD if self._selective is None else _OVERHEARD | self._selective.overhears
+        self._unchanged.clear()
         self.changed()
 
     def changed(self) -> None:
@@ -161,7 +167,7 @@ class Schedule:
 
     def lives_on(self, beat: Heartbeat, now_us: int) -> bool:
         """Note the time of a sign of life that says nothing new, and nothing else; False where it may be news."""
-        peer, is_quiet = self._unchanged.get(beat.sender), now_us < self.waits_until_us
+        (peer, _), is_quiet = self._unchanged.get(beat.sender, _NOBODY), now_us < self.waits_until_us
         if not is_quiet or peer is None or peer.beat is not beat or now_us - peer.heard_at_us > self._sleeps_after_us:
             self._unchanged.pop(beat.sender, None)
             return is_quiet and self._is_unchanged(beat, now_us)
@@ -174,9 +180,26 @@ class Schedule:
     def _is_unchanged(self, beat: Heartbeat, now_us: int) -> bool:
         if not self.part.lives_on(beat, now_us):
             return False
-        peer = self._unchanged[beat.sender] = self.fleet.mirror.peers[beat.sender]
+        peer = self.fleet.mirror.peers[beat.sender]
         peer.beat, peer.mirror_digest = beat, beat.mirror_digest
+        self._unchanged[beat.sender] = peer, self.admission.says(beat.sender)
         return True
+
+    def passes_by(self, message: Message, now_us: int) -> int | None:
+        """The state of my rights before a word that may be none of my business, where all is as usual; else None.
+
+        Nothing is due here, neither its sender nor I was silent, and it counts and may say this: that was looked at
+        when its last sign of life changed nothing. This one is noted.
+        """
+        if now_us >= self.waits_until_us or type(message) not in self._overheard:
+            return None
+        peer, said = self._unchanged.get(message.sender, _NOBODY)
+        if peer is None or type(message) not in said or now_us - peer.heard_at_us > self._sleeps_after_us:
+            return None
+        if getattr(message, "token_kind", None) is TokenKind.RUN:
+            return None
+        peer.heard_at_us = self.part.presence.active_us = now_us
+        return self.fleet.tokens.changes
 
     def _keep_unchanged(self) -> None:
         """Let go of whose word said nothing new, unless all that this was judged by is as it was."""

@@ -1,9 +1,11 @@
 """What part a machine takes at the moment: whether it deals in rights, begins anything, and who it knows to live on."""
 
+from collections import Counter
 from dataclasses import dataclass
 
+from onboard.contract.change import SiteNext
 from onboard.contract.codes import MachineState, Reason
-from onboard.contract.messages import Heartbeat
+from onboard.contract.messages import EmergencyStop, Go, Halted, Heartbeat, Message, Progress, Regeneration
 from onboard.holon.holding import MachineHolds
 from onboard.holon.presence import Presence
 from onboard.holon.regeneration import Regenerating
@@ -13,6 +15,10 @@ from onboard.holon.witness import Witness
 
 #: States of machines that do not bid.
 _NO_BIDDERS = (MachineState.OBSTACLE, MachineState.STOPPED, MachineState.STARTING)
+#: All that is heard of a machine with another contract or site: the stop, who it is, and where it stands.
+_HEARD_FROM_STRANGERS = (EmergencyStop, Heartbeat, Progress)
+#: All that a machine hears while it is apart: what may end that, who lives and who counts, why others stand.
+_WHILE_APART = (EmergencyStop, Go, Halted, Heartbeat, Regeneration, SiteNext)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +61,16 @@ class TakingPart:
         if self.time.clock.is_lost(self.time.clock.local_us(now_us)):
             return Reason.BUS_TIME_LOST
         return Reason.NONE if self.begins and state not in _NO_BIDDERS else Reason.POSITION_UNKNOWN
+
+    def is_deaf_to(self, message: Message, drops: Counter[Reason]) -> bool:
+        """Whether nothing is taken in now, or not of this sender: of another contract or site it is counted."""
+        if self.holding.is_apart and not isinstance(message, _WHILE_APART):
+            return True
+        foreign = self.presence.foreign.get(message.sender)
+        if foreign is None or isinstance(message, _HEARD_FROM_STRANGERS):
+            return False
+        drops[foreign[0]] += 1
+        return True
 
     def lives_on(self, beat: Heartbeat, now_us: int) -> bool:
         """Take up a heartbeat that says nothing new to any part of this machine: it falls due as it did before.

@@ -415,14 +415,14 @@ class Witness:
 
     def hear(self, word: TokenHeld | TokenGrant | TokenGiven | TokenSeen | TokenRequest) -> None:
         """Compare what a machine says of a token with the journal, before the word counts for anything else."""
-        if word.sender not in self._others:
+        if word.sender == self.node_id or word.sender not in self.site.machines:
             return
         self._words += 1
-        key = TokenKey(word.token_kind, word.token)
-        if isinstance(word, TokenHeld | TokenGrant | TokenGiven):
-            self._said_again(word.sender, key, word.version)
+        if self.doubted and isinstance(word, (TokenHeld, TokenGrant, TokenGiven)):
+            self._said_again(word.sender, TokenKey(word.token_kind, word.token), word.version)
         if self.doubt is not None or self._since_us is None or word.sender in self.answered:
             return
+        key = TokenKey(word.token_kind, word.token)
         own = self.tokens.own_version(key)
         is_mine = self.tokens.is_mine_by_journal(key)
         match word:

@@ -1,7 +1,7 @@
 """Who plans to be on which segment, and on which lift, when: half-open windows ``[from, to)`` in bus us."""
 
 from bisect import insort
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Sequence
 from typing import NamedTuple
 
 from onboard.core.site import Segment
@@ -158,10 +158,9 @@ class Reservations:
         ahead = [window for window in windows if window.to_us > now_us]
         return any(holder in self._fixed for _, holder in self.conflicts(owner, ahead))
 
-    def first_start(self, owner: int, segment: Segment, now_us: int) -> int | None:
-        """Start of ``owner``'s first window on a segment that is not over at ``now_us``, or None."""
-        starts = [s for s, end_us, holder in self._windows.get(segment, ()) if holder == owner and end_us > now_us]
-        return min(starts) if starts else None
+    def on(self, segment: Segment) -> Sequence[tuple[int, int, int]]:
+        """Begin, end and owner of all windows on a segment, by their begins."""
+        return self._windows.get(segment, ())
 
     def earliest_other_start(self, owner: int, segment: Segment, now_us: int) -> int | None:
         """Start of anybody else's first window on a segment that is not over at ``now_us``, or None."""

@@ -7,7 +7,7 @@ import pytest
 import bus_sim
 from bus_sim.systems.mapd.importers.draft import site_text
 from bus_sim.systems.mapd.importers.mapf import DrawnDemand, import_map
-from bus_sim.systems.mapd.warehouse import RATES, ROBOTS, map_text, task_text
+from bus_sim.systems.mapd.warehouse import RATES, ROBOTS, great_floor, map_text, task_text
 from onboard.config.site import parse_site
 from onboard.systems.mapd.site import Mapd
 
@@ -49,3 +49,12 @@ def test_what_cannot_be_drawn_is_said() -> None:
         map_text(400)
     with pytest.raises(ValueError, match="write a number above 0"):
         task_text("0")
+
+
+def test_the_great_floor_is_a_site_in_which_all_homes_can_be_taken_for_ever() -> None:
+    site = parse_site(site_text(great_floor(120, 30)), "great")
+    assert isinstance(site, Mapd)
+    assert len(site.robots) == 120 and len(site.tasks) == 30 and set(site.homes.values()) <= site.rests
+    assert site_text(great_floor(3, 5)) == site_text(great_floor(3, 5)) != site_text(great_floor(3, 5, seed=2))
+    with pytest.raises(ValueError, match="121 robots: there are 120 homes"):
+        great_floor(121, 1)

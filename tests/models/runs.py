@@ -28,7 +28,7 @@ STEWARD = genesis_holder(SITE, NEAR)
 PASSES, STANDS = 11, 12
 WANTS = {STEWARD: (), PASSES: WAY, STANDS: (FAR,)}
 #: Attributes of a book by which nothing is decided here: counts, what never changes, and how often it was said.
-LEFT_OUT = frozenset(["site", "node", "changes", "drops", "claimants", "gifts", "hints", "backoff", "_genesis"])
+LEFT_OUT = frozenset(["site", "node", "changes", "drops", "claimants", "gifts", "hints", "backoff"])
 
 
 class View(NamedTuple):

@@ -69,9 +69,8 @@ def test_passing_order_is_read_from_the_first_window_that_is_not_over(
 ) -> None:
     reservations, naive = filled(plans)
     open_here = [(holder, w.from_us) for holder, w in naive if w.segment == HERE and w.to_us > now_us]
-    mine = [start for holder, start in open_here if holder == owner]
     others = [start for holder, start in open_here if holder != owner]
-    assert reservations.first_start(owner, HERE, now_us) == min(mine, default=None)
+    assert [begin for begin, end, _ in reservations.on(HERE) if end > now_us] == sorted(start for _, start in open_here)
     assert reservations.earliest_other_start(owner, HERE, now_us) == min(others, default=None)
     assert reservations.is_free(HERE, now_us, excluding=owner) == (not others)
 

@@ -11,6 +11,7 @@ from fractions import Fraction
 from importlib.resources import as_file, files
 from itertools import product
 
+from bus_sim.systems.mapd.importers.draft import Draft, TaskLine
 from onboard.systems.mapd.floor import grid_floor
 from onboard.ways.rests import lasting_rests
 
@@ -21,6 +22,8 @@ RATES = ("0.2", "0.5", "1", "2", "5", "10", "500")
 TASKS = 500
 #: What ships, fewest robots first: homes of the one are homes of the other.
 _SHIPPED = (10, 30)
+#: Cells of the great floor.
+_GREAT_WIDTH, _GREAT_HEIGHT = 75, 41
 #: Columns of the racks at the sides.
 _SIDES = (*range(1, 7), *range(28, 34))
 
@@ -72,6 +75,29 @@ def task_text(rate: str, seed: int = 0, count: int = TASKS) -> str:
         f"{int(number / step)}\t{pickup}\t{delivery}\t0\t0\n"
         for number, (pickup, delivery) in enumerate(_pairs(seed, count))
     )
+
+
+def great_floor(robots: int, tasks: int, seed: int = 1) -> Draft:
+    """A floor of 41 rows of 75 with so many robots, 120 at most, and so many tasks at once, drawn by ``seed``.
+
+    Racks as in the small warehouse, five beside each other and ten behind; homes in six columns at the sides. Raises
+    ``ValueError`` for more robots.
+    """
+    rows = [["."] * _GREAT_WIDTH for _ in range(_GREAT_HEIGHT)]
+    for row, left in product(range(1, _GREAT_HEIGHT - 1), range(8, _GREAT_WIDTH - 18, 11)):
+        if row % 4:
+            rows[row][left : left + 10] = "@" * 10 if row % 4 == 2 else "e" * 10
+    columns = [1, 3, 5, *(_GREAT_WIDTH - one for one in (2, 4, 6))]
+    homes = [(row, column) for column in columns for row in range(1, _GREAT_HEIGHT - 1, 2)]
+    if robots > len(homes):
+        raise ValueError(f"{robots} robots: there are {len(homes)} homes")
+    for row, column in homes[:robots]:
+        rows[row][column] = "r"
+    ends, chance = [f"{row},{column}" for row, column in _marked(rows, "e")], random.Random(seed)
+    found = Draft(f"floor{robots}", ["drawn"], rows=["".join(row) for row in rows], endpoints=ends)
+    found.robots = [(f"R{number}", f"{row},{column}") for number, (row, column) in enumerate(homes[:robots], 1)]
+    found.tasks = [TaskLine(0, *chance.sample(ends, 2)) for _ in range(tasks)]
+    return found
 
 
 def _pairs(seed: int, count: int) -> list[tuple[int, int]]:

@@ -5,7 +5,7 @@ untouched tasks) and also while it still carries something (it then counts from 
 lowest bid of all wins first: it is the one that speaks soonest (design, section 4), and its robot then falls silent.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from onboard.systems.mapd.floor import Floor
@@ -71,41 +71,49 @@ def cost(
     step: after so many steps no new task is before an old one. An old task that is done first is waited for by all who
     come behind it: with n tasks a robot each step of age counts an nth.
     """
-    empty = floor.steps_to(task.pickup)[offer.cell]
-    loaded = floor.steps_to(task.delivery)[task.pickup]
-    if empty >= FAR or loaded >= FAR:
-        return None
-    later = rule.younger * (task.release - backlog.oldest) * backlog.robots // max(backlog.robots, backlog.tasks)
-    return rule.wait * offer.steps + rule.empty * empty + rule.loaded * loaded + later
+    found = bids(floor, rule, offer, (task,), backlog)
+    return found[0][0] if found else None
+
+
+def bids(
+    floor: Floor, rule: BidWeights, offer: Availability, tasks: Iterable[TransportTask], backlog: Backlog
+) -> list[tuple[int, int]]:
+    """The bid and the number of each task to which a way leads, in the order of ``tasks``; as ``cost`` one by one."""
+    steps_to, cell, younger = floor.steps_to, offer.cell, rule.younger * backlog.robots
+    share, weight, weight_loaded = max(backlog.robots, backlog.tasks), rule.empty, rule.loaded
+    wait, oldest = rule.wait * offer.steps, backlog.oldest
+    found = []
+    for task in tasks:
+        pickup = task.pickup
+        empty, loaded = steps_to(pickup)[cell], steps_to(task.delivery)[pickup]
+        if empty < FAR and loaded < FAR:
+            later = younger * (task.release - oldest) // share
+            found.append((wait + weight * empty + weight_loaded * loaded + later, task.number))
+    return found
 
 
 def winners(
     floor: Floor, rule: BidWeights, offers: Sequence[Availability], tasks: Sequence[TransportTask]
 ) -> dict[int, tuple[TransportTask, int]]:
     """Task and bid that each robot wins, by robot: lowest bid first, then lower robot, then lower task."""
-    bids: dict[int, list[tuple[int, int, int]]] = {}
+    left: dict[int, list[tuple[int, int, int]]] = {}
     by_number: Mapping[int, TransportTask] = {task.number: task for task in tasks}
     backlog = Backlog.of(tasks, len(offers))
     for offer in offers:
-        own = []
-        for task in tasks:
-            bid = cost(floor, rule, offer, task, backlog)
-            if bid is not None:
-                own.append((bid, task.number))
-        own.sort(reverse=True)
-        bids[offer.robot] = [(bid, offer.robot, number) for bid, number in own]
+        own = sorted(bids(floor, rule, offer, tasks, backlog), reverse=True)
+        left[offer.robot] = [(bid, offer.robot, number) for bid, number in own]
     won: dict[int, tuple[TransportTask, int]] = {}
     gone: set[int] = set()
-    while bids:
-        for robot in list(bids):
-            while bids[robot] and bids[robot][-1][2] in gone:
-                bids[robot].pop()
-            if not bids[robot]:
-                del bids[robot]
-        if not bids:
+    while left:
+        for robot in list(left):
+            while left[robot] and left[robot][-1][2] in gone:
+                left[robot].pop()
+            if not left[robot]:
+                del left[robot]
+        if not left:
             break
-        bid, robot, number = min(left[-1] for left in bids.values())
+        bid, robot, number = min(own[-1] for own in left.values())
         won[robot] = (by_number[number], bid)
         gone.add(number)
-        del bids[robot]
+        del left[robot]
     return won

@@ -19,6 +19,8 @@ from onboard.work.plain import NoEstimator
 HALF_US = 3_000_000
 #: Share of a round's length that the longest delay may take, per cent: the rest is for those who are beaten late.
 DELAY_PERCENT = 60
+#: Tasks are put in order as far as this beyond the cheapest, hundredths of a step.
+SPAN = 1_000
 
 
 def bid_timing(timing: Timing, window_us: int) -> Timing:
@@ -45,7 +47,7 @@ class UnitGeneration(NoEstimator):
 
 @dataclass
 class Round:
-    """A round that is open: ``preferences`` are (cost, task), cheapest first; ``begun_us`` when it was heard."""
+    """A round that was opened at ``begun_us``; ``preferences`` are (cost, task) of what was not looked at yet."""
 
     node_id: int
     begun_us: int
@@ -54,6 +56,8 @@ class Round:
     looked_at: int | None = None
     bids: dict[int, list[Bid]] = field(default_factory=dict)
     _best: dict[int, tuple[int, int]] = field(default_factory=dict)
+    #: Those that are looked at now, cheapest first, and how many of them were; all others are dearer.
+    _near: Sequence[tuple[int, int]] = ()
     _next: int = 0
 
     def hear(self, bid: Bid) -> None:
@@ -65,9 +69,18 @@ class Round:
     @property
     def preferred(self) -> int | None:
         """The cheapest task for which nobody is better as far as is known; None where there is none."""
-        while self._next < len(self.preferences):
-            cost, task = self.preferences[self._next]
-            if (cost, self.node_id) <= self._best.get(task, (cost, self.node_id)):
-                return task
-            self._next += 1
-        return None
+        while True:
+            while self._next < len(self._near):
+                cost, task = self._near[self._next]
+                if (cost, self.node_id) <= self._best.get(task, (cost, self.node_id)):
+                    return task
+                self._next += 1
+            if not self.preferences:
+                return None
+            self._look_farther()
+
+    def _look_farther(self) -> None:
+        """Of a great many tasks few are ever looked at: only those are put in order."""
+        limit, others = min(self.preferences)[0] + SPAN, self.preferences
+        self._near, self._next = sorted(one for one in others if one[0] <= limit), 0
+        self.preferences = [one for one in others if one[0] > limit]

@@ -194,7 +194,7 @@ class TransportDesk(Plain):
         fresh = [task for task in fresh if task.number not in self.knowledge.tasks]
         fresh = sorted(fresh, key=lambda task: (task.release, task.number))[:CALLS_A_ROUND]
         for task in fresh:
-            self.knowledge.tasks[task.number] = task
+            self.knowledge.take_up(task)
         idle = any(self.knowledge.task_of(robot) == NO_TASK for robot in self.site.robots)
         bidding = bool(fresh) or self._changed or idle
         self._changed = False
@@ -280,9 +280,9 @@ class TransportDesk(Plain):
             pairs = [tuple(map(int, one.split(":"))) for one in awarded.changes.split()]
             self.turns, self.awards = _told(me, self.round.step, [(robot, task) for robot, task in pairs])
         # Tasks that were called for before are known from their release; the next round brings those of its own step.
-        for number, task in self.orders.items():
+        for task in self.orders.values():
             if self.round is not None and task.release <= self.round.step:
-                self.knowledge.tasks[number] = task
+                self.knowledge.take_up(task)
 
 
 def _told(desk: int, step: int, order: list[tuple[int, int]]) -> tuple[list[StepTurn], list[Award]]:

@@ -3,6 +3,7 @@
 Made of frames alone, so that all have the same once all have heard all frames of a step.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from onboard.contract.mapd import PathHead, PathMoves, StepState
@@ -46,9 +47,13 @@ class Knowledge:
     _parts: dict[int, Assembly] = field(default_factory=dict)
     #: Tasks that were called for since the round before.
     _undated: set[int] = field(default_factory=set)
+    #: What is open, and where somebody has to go; and which tasks were aboard as that was worked out, None for never.
+    _open: tuple[list[TransportTask], frozenset[int]] = field(default_factory=lambda: ([], frozenset()))
+    _open_of: frozenset[int] | None = None
 
     def __post_init__(self) -> None:
         self.paths = Paths(self.floor.network)
+        self._all = frozenset(self.robots)
 
     # --- tasks and steps ---------------------------------------------------------------------------------------
 
@@ -58,8 +63,13 @@ class Knowledge:
         if max(cells) < self.floor.size:
             if number not in self.tasks:
                 self._undated.add(number)
-            self.tasks.setdefault(number, TransportTask(number, 0, *cells))
+                self.take_up(TransportTask(number, 0, *cells))
             self.calls[number] = call
+
+    def take_up(self, task: TransportTask) -> None:
+        """A task that is to be done, or is known better than before."""
+        self.tasks[task.number] = task
+        self._open_of = None
 
     def on_round(self, step: int, deadline_ms: int) -> None:
         """The round of a step is told, until that deadline: what was called for with it was released in that step.
@@ -73,12 +83,12 @@ class Knowledge:
             last = step - max(0, ms_after(deadline_ms, newest.deadline_ms)) // self.step_ms
             for call in undated:
                 number, sooner_ms = call.task.number, ms_after(newest.deadline_ms, call.deadline_ms)
-                self.tasks[number] = replace(self.tasks[number], release=last - round(sooner_ms / self.step_ms))
+                self.take_up(replace(self.tasks[number], release=last - round(sooner_ms / self.step_ms)))
 
     def on_state(self, state: StepState) -> bool:
         """A robot's word; True where it is news."""
         known = self.states.get(state.sender)
-        if state.sender not in self.robots or (known is not None and (state.step < known.step or state == known)):
+        if state.sender not in self._all or (known is not None and (state.step < known.step or state == known)):
             return False
         if known is not None and state.step > known.step:
             self.taken.pop(state.sender, None)
@@ -87,6 +97,7 @@ class Knowledge:
         if state.served:
             self.tasks.pop(state.task, None)
             self.calls.pop(state.task, None)
+            self._open_of = None
         elif state.loaded:
             self.loads[state.sender] = state.task
         return True
@@ -107,16 +118,26 @@ class Knowledge:
         return NO_TASK if state is None or state.served else state.task
 
     @property
-    def open_tasks(self) -> list[TransportTask]:
+    def open_tasks(self) -> Sequence[TransportTask]:
         """Tasks that nobody has picked up, lowest number first."""
-        gone = {*self.loads.values(), *self.taken.values()}
-        return [task for number, task in sorted(self.tasks.items()) if number not in gone]
+        return self._looked_at[0]
 
     @property
-    def wanted_cells(self) -> set[int]:
+    def wanted_cells(self) -> frozenset[int]:
         """Where somebody has to pick up or deliver."""
-        cells = {task.delivery for task in self.tasks.values()}
-        return cells | {task.pickup for task in self.open_tasks}
+        return self._looked_at[1]
+
+    @property
+    def _looked_at(self) -> tuple[list[TransportTask], frozenset[int]]:
+        """Worked out anew where a task came or went, was picked up or is known better."""
+        gone = frozenset((*self.loads.values(), *self.taken.values()))
+        if self._open_of != gone:
+            tasks = self.tasks
+            open_tasks = [tasks[number] for number in sorted(tasks) if number not in gone]
+            ends = {task.delivery for task in tasks.values()}
+            self._open = open_tasks, frozenset(ends.union([task.pickup for task in open_tasks]))
+            self._open_of = gone
+        return self._open
 
     def is_in_the_way(self, robot: int, home: int) -> bool:
         """Whether a robot's path ends where somebody has to pick up or deliver, and not at its ``home``."""
@@ -136,6 +157,7 @@ class Knowledge:
         """Forget tasks that nobody has aboard: the desk says again which there are."""
         aboard = set(self.loads.values())
         self.tasks = {number: task for number, task in self.tasks.items() if number in aboard}
+        self._open_of = None
 
     def behind(self, step: int) -> list[int]:
         """Robots that have not been heard to have come to a step."""
@@ -149,7 +171,7 @@ class Knowledge:
     def on_head(self, head: PathHead) -> bool:
         """A path begins to be told; True where it is complete already and new."""
         known = self.heads.get(head.sender)
-        if head.sender not in self.robots or (known is not None and not _is_newer_path(head, known)):
+        if head.sender not in self._all or (known is not None and not _is_newer_path(head, known)):
             return False
         begun = self._parts.get(head.sender)
         if begun is None or begun.head != head:
@@ -211,12 +233,11 @@ class Knowledge:
         ``leaving`` is a robot whose present step does not count any more.
         """
         found: list[tuple[int, int]] = []
-        taken, paths = cell_segment(resource), self.paths
-        for robot, path in paths.by_robot.items():
-            state = self.states.get(robot)
+        states, by_robot = self.states, self.paths.by_robot
+        for begins_us, ends_us, robot in self.paths.reservations.on(cell_segment(resource)):
+            path, state = by_robot[robot], states.get(robot)
             first = path.start if state is None else max(path.start, state.step + (robot == leaving))
-            begins_us = paths.reservations.first_start(robot, taken, first * STEP_US)
-            if begins_us is not None:
+            if ends_us > first * STEP_US:
                 found.append((max(first * STEP_US, begins_us), robot))
         return min(found)[1] if found else None
 

@@ -2,13 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import pairwise
 
 from onboard.contract.mapd import PathHead, PathMoves
 from onboard.core.effects import Effect, Send
 from onboard.systems.mapd.fields import MOST_MOVES, MOVE_BITS, MOVES_A_FRAME
 from onboard.systems.mapd.floor import Floor
-from onboard.systems.mapd.paths import Path
+from onboard.systems.mapd.paths import MOST_KEPT, Path
+from onboard.ways.network import Network
 
 _MASK = (1 << MOVE_BITS) - 1
 
@@ -45,14 +47,22 @@ class Assembly:
 
     def path(self, floor: Floor) -> Path | None:
         """The path, where all frames are there and each move is one of the floor."""
-        if len(self.parts) * MOVES_A_FRAME < self.head.moves or self.head.cell >= floor.size:
+        head = self.head
+        if len(self.parts) * MOVES_A_FRAME < head.moves or head.cell >= floor.size:
             return None
-        cells = [self.head.cell]
-        for number in range(self.head.moves):
-            codes = self.parts[number // MOVES_A_FRAME]
-            code = codes >> MOVE_BITS * (number % MOVES_A_FRAME) & _MASK
-            ways = floor.ways[cells[-1]]
-            if code > len(ways):
-                return None
-            cells.append(ways[code - 1] if code else cells[-1])
-        return Path(self.head.step, tuple(cells))
+        codes = tuple(self.parts[part] for part in range(-(-head.moves // MOVES_A_FRAME)))
+        cells = _cells(floor.network, head.cell, head.moves, codes)
+        return None if cells is None else Path(head.step, cells)
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _cells(network: Network[int], start: int, count: int, codes: tuple[int, ...]) -> tuple[int, ...] | None:
+    """Where ``count`` moves lead from a cell on, None where one is not of the floor: worked out once in one process."""
+    cells = [start]
+    for number in range(count):
+        code = codes[number // MOVES_A_FRAME] >> MOVE_BITS * (number % MOVES_A_FRAME) & _MASK
+        ways = network.ways[cells[-1]]
+        if code > len(ways):
+            return None
+        cells.append(ways[code - 1][0] if code else cells[-1])
+    return tuple(cells)

@@ -7,11 +7,14 @@ it leaves: never a ring in which each follows the next.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 from onboard.ways.network import Network
 from onboard.ways.reservations import Reservations, SlotWindow
 from onboard.ways.steps import STEP_US, cell_segment, path_windows
 
+#: Paths of which is kept what they take: of each robot its newest, and more.
+MOST_KEPT = 1024
 #: Asks for no robot: numbers of robots are not below 0.
 NOBODY = -1
 
@@ -56,7 +59,7 @@ class Paths:
     def put(self, robot: int, path: Path) -> None:
         """Publish a path in place of the robot's former one. Raises ``ValueError`` where it meets another's."""
         self.take(robot)
-        windows = path_windows(self.network, path.start, path.cells)
+        windows = _windows(self.network, path.start, path.cells)
         if self.reservations.conflicts(robot, windows):
             for step, cell in path.steps():
                 other = self.holder(cell, step)
@@ -95,3 +98,9 @@ class Paths:
     def horizon(self) -> int:
         """The step after which nobody moves any more."""
         return max((path.end for path in self.by_robot.values()), default=0)
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _windows(network: Network[int], start: int, cells: tuple[int, ...]) -> list[SlotWindow]:
+    """What a path takes: worked out once for all who hear of it in one process."""
+    return path_windows(network, start, cells)

@@ -5,7 +5,9 @@ and no plan is ever late. What it may enter is a matter of tokens all the same: 
 robots up and brings no two into one cell.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 from onboard.contract.codes import KindCode, MachineState, Reason, TaskPhase
 from onboard.contract.mapd import PathHead, PathMoves, StepRound, StepState, StepTurn, TurnRequest
@@ -26,7 +28,7 @@ from onboard.core.behaviour import NEVER_US
 from onboard.core.effects import Effect, Send
 from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import successor, to_bus_ms
-from onboard.systems.mapd.auction import Availability, Backlog, BidWeights, cost
+from onboard.systems.mapd.auction import Availability, Backlog, BidWeights, bids
 from onboard.systems.mapd.bidding import Round, UnitGeneration, bid_timing
 from onboard.systems.mapd.calls import CALL_AGAIN_US, mark_of
 from onboard.systems.mapd.driving import Driving
@@ -54,13 +56,18 @@ TOKENS_SAID_US = 1_000_000
 
 
 #: What may let a robot go on; all else, such as others' heartbeats, changes nothing for it.
-_OF_INTEREST = (Bid, StepState, PathMoves, PathHead, StepTurn, Award, CallForProposals, StepRound, TokenGrant)
+_OF_INTEREST: frozenset[type[Message]] = frozenset(
+    (Bid, StepState, PathMoves, PathHead, StepTurn, Award, CallForProposals, StepRound, TokenGrant)
+)
 #: What is said so often that a robot is to know whether it waits for it (``UnitRobot.heeds``).
 _OVERHEARD = frozenset(
     (Bid, StepState, PathMoves, PathHead, StepTurn, Award, CallForProposals, TaskReport, TurnRequest, Diagnostic)
 )
 #: What only the desk says.
 _OF_DESK = (StepTurn, Award, CallForProposals, StepRound)
+#: What ends a round, and what makes a robot look for another call in it.
+_OF_END: frozenset[type[Message]] = frozenset((StepTurn, Award))
+_OF_CHOICE: frozenset[type[Message]] = frozenset((Bid, CallForProposals))
 
 
 @dataclass
@@ -102,7 +109,15 @@ class UnitRobot(Plain):
         self.driving = Driving(self.fleet, site, self.knowledge)
         self.turns = Turns(0)
         self._home = site.homes[self.fleet.node_id]
+        self._own_rests = site.rests - set(site.homes.values())
         self._waiting = WaitingPlaces(site.floor, site.endpoints)
+        # Each hearer takes the class that it is listed under; Any is what a dispatch table costs.
+        self._hearers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
+            Bid: self._on_bid,
+            StepState: self._on_state,
+            **dict.fromkeys((PathHead, PathMoves), self._on_path),
+            **dict.fromkeys(_OF_DESK, self._on_desk),
+        }
         dealing = self.fleet.negotiation
         dealing.timing, dealing.slot = bid_timing(site.timing, site.bid_window_us), ANY_TIME
         dealing.stands = lambda call: call.sender == site.desk
@@ -124,26 +139,28 @@ class UnitRobot(Plain):
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Everything that others say of tasks, steps, bids and paths."""
-        self._is_new |= isinstance(message, _OF_INTEREST)
-        if isinstance(message, _OF_DESK) and message.sender != self.site.desk:
-            self.fleet.drops[Reason.NOT_AUTHORISED] += 1
-            return []
-        match message:
-            case Bid() if not self.knowledge.is_possible(message, self.rule):
-                self.fleet.drops[Reason.FALSE_STATEMENT] += 1
-            case Bid() if message.sender in self.site.homes:
-                self._heard_bids.append(message)
-                if self._bids is not None and self._is_of_round(message):
-                    self._bids.hear(message)
-            case StepState():
-                self.knowledge.on_state(message)
-            case PathMoves() | PathHead():
-                self._on_path(message)
-            case StepTurn() | Award() | CallForProposals() | StepRound():
-                return self._on_desk(message, now_us)
+        said = type(message)
+        self._is_new |= said in _OF_INTEREST
+        hearer = self._hearers.get(said)
+        return hearer(message, now_us) if hearer is not None else []
+
+    def _on_bid(self, bid: Bid, now_us: int) -> list[Effect]:
+        if not self.knowledge.is_possible(bid, self.rule):
+            self.fleet.drops[Reason.FALSE_STATEMENT] += 1
+        elif bid.sender in self.site.homes:
+            self._heard_bids.append(bid)
+            if self._bids is not None and self._is_of_round(bid):
+                self._bids.hear(bid)
+        return []
+
+    def _on_state(self, state: StepState, now_us: int) -> list[Effect]:
+        self.knowledge.on_state(state)
         return []
 
     def _on_desk(self, message: StepTurn | Award | CallForProposals | StepRound, now_us: int) -> list[Effect]:
+        if message.sender != self.site.desk:
+            self.fleet.drops[Reason.NOT_AUTHORISED] += 1
+            return []
         match message:
             case StepTurn():
                 self.turns.hear(message)
@@ -156,10 +173,11 @@ class UnitRobot(Plain):
                 self._on_round(message)
         return []
 
-    def _on_path(self, message: PathHead | PathMoves) -> None:
+    def _on_path(self, message: PathHead | PathMoves, now_us: int) -> list[Effect]:
         known = self.knowledge
         if known.on_head(message) if isinstance(message, PathHead) else known.on_moves(message):
             self._note_taken(message.sender)
+        return []
 
     def _on_round(self, message: StepRound) -> None:
         if message.step == self.step and message != self.round:
@@ -200,21 +218,22 @@ class UnitRobot(Plain):
 
     def heeds(self, message: Message) -> bool:
         """Whether a word may let it go on, by the phase that it is in; see ``_found`` for what each phase reads."""
+        said = type(message)
         if self.state is not self._state_by_task:
-            return isinstance(message, _OF_INTEREST)
-        if isinstance(message, Bid | Award) and self._takes_part(message):
+            return said in _OF_INTEREST
+        if isinstance(message, (Bid, Award)) and self._takes_part(message):
             return True
         match self.phase:
             case GridStepPhase.GATHER:
                 # Before the round is told nothing else counts.
-                return self.round is not None and isinstance(message, _OF_INTEREST)
-            case GridStepPhase.BID if isinstance(message, StepTurn | Award):
+                return self.round is not None and said in _OF_INTEREST
+            case GridStepPhase.BID if said in _OF_END:
                 return self.turns.is_complete
             case GridStepPhase.BID:
-                return isinstance(message, Bid | CallForProposals) and self._prefers_another()
+                return said in _OF_CHOICE and self._prefers_another()
             case GridStepPhase.TURNS:
                 return self.turns.next_to_plan(self.knowledge.heads) in (0, self.fleet.node_id)
-        return self.fleet.node_id not in self.knowledge.paths.by_robot or isinstance(message, CallForProposals)
+        return self.fleet.node_id not in self.knowledge.paths.by_robot or said is CallForProposals
 
     @property
     def _state_by_task(self) -> MachineState:
@@ -320,7 +339,8 @@ class UnitRobot(Plain):
         if robot != me:
             return (StepFinding.MISSING, [robot]) if robot else (StepFinding.ALL_PLANNED, [])
         missing = self.knowledge.pathless()
-        if self.turns.takes(me) not in (NO_TASK, *self.knowledge.tasks):
+        task = self.turns.takes(me)
+        if task != NO_TASK and task not in self.knowledge.tasks:
             missing.append(self.site.desk)
         return StepFinding.MISSING if missing else StepFinding.MY_TURN, missing
 
@@ -363,10 +383,10 @@ class UnitRobot(Plain):
     def _begin_bids(self, now_us: int) -> list[Effect]:
         """What each open task would cost; who is to make room for others' ends, or waits elsewhere better, says so."""
         assert self.round is not None
-        preferences = self._preferences()
-        self.generation.costs, self.generation.mark = {task: bid for bid, task in preferences}, mark_of(self.round)
+        costs = self._costs()
+        self.generation.costs, self.generation.mark = {task: bid for bid, task in costs}, mark_of(self.round)
         self.fleet.negotiation.leave_round(self.site.desk)
-        self._bids = Round(self.fleet.node_id, now_us, preferences)
+        self._bids = Round(self.fleet.node_id, now_us, costs)
         for heard in self._heard_bids:
             self._bids.hear(heard)
         self._ask_us = now_us + self.site.bid_window_us + ASK_US
@@ -407,12 +427,10 @@ class UnitRobot(Plain):
         body = self.driving.cart.state
         return body is not None and body.task != NO_TASK
 
-    def _preferences(self) -> list[tuple[int, int]]:
-        """What each open task would cost, cheapest first: the task-generation function of this system."""
-        floor, offer, tasks = self.site.floor, self._offer(), self.knowledge.open_tasks
-        backlog = Backlog.of(tasks, len(self.site.robots))
-        bids = ((cost(floor, self.rule, offer, task, backlog), task.number) for task in tasks)
-        return sorted((bid, number) for bid, number in bids if bid is not None)
+    def _costs(self) -> list[tuple[int, int]]:
+        """What each open task would cost, with its number: the task-generation function of this system."""
+        tasks = self.knowledge.open_tasks
+        return bids(self.site.floor, self.rule, self._offer(), tasks, Backlog.of(tasks, len(self.site.robots)))
 
     def _offer(self) -> Availability:
         """Where and when it will be free: at once, or where it delivers what it carries."""
@@ -426,8 +444,7 @@ class UnitRobot(Plain):
 
     def _rests(self) -> frozenset[int]:
         """Where it may end: not in others' homes, nor where somebody has to pick up or deliver; its home always."""
-        others = self.knowledge.wanted_cells | set(self.site.homes.values())
-        return (self.site.rests - others) | {self._home}
+        return self._own_rests - self.knowledge.wanted_cells | {self._home}
 
     def _wants_turn(self) -> bool:
         path = self.knowledge.paths.by_robot[self.fleet.node_id]

@@ -16,15 +16,17 @@ class Turns:
     step: int
     turns: dict[int, StepTurn] = field(default_factory=dict)
     won: dict[int, int] = field(default_factory=dict)
-    #: Robots in the order of their turns, and how many of them, first ones first, have told their paths.
-    _order: list[int] = field(default_factory=list)
+    #: Robots in the order of their turns, None where a turn was heard since; who of them has won.
+    _order: list[int] | None = None
+    _winners: set[int] = field(default_factory=set)
+    #: How many of them, first ones first, have told their paths.
     _planned: int = 0
 
     def hear(self, turn: StepTurn) -> None:
         """One turn, in any order, also twice; others' steps are passed over."""
         if turn.step == self.step and self.turns.get(turn.index) != turn:
             self.turns[turn.index] = turn
-            self._order, self._planned = [one.robot for _, one in sorted(self.turns.items()) if one.robot], 0
+            self._order, self._planned = None, 0
 
     def on_award(self, award: Award) -> bool:
         """An award, said before or after the turn; True where it is of this step."""
@@ -43,8 +45,9 @@ class Turns:
 
     def next_to_plan(self, heads: Mapping[int, PathHead]) -> int:
         """The first robot that has not told a path of this step, by the ``heads`` of all paths; 0 where all have."""
-        while self._planned < len(self._order):
-            robot = self._order[self._planned]
+        order = self._in_order()
+        while self._planned < len(order):
+            robot = order[self._planned]
             head = heads.get(robot)
             if head is None or head.step != self.step or not head.version:
                 return robot
@@ -53,5 +56,11 @@ class Turns:
 
     def takes(self, robot: int) -> int:
         """The task that a robot has won in this step, ``NO_TASK`` for none."""
-        has_won = any(turn.won for turn in self.turns.values() if turn.robot == robot)
-        return self.won.get(robot, NO_TASK) if has_won else NO_TASK
+        self._in_order()
+        return self.won.get(robot, NO_TASK) if robot in self._winners else NO_TASK
+
+    def _in_order(self) -> list[int]:
+        if self._order is None:
+            self._order = [turn.robot for _, turn in sorted(self.turns.items()) if turn.robot]
+            self._winners = {turn.robot for turn in self.turns.values() if turn.won}
+        return self._order
