@@ -62,8 +62,8 @@ class Listener:
             return LoggedFrame(frame, None, None, False)
         fleet, device = self._decoders_of(frame.channel)
         is_fleet = self.codecs.fleet.name_of(classic) is not None
-        decoder = fleet if is_fleet else device
-        message = decoder.feed(classic, frame.time_us)
+        decoder, codec = (fleet, self.codecs.fleet) if is_fleet else (device, self.codecs.device)
+        message = decoder.take(codec.decode_once(classic), frame.time_us)
         reason = None
         if decoder.drops:
             reason = next(iter(decoder.drops))

@@ -1,8 +1,9 @@
 """One listener's view of a bus: frames in, whole messages out, everything else counted under its reason."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 from onboard.contract.base import SetFrame
 from onboard.contract.codes import Grade, Reason
@@ -58,8 +59,12 @@ class Decoder:
 
     def feed(self, frame: Frame, now_us: int) -> Message | None:
         """The message that this frame completes, if any. Never raises, whatever the frame."""
-        part = self._codec.decode_part(frame)
-        if isinstance(part, Message) and type(part) in self._codec.wholes:
+        return self.take(self._codec.decode_part(frame), now_us)
+
+    def take(self, part: Message | Reason, now_us: int) -> Message | None:
+        """The same of what a codec has made of a frame."""
+        if type(part) in self._codec.wholes:
+            assert isinstance(part, Message), "a reason is no message"
             message: Message | None = part
         else:
             message = self._put_together(part, now_us)
@@ -77,14 +82,8 @@ class Decoder:
             return None
         if self._sets or self._whole:
             self._expire(now_us)
-        match part:
-            case Call() | CallTerms() | CallLoad() | CallParent():
-                return self._feed_call(part, now_us)
-            case ItineraryHead():
-                return self._feed_head(part, now_us)
-            case ItineraryLeg():
-                return self._feed_leg(part, now_us)
-        return None
+        feed = self._FEEDS.get(type(part))
+        return None if feed is None else feed(self, part, now_us)
 
     @property
     def unfinished(self) -> int:
@@ -131,6 +130,13 @@ class Decoder:
         if whole is not None:
             self._complete(key, now_us)
         return whole
+
+    #: What takes a part of each class.
+    _FEEDS: ClassVar[dict[type[Message], Callable[["Decoder", Any, int], Message | None]]] = {
+        **dict.fromkeys((Call, CallTerms, CallLoad, CallParent), _feed_call),
+        ItineraryHead: _feed_head,
+        ItineraryLeg: _feed_leg,
+    }
 
     def _drop_other(self, key: _Key, place: type[SetFrame] | int, part: SetFrame) -> None:
         """Drop a set that holds this part with another content. A part that comes twice as it was is inert."""
@@ -179,7 +185,7 @@ class Decoder:
 
 
 def _is_old(sets: dict[_Key, _Set], now_us: int) -> bool:
-    return now_us - sets[next(iter(sets))].heard_us > SET_TIMEOUT_US
+    return now_us - next(iter(sets.values())).heard_us > SET_TIMEOUT_US
 
 
 def _call(parts: dict[type[SetFrame] | int, SetFrame]) -> CallForProposals | None:
