@@ -80,7 +80,7 @@ class Decoder:
         if isinstance(part, Reason):
             self.drops[part] += 1
             return None
-        if self._sets or self._whole:
+        if _is_old(self._sets, now_us) or _is_old(self._whole, now_us):
             self._expire(now_us)
         feed = self._FEEDS.get(type(part))
         return None if feed is None else feed(self, part, now_us)
@@ -141,7 +141,8 @@ class Decoder:
     def _drop_other(self, key: _Key, place: type[SetFrame] | int, part: SetFrame) -> None:
         """Drop a set that holds this part with another content. A part that comes twice as it was is inert."""
         collected = self._sets.get(key)
-        if collected is not None and collected.parts.get(place, part) != part:
+        before = collected.parts.get(place) if collected is not None else None
+        if before is not None and before != part:
             del self._sets[key]
             self.drops[Reason.INCOMPLETE_SET] += 1
 
@@ -177,15 +178,17 @@ class Decoder:
 
     def _expire(self, now_us: int) -> None:
         """Sets are in the order of their last frames, so only the first ones can be too old."""
-        while self._sets and _is_old(self._sets, now_us):
+        while _is_old(self._sets, now_us):
             del self._sets[next(iter(self._sets))]
             self.drops[Reason.INCOMPLETE_SET] += 1
-        while self._whole and _is_old(self._whole, now_us):
+        while _is_old(self._whole, now_us):
             del self._whole[next(iter(self._whole))]
 
 
 def _is_old(sets: dict[_Key, _Set], now_us: int) -> bool:
-    return now_us - next(iter(sets.values())).heard_us > SET_TIMEOUT_US
+    for first in sets.values():
+        return now_us - first.heard_us > SET_TIMEOUT_US
+    return False
 
 
 def _call(parts: dict[type[SetFrame] | int, SetFrame]) -> CallForProposals | None:

@@ -55,7 +55,8 @@ class BusPicture:
         #: Boot counter and last sign of life, us of the log, by node.
         self.boots: dict[int, int] = {}
         self.heard_us: dict[int, int] = {}
-        #: The sign of life of each node that was taken up last: the same again tells only that its sender lives.
+        #: The sign of life of each node that was taken up last: one that differs in its mirror's digest only, which
+        #: nothing here reads, tells only that its sender lives.
         self.beats: dict[int, Heartbeat] = {}
         #: Machines that start, or hold for their journals: what they say that they hold is for the others to compare.
         self.announcing: set[int] = set()
@@ -70,12 +71,16 @@ class BusPicture:
         #: Bus time has jumped: until then (us of the log) machines wait for a second word, and decide no call.
         self.clock_settles_us = 0
         self._site = site
+        machines = site.machines.values() if site is not None else ()
+        self._kinds = {machine.node_id: machine.kind for machine in machines}
         #: The body that was told of last, by what and when.
         self._told: tuple[Progress | None, int, ReportedPosition | None] = None, 0, None
         #: What the picture is made of, and what takes it up at a time in us, after the rules have seen it: half of what
         #: is said on a bus is none of it.
         self.taken: dict[type[Message], Callable[[Any, int], None]] = {
-            **dict.fromkeys((TokenGrant, TokenHeld, TokenAssigned, Regeneration), self.tokens.feed),
+            TokenGrant: self.tokens.on_grant,
+            TokenHeld: self.tokens.on_held,
+            **dict.fromkeys((TokenAssigned, Regeneration), self.tokens.on_operator),
             Heartbeat: self._on_heartbeat,
             BusTime: self._on_bus_time,
             Progress: self._on_progress,
@@ -115,8 +120,7 @@ class BusPicture:
 
     def kind(self, node: int) -> KindCode | None:
         """Kind of a machine by the site file."""
-        machine = self._site.machines.get(node) if self._site is not None else None
-        return machine.kind if machine is not None else None
+        return self._kinds.get(node)
 
     def bus_us(self, time_us: int) -> int | None:
         """Bus time at a time of the log; None before anybody told it. Low by the time that a frame takes."""
