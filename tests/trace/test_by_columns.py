@@ -3,13 +3,14 @@
 import random
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from cantools.database import load_string
 from cantools.database.can.database import Database
 
 from onboard.contract.codes import KindCode, MachineState, Reason
-from onboard.contract.messages import Halted, Heartbeat, Message
+from onboard.contract.messages import BusTime, Halted, Heartbeat, Message, Progress, Waiting
 from onboard.trace.check.checks import Checks
 from onboard.trace.cli import main
 from onboard.trace.dump.formats import log_line
@@ -158,12 +159,8 @@ def _odd_log(path: Path, odd: list[str], *, step_us: int) -> Path:
     return path
 
 
-@pytest.mark.parametrize("step_us", [10, -1_500_000, -20])
-@pytest.mark.parametrize("kind", _ODD)
-def test_odd_frames_are_shown_and_judged_by_columns_as_frame_by_frame(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, step_us: int
-) -> None:
-    log_file = _odd_log(tmp_path / "odd.log", _ODD[kind], step_us=step_us)
+def _verdicts(log_file: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What is judged by columns, and frame by frame."""
     together, one_by_one = Checks(SITE), Checks(SITE)
     with Log(str(log_file)) as log:
         for portion in log.portions():
@@ -172,7 +169,52 @@ def test_odd_frames_are_shown_and_judged_by_columns_as_frame_by_frame(
     with Log(str(log_file)) as log:
         for raw in log.one_by_one():
             one_by_one.feed_raw(raw)
-    assert together.finish().to_json() == one_by_one.finish().to_json()
+    return together.finish().to_json(), one_by_one.finish().to_json()
+
+
+def _said_log(path: Path, said: list[tuple[int, Message]]) -> Path:
+    """A log of messages at seconds."""
+    path.write_text("".join(f"({time_s:010d}.000000) {_frame_line(message)}\n" for time_s, message in said))
+    return path
+
+
+def test_a_sign_of_life_behind_a_halt_is_news_though_it_was_heard_before(tmp_path: Path) -> None:
+    one, other, *_ = (node for node, machine in SITE.machines.items() if machine.kind is KindCode.ROBOT)
+    beat = replace(_BEAT, sender=one)
+    home = SITE.machines[other].home
+    said: list[tuple[int, Message]] = [
+        (1, beat),
+        (2, Halted(one, one, Reason.ACTUATOR_FAULT, 0, True, 1)),
+        (3, beat),
+        (4, Waiting(other, home.track, home.index, one, Reason.NONE)),
+        (34, Progress(other, 1, 0, home.track, home.index, 0, 500)),
+    ]
+    together, one_by_one = _verdicts(_said_log(tmp_path / "halt.log", said))
+    assert together == one_by_one
+    assert together["waits_us"] == {other: 30_000_000}
+
+
+def test_a_start_is_news_though_it_was_heard_before(tmp_path: Path) -> None:
+    start = replace(_BEAT, state=MachineState.STARTING)
+    said: list[tuple[int, Message]] = [
+        (1, start),
+        (2, BusTime(1, 2_000_000)),
+        (3, start),
+        (12, BusTime(1, 3_000_000)),
+    ]
+    together, one_by_one = _verdicts(_said_log(tmp_path / "start.log", said))
+    assert together == one_by_one
+    assert together["runs"] == 2
+
+
+@pytest.mark.parametrize("step_us", [10, -1_500_000, -20])
+@pytest.mark.parametrize("kind", _ODD)
+def test_odd_frames_are_shown_and_judged_by_columns_as_frame_by_frame(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, step_us: int
+) -> None:
+    log_file = _odd_log(tmp_path / "odd.log", _ODD[kind], step_us=step_us)
+    together, one_by_one = _verdicts(log_file)
+    assert together == one_by_one
     command = ["dump", str(log_file), "--decode", "--site", str(SITE_FILE)]
     capsys.readouterr()
     assert main(command) == 0
