@@ -31,7 +31,10 @@ _FIELDS: dict[type[Message], tuple[int, int] | None] = {}
 def singles(message: Message) -> Sequence[Message]:
     """The words for which this one stands: itself, or one for each segment of a run in its order; none of a bad run."""
     word: Any = message
-    at = _token_fields(type(message))
+    try:
+        at = _FIELDS[type(message)]
+    except KeyError:
+        at = _token_fields(type(message))
     if at is None or word.token_kind is not TokenKind.RUN:
         return (message,)
     track, first, last = word.token >> 16, word.token >> 8 & 0xFF, word.token & 0xFF
@@ -49,9 +52,8 @@ def singles(message: Message) -> Sequence[Message]:
 
 def _token_fields(kind: type[Message]) -> tuple[int, int] | None:
     """Where messages of a class name a token among their fields: its kind and its number; None where they do not."""
-    if kind not in _FIELDS:
-        names = kind.__match_args__
-        _FIELDS[kind] = (names.index("token_kind"), names.index("token")) if "token_kind" in names else None
+    names = kind.__match_args__
+    _FIELDS[kind] = (names.index("token_kind"), names.index("token")) if "token_kind" in names else None
     return _FIELDS[kind]
 
 

@@ -231,19 +231,16 @@ class _Cut(NamedTuple):
 
 
 class _Plain(NamedTuple):
-    """A message that always has the same signals, each of whole numbers."""
+    """A message that always has the same signals, each of whole numbers; ``little`` where all are little-endian."""
 
     begins: str
     length: int
-    has_big: bool
     cuts: tuple[_Cut, ...]
+    little: tuple[tuple[_Told, int, int], ...]
 
     def text(self, data: bytes) -> str:
         """The signals of a frame that is long enough."""
-        little = int.from_bytes(data, "little")
-        if not self.has_big:
-            return ", ".join([told[little >> shift & mask] for told, _, shift, mask in self.cuts])
-        big = int.from_bytes(data[: self.length], "big")
+        little, big = int.from_bytes(data, "little"), int.from_bytes(data[: self.length], "big")
         return ", ".join([told[(big if is_big else little) >> shift & mask] for told, is_big, shift, mask in self.cuts])
 
 
@@ -293,7 +290,12 @@ class AnyDbc:
     def words(self, can_id: int, data: bytes, *, is_extended: bool) -> str | None:
         """Name and signals of a whole frame; None for what ``decode`` must look at."""
         plain = self._plain.get((can_id, is_extended))
-        return plain.begins + plain.text(data) if plain is not None and len(data) >= plain.length else None
+        if plain is None or len(data) < plain.length:
+            return None
+        if not plain.little:
+            return plain.begins + plain.text(data)
+        bits = int.from_bytes(data, "little")
+        return plain.begins + ", ".join([told[bits >> shift & mask] for told, shift, mask in plain.little])
 
     def _plain_of(self, message: DbcMessage) -> _Plain | None:
         """None where signals depend on others, are no whole numbers, or do not lie in the message: cantools judges."""
@@ -309,7 +311,8 @@ class AnyDbc:
             cuts.append(_Cut(self._told_of(signal), is_big, shift, (1 << signal.length) - 1))
         if len({signal.name for signal in message.signals}) < len(cuts):
             return None
-        return _Plain(f"{message.name}: ", message.length, any(cut.is_big for cut in cuts), tuple(cuts))
+        little = () if any(cut.is_big for cut in cuts) else tuple((cut.told, cut.shift, cut.mask) for cut in cuts)
+        return _Plain(f"{message.name}: ", message.length, tuple(cuts), little)
 
     def _told_of(self, signal: DbcSignal) -> _Told:
         choices = tuple(sorted((value, str(name)) for value, name in (signal.choices or {}).items()))

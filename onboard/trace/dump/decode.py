@@ -73,8 +73,9 @@ class _Lines(ABC):
     def _new(self, time_us: int, channel: str, key: bytes) -> str | None:
         """The words of a data frame that are not known, by its key (``FrameBlock.keys``)."""
         can_id, data, is_extended = data_frame(key)
-        said = self._say_whole(can_id, data, is_extended=is_extended)
-        return self._kept(key, said or self._say(RawFrame(time_us, channel, can_id, data, is_extended)))
+        whole = self._say_whole(can_id, data, is_extended=is_extended)
+        said = whole or self._say(RawFrame(time_us, channel, can_id, data, is_extended))
+        return self._kept(key, said) if said[1] else said[0]
 
     def _kept(self, key: object, said: tuple[str | None, bool]) -> str | None:
         words, is_fixed = said
