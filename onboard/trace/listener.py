@@ -62,8 +62,8 @@ class Listener:
             return LoggedFrame(frame, None, None, False)
         fleet, device = self._decoders_of(frame.channel)
         is_fleet = self.codecs.fleet.name_of(classic) is not None
-        decoder, codec = (fleet, self.codecs.fleet) if is_fleet else (device, self.codecs.device)
-        message = decoder.take(codec.decode_once(classic), frame.time_us)
+        decoder = fleet if is_fleet else device
+        message = decoder.feed(classic, frame.time_us)
         reason = None
         if decoder.drops:
             reason = next(iter(decoder.drops))
@@ -94,5 +94,6 @@ class Listener:
         if found is None:
             if len(self._decoders) >= MOST_CHANNELS:
                 return next(iter(self._decoders.values()))
-            found = self._decoders[channel] = (Decoder(self.codecs.fleet), Decoder(self.codecs.device))
+            fleet, device = (Decoder(codec, is_only_one=True) for codec in self.codecs)
+            found = self._decoders[channel] = fleet, device
         return found

@@ -10,7 +10,7 @@ to rings; which tracks are at one mouth never matters to who has its token.
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, singledispatch
 from typing import NamedTuple
 
 from onboard.contract.codes import KindCode, Side
@@ -293,8 +293,12 @@ def _crosswise(tracks: dict[int, Track]) -> Iterator[int]:
                 ahead += [(there, is_across is not turns) for there, turns in ways[here]]
 
 
+@singledispatch
 def way_site(site: Site) -> WaySite:
     """The same site with its tracks; one whose machines do not move along any has none."""
-    if isinstance(site, WaySite):
-        return site
     return WaySite(**{one.name: getattr(site, one.name) for one in fields(Site)})
+
+
+@way_site.register
+def _(site: WaySite) -> WaySite:
+    return site

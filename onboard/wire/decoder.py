@@ -48,10 +48,16 @@ class _Set:
 class Decoder:
     """Puts sets of frames together for one listener. ``drops`` counts what came to nothing, by reason."""
 
-    def __init__(self, codec: Codec, machines: Mapping[int, Machine] | None = None) -> None:
-        """With ``machines``, those of a site by node-ID, what none of them listens to is dropped too."""
+    def __init__(
+        self, codec: Codec, machines: Mapping[int, Machine] | None = None, *, is_only_one: bool = False
+    ) -> None:
+        """With ``machines``, those of a site by node-ID, what none of them listens to is dropped too.
+
+        ``is_only_one``: nobody else decodes the same frames, so nothing is remembered for others.
+        """
         self.drops: Counter[Reason] = Counter()
         self._codec = codec
+        self._decode = codec.decode_once if is_only_one else codec.decode_part
         self._machines = machines
         self._sets: dict[_Key, _Set] = {}
         #: Sets that were whole, from then on: what is said twice on a bus may come twice.
@@ -59,10 +65,7 @@ class Decoder:
 
     def feed(self, frame: Frame, now_us: int) -> Message | None:
         """The message that this frame completes, if any. Never raises, whatever the frame."""
-        return self.take(self._codec.decode_part(frame), now_us)
-
-    def take(self, part: Message | Reason, now_us: int) -> Message | None:
-        """The same of what a codec has made of a frame."""
+        part = self._decode(frame)
         if type(part) in self._codec.wholes:
             assert isinstance(part, Message), "a reason is no message"
             message: Message | None = part

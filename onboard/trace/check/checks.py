@@ -204,9 +204,8 @@ class Checks:
     def _completed(self, time_us: int, channel: str, frame: Frame) -> Message | None:
         """The message that a frame completes which is none by itself, or is one of a device bus."""
         fleet, device = self._decoders_of(channel)
-        is_fleet = self._codecs[0].name_of(frame) is not None
-        decoder, codec = (fleet, self._codecs[0]) if is_fleet else (device, self._codecs[1])
-        message = decoder.take(codec.decode_once(frame), time_us)
+        decoder = fleet if self._codecs[0].name_of(frame) is not None else device
+        message = decoder.feed(frame, time_us)
         if message is None and decoder.drops:
             self._count_drops(decoder)
         return message
@@ -385,7 +384,8 @@ class Checks:
         if found is None:
             if len(self._decoders) >= MOST_CHANNELS:
                 return next(iter(self._decoders.values()))
-            found = self._decoders[channel] = (Decoder(self._codecs[0]), Decoder(self._codecs[1]))
+            fleet, device = (Decoder(codec, is_only_one=True) for codec in self._codecs)
+            found = self._decoders[channel] = fleet, device
         return found
 
     def _count_drops(self, decoder: Decoder) -> None:
