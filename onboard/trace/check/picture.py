@@ -24,7 +24,7 @@ from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment, Site
 from onboard.trace.check.geometry import ReportedPosition, body_at, body_of, floors_of
 from onboard.trace.check.tokens_seen import TokensSeen
-from onboard.ways.site import way_site
+from onboard.ways.site import WaySite, way_site
 
 #: A machine that was not heard for so long counts as silent, us: three missing heartbeats (dbc/fleet.dbc).
 SILENT_US = 7_000_000
@@ -71,6 +71,7 @@ class BusPicture:
         #: Bus time has jumped: until then (us of the log) machines wait for a second word, and decide no call.
         self.clock_settles_us = 0
         self._site = site
+        self._ways = way_site(site) if site is not None else None
         machines = site.machines.values() if site is not None else ()
         self._kinds = {machine.node_id: machine.kind for machine in machines}
         #: The body that was told of last, by what and when.
@@ -95,6 +96,13 @@ class BusPicture:
         if self._site is None:
             raise ValueError("this rule needs the site file")
         return self._site
+
+    @property
+    def ways(self) -> WaySite:
+        """The site with its tracks. Raises ``ValueError`` as ``site`` does."""
+        if self._ways is None:
+            raise ValueError("this rule needs the site file")
+        return self._ways
 
     @property
     def has_site(self) -> bool:
@@ -172,11 +180,11 @@ class BusPicture:
 
     def body_told(self, progress: Progress, time_us: int) -> ReportedPosition | None:
         """The body that a message tells of, worked out once for all rules; None where the site has no such track."""
-        if self._site is None:
+        if self._ways is None:
             return None
         told, told_us, body = self._told
         if told is not progress or told_us != time_us:
-            body = body_of(self._site, progress, time_us)
+            body = body_of(self._ways, progress, time_us)
             self._told = progress, time_us, body
         return body
 

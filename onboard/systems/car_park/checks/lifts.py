@@ -22,7 +22,6 @@ from onboard.trace.check.geometry import (
 )
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
-from onboard.ways.site import way_site
 
 
 class _LiftRule(Rule):
@@ -105,9 +104,9 @@ class LiftCrush(_LiftRule):
         (self._crossing.add if event.message.crossing else self._crossing.discard)(event.message.sender)
 
     def _moves(self, event: LogEvent[Message], track: int, node: int, how: str) -> None:
-        site, gate = self.picture.site, Segment(track, GATE_INDEX)
+        ways, gate = self.picture.ways, Segment(track, GATE_INDEX)
         over = [
-            body.node for body in self._robots() if gate in occupied(site, body) and track in lifts_under(site, body)
+            body.node for body in self._robots() if gate in occupied(ways, body) and track in lifts_under(ways, body)
         ]
         if not over and node not in self._crossing:
             self._told.discard(node)
@@ -139,7 +138,7 @@ class PlatformThere(Rule):
     def _on_progress(self, event: LogEvent[Progress]) -> None:
         body = self.picture.body_told(event.message, event.time_us)
         if body is not None and self.picture.kind(body.node) is KindCode.ROBOT:
-            self._judge(event, body, occupied(self.picture.site, body), "is over")
+            self._judge(event, body, occupied(self.picture.ways, body), "is over")
 
     def _on_order(self, event: LogEvent[DriveOrder]) -> None:
         body = self.picture.bodies.get(event.message.sender)
@@ -151,7 +150,7 @@ class PlatformThere(Rule):
         self._judge(event, body, slots, "is sent over")
 
     def _judge(self, event: LogEvent[Message], body: ReportedPosition, slots: Sequence[Segment], how: str) -> None:
-        site, wrong = way_site(self.picture.site), False
+        site, wrong = self.picture.ways, False
         for slot in slots:
             lift = self.picture.bodies.get(site.stewards.get(slot.track, 0)) if slot.index == GATE_INDEX else None
             if lift is None or lift.track != slot.track:

@@ -49,17 +49,17 @@ class InsideAuthority(Rule):
         body = self.picture.body_told(event.message, event.time_us)
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
-        deceleration = way_site(self.picture.site).carrier.acceleration_mm_s2
+        deceleration = self.picture.ways.carrier.acceleration_mm_s2
         was_pushed = self._was_pushed(body)
         self._pushed.pop(body.node, None)
         if was_pushed:
             self._pushed[body.node] = event, body, event.time_us + PUSHED_US
             return
         braking_mm = body.speed_mm_s * abs(body.speed_mm_s) / (2 * deceleration)
-        here = occupied(self.picture.site, body)
+        here = occupied(self.picture.ways, body)
         self._judge(event, body, here, "is in")
         if braking_mm:
-            ahead = swept(self.picture.site, body, body.position_mm + braking_mm)
+            ahead = swept(self.picture.ways, body, body.position_mm + braking_mm)
             self._judge(event, body, [slot for slot in ahead if slot not in here], "cannot stop before")
 
     def _was_pushed(self, body: ReportedPosition) -> bool:
@@ -75,7 +75,7 @@ class InsideAuthority(Rule):
         for node, (event, body, due_us) in list(self._pushed.items()):
             if now_us >= due_us:
                 del self._pushed[node]
-                self._judge(event, body, occupied(self.picture.site, body), "was pushed, and stays in", now_us)
+                self._judge(event, body, occupied(self.picture.ways, body), "was pushed, and stays in", now_us)
 
     def _on_order(self, event: LogEvent[DriveOrder]) -> None:
         body = self.picture.bodies.get(event.message.sender)
@@ -128,16 +128,16 @@ class OneBody(Rule):
         return {Progress: self._on_progress}
 
     def _on_progress(self, event: LogEvent[Progress]) -> None:
-        site, body = self.picture.site, self.picture.body_told(event.message, event.time_us)
+        ways, body = self.picture.ways, self.picture.body_told(event.message, event.time_us)
         if body is None or body.node not in self._robots:
             return
-        lifts, near_mm = lifts_under(site, body), way_site(site).carrier_length_mm - TOLERANCE_MM
+        lifts, near_mm = lifts_under(ways, body), ways.carrier_length_mm - TOLERANCE_MM
         for other in self.picture.bodies.values():
             if other.node == body.node or other.node not in self._robots:
                 continue
             if other.track == body.track and abs(other.position_mm - body.position_mm) < near_mm:
                 self._judge_near(event, body, other)
-            for lift in sorted(lifts & lifts_under(site, other)) if lifts else ():
+            for lift in sorted(lifts & lifts_under(ways, other)) if lifts else ():
                 self.find(event, (body.node, other.node), f"both on the platform of lift {lift}")
             if body.track not in self._mouths and other.track not in self._mouths:
                 continue
@@ -153,12 +153,12 @@ class OneBody(Rule):
             self.find(event, (body.node, other.node), f"{abs(apart_mm)} mm apart on track {body.track}")
 
     def _name(self, track: int) -> str:
-        kind = way_site(self.picture.site).tracks[track].kind
+        kind = self.picture.ways.tracks[track].kind
         return f"{'spur' if kind is TrackKind.SPUR else 'track'} {track}"
 
     def _is_in_mouth_of(self, one: ReportedPosition, two: ReportedPosition) -> bool:
         """Whether a body is where another turns into a track, or comes out of it."""
-        ways = way_site(self.picture.site)
+        ways = self.picture.ways
         here = occupied(ways, two)
         for mouth in self._mouths[two.track]:
             if mouth not in here:
