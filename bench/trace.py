@@ -3,9 +3,10 @@
     python -m bench.trace [--megabytes 5] [--long 100] [--log LOG --site SITE] [--before DIR]
 
 The log is a run of the small site, repeated, or LOG of SITE; each program prints one decoded line a frame or message,
-and `export` writes columns. ``--before`` names another checkout of this project, measured in the same run. ``--long``
-reads one of that many megabytes with ours alone, for its memory. Times are of the processor; absolute times drift,
-keep the ratio. A log that was repeated is kind to what remembers frames: give a LOG for figures.
+and `export` writes columns. ``--before`` names another checkout of this project, measured in the same run; SITE is
+one that both can read. ``--long`` reads one of that many megabytes with ours alone, for its memory. Times are of the
+processor; absolute times drift, keep the ratio. A log that was repeated is kind to what remembers frames: give a LOG
+for figures.
 """
 
 import argparse

@@ -24,19 +24,37 @@ _JOINED: dict[type[Message], str] = {
     TokenRefusal: "version",
     TokenRequest: "version_seen",
 }
+#: What ``_token_fields`` has found, one row a class.
+_FIELDS: dict[type[Message], tuple[int, int] | None] = {}
 
 
 def singles(message: Message) -> Sequence[Message]:
     """The words for which this one stands: itself, or one for each segment of a run in its order; none of a bad run."""
-    if getattr(message, "token_kind", None) is not TokenKind.RUN:
-        return (message,)
     word: Any = message
+    try:
+        at = _FIELDS[type(message)]
+    except KeyError:
+        at = _token_fields(type(message))
+    if at is None or word.token_kind is not TokenKind.RUN:
+        return (message,)
     track, first, last = word.token >> 16, word.token >> 8 & 0xFF, word.token & 0xFF
     if abs(last - first) >= MOST_OF_RUN:
         return ()
     step = 1 if last >= first else -1
-    numbers = [track << 8 | index for index in range(first, last + step, step)]
-    return [replace(word, token_kind=TokenKind.SEGMENT, token=number) for number in numbers]
+    kind, values, (at_kind, at_token) = type(word), list(word.values_of(word)), at
+    values[at_kind] = TokenKind.SEGMENT
+    found = []
+    for index in range(first, last + step, step):
+        values[at_token] = track << 8 | index
+        found.append(kind(*values))
+    return found
+
+
+def _token_fields(kind: type[Message]) -> tuple[int, int] | None:
+    """Where messages of a class name a token among their fields: its kind and its number; None where they do not."""
+    names = kind.__match_args__
+    _FIELDS[kind] = (names.index("token_kind"), names.index("token")) if "token_kind" in names else None
+    return _FIELDS[kind]
 
 
 def is_joined(message: Message) -> bool:

@@ -1,17 +1,20 @@
 """What ends a program from outside: Ctrl-C, a supervisor's SIGTERM, a terminal that is closed."""
 
-import asyncio
 import contextlib
 import signal
 import threading
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import asyncio
 
 _OTHERS = (signal.SIGTERM, signal.SIGHUP)
 _ENDING = (signal.SIGINT, *_OTHERS)
 
 
 @contextlib.contextmanager
-def ended_by(loop: asyncio.AbstractEventLoop, end: Callable[[signal.Signals], None]) -> Iterator[None]:
+def ended_by(loop: "asyncio.AbstractEventLoop", end: Callable[[signal.Signals], None]) -> Iterator[None]:
     """``end`` is called on the loop for every signal that asks a program to end, instead of ending it in the middle.
 
     A closed terminal counts unless the program was started to outlive it (nohup). Does nothing outside the main

@@ -94,5 +94,6 @@ class Listener:
         if found is None:
             if len(self._decoders) >= MOST_CHANNELS:
                 return next(iter(self._decoders.values()))
-            found = self._decoders[channel] = (Decoder(self.codecs.fleet), Decoder(self.codecs.device))
+            fleet, device = (Decoder(codec, is_only_one=True) for codec in self.codecs)
+            found = self._decoders[channel] = fleet, device
         return found

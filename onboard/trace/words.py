@@ -69,16 +69,17 @@ class Words:
             if len(self._criteria) > _CALLS_KEPT:
                 del self._criteria[next(iter(self._criteria))]
 
-    def is_fixed(self, message: Message) -> bool:
-        """Whether the same message is always said in the same words, whatever was said before."""
-        return (self._kinds.get(type(message)) or self._kind(message)).is_fixed
-
     def message(self, message: Message) -> str:
         """``MR1 Bid: initiator IOC1, call 1, cost 43.210 s, itinerary version 2``."""
-        begins, phrases, is_heard, _ = self._kinds.get(type(message)) or self._kind(message)
+        return self.said(message)[0]
+
+    def said(self, message: Message) -> tuple[str, bool]:
+        """The same, and whether this message is always said in the same words, whatever was said before."""
+        begins, phrases, is_heard, is_fixed = self._kinds.get(type(message)) or self._kind(message)
         if is_heard:
             self.hear(message)
-        return self.machine(message.sender) + begins + ", ".join([say(taken(message)) for taken, say in phrases])
+        words = ", ".join([say(taken(message)) for taken, say in phrases])
+        return self.machine(message.sender) + begins + words, is_fixed
 
     def _kind(self, message: Message) -> _Kind:
         phrases, is_call = tuple(self._phrases_of(message)), isinstance(message, CallForProposals)

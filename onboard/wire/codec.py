@@ -72,7 +72,7 @@ class Codec:
         #: Which kinds of machine may say what on the bus, by the DBC.
         self.speakers = speakers_of(frames)
         #: A whole message, a part of a set (``SetFrame``), or why the frame is none.
-        self.decode_part = lru_cache(maxsize=_MEMORY)(self._decode)
+        self.decode_part = lru_cache(maxsize=_MEMORY)(self.decode_once)
 
     # --- out ---------------------------------------------------------------------------------------------------
 
@@ -99,7 +99,7 @@ class Codec:
     def whole(self, arbitration_id: int, data: bytes) -> Message | None:
         """The message of a classic data frame with a 29-bit identifier; None for a part of a set and what is none.
 
-        Nothing is remembered: of a log each frame has one reader, who does that better.
+        Nothing is remembered, as in ``decode_once``.
         """
         sender = arbitration_id & _NODE_MASK
         found = self._wholes.get(arbitration_id - sender)
@@ -116,7 +116,8 @@ class Codec:
         found = self._by_id.get(frame.arbitration_id & ~_NODE_MASK) if frame.is_extended else None
         return found.name if found is not None else None
 
-    def _decode(self, frame: Frame) -> Message | Reason:
+    def decode_once(self, frame: Frame) -> Message | Reason:
+        """The same as ``decode_part``, and nothing is remembered: of a log each frame has one reader."""
         arbitration_id, data, is_extended, is_remote, is_error, _ = frame
         if is_error or is_remote or not is_extended:
             return Reason.UNKNOWN_IDENTIFIER

@@ -4,8 +4,9 @@ cantools changes its internals with every release (it is pinned); nothing but th
 """
 
 import re
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 from cantools.database import DecodeError, load_string
@@ -224,13 +225,40 @@ class Decoded(NamedTuple):
     text: str
 
 
+class _Told(dict[int, str]):
+    """Words of a signal by its bits, as a number without sign; what is not there yet is put into words."""
+
+    def __init__(self, tell: Callable[[int], str]) -> None:
+        super().__init__()
+        self._tell = tell
+
+    def __missing__(self, raw: int) -> str:
+        words = self._tell(raw)
+        self[raw] = words
+        return words
+
+
 class _Cut(NamedTuple):
     """A signal of whole numbers: its bits in the big-endian or little-endian number of the message's bytes."""
 
-    number: int
+    told: _Told
     is_big: bool
     shift: int
     mask: int
+
+
+class _Plain(NamedTuple):
+    """A message that always has the same signals, each of whole numbers; ``little`` where all are little-endian."""
+
+    begins: str
+    length: int
+    cuts: tuple[_Cut, ...]
+    little: tuple[tuple[_Told, int, int], ...]
+
+    def text(self, data: bytes) -> str:
+        """The signals of a frame that is long enough."""
+        little, big = int.from_bytes(data, "little"), int.from_bytes(data[: self.length], "big")
+        return ", ".join([told[(big if is_big else little) >> shift & mask] for told, is_big, shift, mask in self.cuts])
 
 
 class AnyDbc:
@@ -255,20 +283,18 @@ class AnyDbc:
             raise AnyDbcError(" ".join(str(error).split())[:200]) from error
         assert isinstance(database, Database)
         self._messages = {(one.frame_id, one.is_extended_frame): one for one in database.messages}
-        self._signals: list[DbcSignal] = []
-        #: By identifier, of messages that always have the same signals.
-        self._cuts = {key: self._cuts_of(one) for key, one in self._messages.items()}
-        #: Words by a signal's number here and its bits.
-        self._told: dict[tuple[int, int], str] = {}
+        #: Words of signals that are said alike, whichever messages they are in; and how many words there are.
+        self._told: dict[Hashable, _Told] = {}
+        self._words_kept = 0
+        self._plain = {key: self._plain_of(one) for key, one in self._messages.items()}
 
     def decode(self, can_id: int, data: bytes, *, is_extended: bool) -> Decoded | None:
         """The frame in words, or None for an identifier that the DBC has not. A short frame gives what it holds."""
         message = self._messages.get((can_id, is_extended))
         if message is None:
             return None
-        cuts = self._cuts[can_id, is_extended]
-        if cuts is not None and len(data) >= message.length:
-            return Decoded(message.name, message.length, self._cut(cuts, data[: message.length]))
+        if (plain := self._plain[can_id, is_extended]) is not None and len(data) >= message.length:
+            return Decoded(message.name, message.length, plain.text(data))
         units = {signal.name: signal.unit or "" for signal in message.signals}
         try:
             values = message.decode(data, allow_truncated=True)
@@ -278,23 +304,17 @@ class AnyDbc:
         text = ", ".join(f"{name} {_told(value, units.get(name, ''))}" for name, value in values.items())
         return Decoded(message.name, message.length, text)
 
-    def _cut(self, cuts: list[_Cut], data: bytes) -> str:
-        told = self._told
-        little, big = int.from_bytes(data, "little"), int.from_bytes(data, "big")
-        raws = [(number, (big if is_big else little) >> shift & mask) for number, is_big, shift, mask in cuts]
-        return ", ".join([told.get(raw) or self._tell(*raw) for raw in raws])
+    def words(self, can_id: int, data: bytes, *, is_extended: bool) -> str | None:
+        """Name and signals of a whole frame; None for what ``decode`` must look at."""
+        plain = self._plain.get((can_id, is_extended))
+        if plain is None or len(data) < plain.length:
+            return None
+        if not plain.little:
+            return plain.begins + plain.text(data)
+        bits = int.from_bytes(data, "little")
+        return plain.begins + ", ".join([told[bits >> shift & mask] for told, shift, mask in plain.little])
 
-    def _tell(self, number: int, raw: int) -> str:
-        signal = self._signals[number]
-        half = 1 << signal.length - 1
-        value = signal.conversion.raw_to_scaled((raw ^ half) - half if signal.is_signed else raw, decode_choices=True)
-        text = f"{signal.name} {_told(value, signal.unit or '')}"
-        if len(self._told) >= _TOLD_KEPT:
-            self._told.clear()
-        self._told[number, raw] = text
-        return text
-
-    def _cuts_of(self, message: DbcMessage) -> list[_Cut] | None:
+    def _plain_of(self, message: DbcMessage) -> _Plain | None:
         """None where signals depend on others, are no whole numbers, or do not lie in the message: cantools judges."""
         bits = 8 * message.length
         cuts: list[_Cut] = []
@@ -305,11 +325,26 @@ class AnyDbc:
             if message.is_multiplexed() or signal.is_float or not 0 < signal.length <= bits - first:
                 return None
             shift = bits - first - signal.length if is_big else first
-            cuts.append(_Cut(len(self._signals) + len(cuts), is_big, shift, (1 << signal.length) - 1))
+            cuts.append(_Cut(self._told_of(signal), is_big, shift, (1 << signal.length) - 1))
         if len({signal.name for signal in message.signals}) < len(cuts):
             return None
-        self._signals += message.signals
-        return cuts
+        little = () if any(cut.is_big for cut in cuts) else tuple((cut.told, cut.shift, cut.mask) for cut in cuts)
+        return _Plain(f"{message.name}: ", message.length, tuple(cuts), little)
+
+    def _told_of(self, signal: DbcSignal) -> _Told:
+        choices = tuple(sorted((value, str(name)) for value, name in (signal.choices or {}).items()))
+        form = signal.length, signal.is_signed, repr(signal.scale), repr(signal.offset), choices
+        return self._told.setdefault((signal.name, signal.unit, *form), _Told(partial(self._tell, signal)))
+
+    def _tell(self, signal: DbcSignal, raw: int) -> str:
+        if self._words_kept >= _TOLD_KEPT:
+            self._words_kept = 0
+            for told in self._told.values():
+                told.clear()
+        self._words_kept += 1
+        half = 1 << signal.length - 1
+        value = signal.conversion.raw_to_scaled((raw ^ half) - half if signal.is_signed else raw, decode_choices=True)
+        return f"{signal.name} {_told(value, signal.unit or '')}"
 
 
 def _told(value: object, unit: str) -> str:

@@ -1,8 +1,9 @@
 """One listener's view of a bus: frames in, whole messages out, everything else counted under its reason."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 from onboard.contract.base import SetFrame
 from onboard.contract.codes import Grade, Reason
@@ -47,10 +48,16 @@ class _Set:
 class Decoder:
     """Puts sets of frames together for one listener. ``drops`` counts what came to nothing, by reason."""
 
-    def __init__(self, codec: Codec, machines: Mapping[int, Machine] | None = None) -> None:
-        """With ``machines``, those of a site by node-ID, what none of them listens to is dropped too."""
+    def __init__(
+        self, codec: Codec, machines: Mapping[int, Machine] | None = None, *, is_only_one: bool = False
+    ) -> None:
+        """With ``machines``, those of a site by node-ID, what none of them listens to is dropped too.
+
+        ``is_only_one``: nobody else decodes the same frames, so nothing is remembered for others.
+        """
         self.drops: Counter[Reason] = Counter()
         self._codec = codec
+        self._decode = codec.decode_once if is_only_one else codec.decode_part
         self._machines = machines
         self._sets: dict[_Key, _Set] = {}
         #: Sets that were whole, from then on: what is said twice on a bus may come twice.
@@ -58,8 +65,9 @@ class Decoder:
 
     def feed(self, frame: Frame, now_us: int) -> Message | None:
         """The message that this frame completes, if any. Never raises, whatever the frame."""
-        part = self._codec.decode_part(frame)
-        if isinstance(part, Message) and type(part) in self._codec.wholes:
+        part = self._decode(frame)
+        if type(part) in self._codec.wholes:
+            assert isinstance(part, Message), "a reason is no message"
             message: Message | None = part
         else:
             message = self._put_together(part, now_us)
@@ -75,16 +83,10 @@ class Decoder:
         if isinstance(part, Reason):
             self.drops[part] += 1
             return None
-        if self._sets or self._whole:
+        if _is_old(self._sets, now_us) or _is_old(self._whole, now_us):
             self._expire(now_us)
-        match part:
-            case Call() | CallTerms() | CallLoad() | CallParent():
-                return self._feed_call(part, now_us)
-            case ItineraryHead():
-                return self._feed_head(part, now_us)
-            case ItineraryLeg():
-                return self._feed_leg(part, now_us)
-        return None
+        feed = self._FEEDS.get(type(part))
+        return None if feed is None else feed(self, part, now_us)
 
     @property
     def unfinished(self) -> int:
@@ -132,10 +134,18 @@ class Decoder:
             self._complete(key, now_us)
         return whole
 
+    #: What takes a part of each class.
+    _FEEDS: ClassVar[dict[type[Message], Callable[["Decoder", Any, int], Message | None]]] = {
+        **dict.fromkeys((Call, CallTerms, CallLoad, CallParent), _feed_call),
+        ItineraryHead: _feed_head,
+        ItineraryLeg: _feed_leg,
+    }
+
     def _drop_other(self, key: _Key, place: type[SetFrame] | int, part: SetFrame) -> None:
         """Drop a set that holds this part with another content. A part that comes twice as it was is inert."""
         collected = self._sets.get(key)
-        if collected is not None and collected.parts.get(place, part) != part:
+        before = collected.parts.get(place) if collected is not None else None
+        if before is not None and before != part:
             del self._sets[key]
             self.drops[Reason.INCOMPLETE_SET] += 1
 
@@ -171,15 +181,17 @@ class Decoder:
 
     def _expire(self, now_us: int) -> None:
         """Sets are in the order of their last frames, so only the first ones can be too old."""
-        while self._sets and _is_old(self._sets, now_us):
+        while _is_old(self._sets, now_us):
             del self._sets[next(iter(self._sets))]
             self.drops[Reason.INCOMPLETE_SET] += 1
-        while self._whole and _is_old(self._whole, now_us):
+        while _is_old(self._whole, now_us):
             del self._whole[next(iter(self._whole))]
 
 
 def _is_old(sets: dict[_Key, _Set], now_us: int) -> bool:
-    return now_us - sets[next(iter(sets))].heard_us > SET_TIMEOUT_US
+    for first in sets.values():
+        return now_us - first.heard_us > SET_TIMEOUT_US
+    return False
 
 
 def _call(parts: dict[type[SetFrame] | int, SetFrame]) -> CallForProposals | None:

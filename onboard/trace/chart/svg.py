@@ -4,7 +4,7 @@ Colours are those of Okabe and Ito (Color Universal Design, 2008), told apart by
 their dashes as well.
 """
 
-from xml.sax.saxutils import escape
+from html import escape
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D1F")
 #: These have less than 3:1 on the ground of a panel (WCAG 2.2, 1.4.11): a line of theirs has a dark rim.
@@ -30,7 +30,7 @@ class SvgDrawing:
         self._parts = [
             f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
             f'viewBox="0 0 {width:.0f} {height:.0f}" font-family="DejaVu Sans, sans-serif" font-size="11">',
-            f"<title>{escape(title)}</title>",
+            f"<title>{escape(title, quote=False)}</title>",
             '<rect width="100%" height="100%" fill="#ffffff"/>',
         ]
 
@@ -49,7 +49,7 @@ class SvgDrawing:
     def area(self, points: list[tuple[float, float]], fill: str, *, opacity: float, note: str = "") -> None:
         """A filled shape; ``note`` is shown where a browser's pointer rests on it."""
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-        title = f"<title>{escape(note)}</title>" if note else ""
+        title = f"<title>{escape(note, quote=False)}</title>" if note else ""
         self._parts.append(f'<polygon points="{path}" fill="{fill}" fill-opacity="{opacity}">{title}</polygon>')
 
     def ring(self, x: float, y: float, radius: float, stroke: str, *, width: float = 1) -> None:
@@ -77,9 +77,8 @@ class SvgDrawing:
         more = f' font-size="{size:.1f}"' if size is not None else ""
         more += f' stroke="{halo}" stroke-width="3" paint-order="stroke"' if halo is not None else ""
         more += f' transform="rotate(-90 {x:.1f} {y:.1f})"' if upwards else ""
-        self._parts.append(
-            f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{fill}"{more}>{escape(words)}</text>'
-        )
+        said = escape(words, quote=False)
+        self._parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{fill}"{more}>{said}</text>')
 
     def arrow(self, x1: float, x2: float, y: float, stroke: str) -> None:
         """A level arrow from one lane to another."""

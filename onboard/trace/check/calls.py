@@ -47,6 +47,8 @@ class _CallRule(Rule):
     def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self.calls: OrderedDict[tuple[int, int], CallSeen] = OrderedDict()
+        #: Before then, us of the log, none of them is long over.
+        self._forget_us = 0
 
     def handlers(self) -> Handlers:
         """Calls, bids and awards."""
@@ -54,7 +56,12 @@ class _CallRule(Rule):
 
     def tick(self, now_us: int) -> None:
         """Forget what is long over."""
-        while self.calls and now_us - next(iter(self.calls.values())).event.time_us > REMEMBERED_US:
+        if now_us < self._forget_us:
+            return
+        while self.calls:
+            self._forget_us = next(iter(self.calls.values())).event.time_us + REMEMBERED_US + 1
+            if now_us < self._forget_us:
+                return
             self.calls.popitem(last=False)
 
     def _on_call(self, event: LogEvent[CallForProposals]) -> None:
@@ -66,6 +73,7 @@ class _CallRule(Rule):
         seen = CallSeen(call, event, self.picture.boots.get(call.sender), due_us)
         self.calls.pop((call.sender, call.call), None)
         self.calls[call.sender, call.call] = seen
+        self.opened(seen)
 
     def _on_bid(self, event: LogEvent[Bid]) -> None:
         bid = event.message
@@ -80,6 +88,9 @@ class _CallRule(Rule):
             self.picture.unjudged += 1
             return
         self.judge_award(event, seen)
+
+    def opened(self, seen: CallSeen) -> None:
+        """A call is heard for the first time, or another under the number of an older one."""
 
     def judge_bid(self, event: LogEvent[Bid], seen: CallSeen) -> None:
         """A bid for a call that is known."""
@@ -104,6 +115,8 @@ class CallsClosed(_CallRule):
         super().__init__(picture, report)
         #: When a machine last said that it is held: it closes its calls once it goes on.
         self._held_us: dict[int, int] = {}
+        #: Calls that somebody is still to close, in their order.
+        self._open: dict[tuple[int, int], CallSeen] = {}
 
     def handlers(self) -> Handlers:
         """Beside calls, machines that do nothing any more for a while."""
@@ -113,9 +126,17 @@ class CallsClosed(_CallRule):
         if event.message.sender == event.message.machine:
             self._held_us[event.message.sender] = event.time_us
 
+    def opened(self, seen: CallSeen) -> None:
+        """It is to be closed, where the log tells when."""
+        key = seen.call.sender, seen.call.call
+        self._open.pop(key, None)
+        if seen.due_us is not None:
+            self._open[key] = seen
+
     def judge_award(self, event: LogEvent[Award], seen: CallSeen) -> None:
         """Another outcome than the first."""
         award, before = event.message, seen.outcome
+        self._open.pop((award.sender, award.call), None)
         if award.result is CallResult.OPTION:
             if before is not None:
                 self.find(event, (award.sender,), f"call {award.call} becomes an option after {before.result.name}")
@@ -130,22 +151,28 @@ class CallsClosed(_CallRule):
     def tick(self, now_us: int) -> None:
         """Calls that should be closed by now."""
         super().tick(now_us)
-        for seen in self.calls.values():
-            if seen.is_reported or seen.outcome is not None or seen.option or seen.due_us is None:
-                continue
-            # A sign of the same life after the time is over: before it, the initiator may have died without a word.
-            lived_us = self.picture.heard_us.get(seen.call.sender, 0)
-            # A caller whose clock is behind may name a deadline that is over when the call is heard.
-            held_us = self._held_us.get(seen.call.sender, 0)
-            due_us = max(seen.due_us, seen.event.time_us, self.picture.clock_settles_us, held_us)
-            if due_us <= self.picture.spoiled_until_us:
-                # It may have closed it by a word that came to nothing: its bidders end by their own clocks.
-                seen.is_reported = True
-                continue
-            late = lived_us - due_us > CLOSED_WITHIN_US
-            if late and self.picture.is_alive(seen.call.sender, seen.boot):
-                seen.is_reported = True
-                self.find(seen.event, (seen.call.sender,), f"call {seen.call.call} was never closed")
+        if not self._open:
+            return
+        for key, seen in list(self._open.items()):
+            if now_us - seen.event.time_us > REMEMBERED_US or self._is_judged(seen):
+                del self._open[key]
+
+    def _is_judged(self, seen: CallSeen) -> bool:
+        """Whether a call that nobody has closed is late, or never will be judged."""
+        if seen.due_us is None:
+            return True
+        # A sign of the same life after the time is over: before it, the initiator may have died without a word.
+        lived_us = self.picture.heard_us.get(seen.call.sender, 0)
+        # A caller whose clock is behind may name a deadline that is over when the call is heard.
+        held_us = self._held_us.get(seen.call.sender, 0)
+        due_us = max(seen.due_us, seen.event.time_us, self.picture.clock_settles_us, held_us)
+        if due_us <= self.picture.spoiled_until_us:
+            # It may have closed it by a word that came to nothing: its bidders end by their own clocks.
+            return True
+        if lived_us - due_us <= CLOSED_WITHIN_US or not self.picture.is_alive(seen.call.sender, seen.boot):
+            return False
+        self.find(seen.event, (seen.call.sender,), f"call {seen.call.call} was never closed")
+        return True
 
 
 class BidsInTime(_CallRule):

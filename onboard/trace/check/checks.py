@@ -2,11 +2,11 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from onboard.contract.codes import MachineState, Reason
+from onboard.contract.codes import KindCode, MachineState, Reason
 from onboard.contract.messages import BusTime, Heartbeat, Message
 from onboard.contract.runs import singles
 from onboard.core.frame import Frame
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 MOST_FINDINGS = 1_000
 #: Channels of a log that are told apart; a name more is taken for one of them.
 MOST_CHANNELS = 300
-#: Frames whose messages are remembered, half a kilobyte each: heartbeats come again for minutes.
+#: Signs of life that are remembered, half a kilobyte each: each machine of a site says some few for years.
 MOST_KNOWN = 1 << 12
 #: Rules look at the time this often, us of the log.
 TICK_US = 1_000_000
@@ -40,11 +40,13 @@ BACK_US = 1_000_000
 _event_of: Callable[[Any], LogEvent[Any]] = partial(tuple.__new__, LogEvent)
 
 
+#: ``Frame`` from a tuple of all its fields: half the time of calling the class.
+_frame_of: Callable[[Any], Frame] = partial(tuple.__new__, Frame)
+
 #: Words that may tell that another run begins.
 _OF_TIME = frozenset((BusTime, Heartbeat))
-
-#: Words of a frame, the frame, and the sign of life that it is.
-KnownFrame = tuple[tuple[Message, ...], Frame, Heartbeat | None]
+#: The handlers of rules that see messages of a class, and what takes those up in the picture.
+_Route = tuple[tuple[Callable[[Any], None], ...], Callable[[Any, int], None] | None]
 
 
 @dataclass
@@ -138,8 +140,9 @@ class Checks:
         #: Messages of this run that rules were shown, by class.
         self._seen: Counter[type[Message]] = Counter()
         self._whole = self._codecs[0].whole
-        #: By ``FrameBlock.keys``, as ``_learn`` gives them.
-        self._known: dict[bytes, KnownFrame] = {}
+        self._beat_bits = _beat_bits(self._codecs[0])
+        #: Signs of life that no rule looks at, by their keys (``FrameBlock.apart``).
+        self._beats: dict[bytes, Heartbeat] = {}
         self._decoders: dict[str, tuple[Decoder, Decoder]] = {}
         rules = rules_for(site) if rules is None else rules
         self.verdict = LogVerdict(tuple(rule for rule in rules if not self._why_not(rule)))
@@ -165,13 +168,14 @@ class Checks:
         self._rules = [rule(self._picture, self._keep) for rule in self.verdict.rules]
         self._ticks = [rule.tick for rule in self._rules if type(rule).tick is not Rule.tick]
         self._handlers: dict[type[Message], list[Callable[[Any], None]]] = {}
+        self._routes: dict[type[Message], _Route] = {}
         self._names: dict[type[Message], list[str]] = {}
         for rule in self._rules:
             for kind, handler in rule.handlers().items():
                 self._handlers.setdefault(kind, []).append(handler)
                 self._names.setdefault(kind, []).append(rule.name)
-        #: When rules look at the time again; None: at once.
-        self._tick_us: int | None = None
+        #: When rules look at the time again; 0: at once.
+        self._tick_us = 0
 
     def excuse(self, until_us: int) -> None:
         """Until then, us of the log, machines are broken on purpose: rules of liveness begin to count there."""
@@ -190,23 +194,27 @@ class Checks:
         if frame.is_error:
             self.verdict.unknown["ERROR_FRAME"] += 1
             return
-        if frame.is_extended and not frame.is_remote:
-            # Most frames are whole messages: nothing of other frames is needed for those.
-            message = self._whole(frame.arbitration_id, frame.data)
-            if message is not None:
-                self.feed_message(time_us, message, channel, frame)
-                return
+        is_long = frame.is_extended and not frame.is_remote
+        message = (self._whole(frame.arbitration_id, frame.data) if is_long else None) or self._completed(
+            time_us, channel, frame
+        )
+        if message is not None:
+            self.feed_message(time_us, message, channel, frame)
+
+    def _completed(self, time_us: int, channel: str, frame: Frame) -> Message | None:
+        """The message that a frame completes which is none by itself, or is one of a device bus."""
         fleet, device = self._decoders_of(channel)
         decoder = fleet if self._codecs[0].name_of(frame) is not None else device
         message = decoder.feed(frame, time_us)
-        if message is not None:
-            self.feed_message(time_us, message, channel, frame)
-        elif decoder.drops:
+        if message is None and decoder.drops:
             self._count_drops(decoder)
+        return message
 
     def feed_message(self, time_us: int, message: Message, channel: str = "", frame: Frame | None = None) -> None:
         """One whole message, with the frame that completed it where there is one."""
-        why = self._why_unheard(message)
+        why = self._unheard.get((type(message), message.sender))
+        if why is None:
+            why = self._why_unheard(message)
         if why is Reason.NONE:
             for word in singles(message):
                 self._judge(time_us, word, channel, frame)
@@ -219,30 +227,35 @@ class Checks:
             for raw in block.frames():
                 self.feed_raw(raw)
             return
-        known, judge, verdict = self._known, self._judge, self.verdict
-        for time_us, channel, key in zip(block.time_us.tolist(), block.names, block.keys, strict=True):
-            words, frame, beat = known.get(key) or self._learn(key)
-            if not words:
-                self.feed(time_us, channel, frame)
+        keys, others = block.apart(*self._beat_bits)
+        self.verdict.frames += len(block)
+        last_us, tick_us, picture, alive = self._last_us or 0, self._tick_us, self._picture, 0
+        for time_us, channel, key in zip(block.time_us.tolist(), block.names, keys, strict=True):
+            if key is None:
+                self._feed_data(time_us, channel, next(others))
+            elif (beat := self._beats.get(key) or self._learn(key)) is None:
+                self._feed_data(time_us, channel, data_frame(key))
+            elif last_us <= time_us and picture.beats.get(beat.sender) is beat:
+                # It tells only that its sender lives: half of most logs.
+                self._last_us = last_us = time_us
+                if time_us >= tick_us:
+                    tick_us = self._look(time_us)
+                picture.heard_us[beat.sender] = picture.now_us = time_us
+                alive += 1
                 continue
-            verdict.frames += 1
-            if beat is not None and self._lives_on(beat, time_us):
-                continue
-            for word in words:
-                judge(time_us, word, channel, frame)
+            else:
+                self._judge(time_us, beat, channel, None)
+            last_us, tick_us, picture = self._last_us or 0, self._tick_us, self._picture
+        self.verdict.messages += alive
 
-    def _lives_on(self, beat: Heartbeat, time_us: int) -> bool:
-        """Whether a sign of life tells nothing but that its sender lives, and no rule is to look at the time yet.
-
-        Of most logs that is half of all frames.
-        """
-        picture = self._picture
-        is_due = self._tick_us is None or time_us >= self._tick_us or time_us < (self._last_us or 0)
-        if is_due or picture.beats.get(beat.sender) is not beat:
-            return False
-        self._last_us = picture.now_us = picture.heard_us[beat.sender] = time_us
-        self.verdict.messages += 1
-        return True
+    def _feed_data(self, time_us: int, channel: str, data_frame: tuple[int, bytes, bool]) -> None:
+        """One data frame that is counted already: identifier, data, whether the identifier is a long one."""
+        can_id, data, is_extended = data_frame
+        frame = _frame_of((can_id, data, is_extended, False, False, 0))
+        # Most frames are whole messages: nothing of other frames is needed for those.
+        message = (self._whole(can_id, data) if is_extended else None) or self._completed(time_us, channel, frame)
+        if message is not None:
+            self.feed_message(time_us, message, channel, frame)
 
     def feed_raw(self, raw: RawFrame) -> None:
         """One frame of a log, of whatever kind."""
@@ -252,23 +265,21 @@ class Checks:
         else:
             self.feed(raw.time_us, raw.channel, frame)
 
-    def _learn(self, key: bytes) -> KnownFrame:
-        """A data frame, and its words where it is a whole message that somebody listens to.
+    def _learn(self, key: bytes) -> Heartbeat | None:
+        """A sign of life without its mirror's digest; None where each is to be looked at anew: by rules, or as a start.
 
-        Beside them a sign of life that no rule looks at.
+        None, too, for what is no message, and for who is not heard.
         """
-        can_id, data, is_extended = data_frame(key)
-        frame = Frame(can_id, data, is_extended)
-        message = self._whole(can_id, data) if is_extended else None
-        if message is not None and self._why_unheard(message) is not Reason.NONE:
-            message = None
-        if len(self._known) >= MOST_KNOWN:
-            self._known.clear()
-        beat = message if isinstance(message, Heartbeat) and Heartbeat not in self._handlers else None
-        if beat is not None and beat.state is MachineState.STARTING:
-            beat = None
-        found = self._known[key] = () if message is None else tuple(singles(message)), frame, beat
-        return found
+        can_id, data, _ = data_frame(key)
+        beat = self._whole(can_id, data)
+        if not isinstance(beat, Heartbeat) or Heartbeat in self._handlers or beat.state is MachineState.STARTING:
+            return None
+        if self._why_unheard(beat) is not Reason.NONE:
+            return None
+        if len(self._beats) >= MOST_KNOWN:
+            self._beats.clear()
+        self._beats[key] = beat
+        return beat
 
     def _judge(self, time_us: int, message: Message, channel: str, frame: Frame | None) -> None:
         """A message that the site listens to: every rule that reads such messages, and the picture, see it."""
@@ -279,30 +290,36 @@ class Checks:
         self._last_us = time_us
         self.verdict.messages += 1
         picture = self._picture
-        if self._tick_us is None or time_us >= self._tick_us:
-            self._tick_us = time_us + TICK_US
-            picture.now_us = time_us
-            for tick in self._ticks:
-                tick(time_us)
-        handlers = self._handlers.get(kind)
-        if handlers is not None:
+        if time_us >= self._tick_us:
+            self._look(time_us)
+        handlers, take = self._routes.get(kind) or self._route(kind)
+        if handlers:
             self._seen[kind] += 1
             event: LogEvent[Message] = _event_of((time_us, message, channel, frame))
             for handler in handlers:
                 handler(event)
         picture.now_us = time_us
-        take = picture.taken.get(kind)
         if take is not None:
             take(message, time_us)
+
+    def _look(self, time_us: int) -> int:
+        """Rules look at the time; when they are to do so again."""
+        self._picture.now_us = time_us
+        for tick in self._ticks:
+            tick(time_us)
+        self._tick_us = time_us + TICK_US
+        return self._tick_us
+
+    def _route(self, kind: type[Message]) -> _Route:
+        found = self._routes[kind] = tuple(self._handlers.get(kind, ())), self._picture.taken.get(kind)
+        return found
 
     def _why_unheard(self, message: Message) -> Reason:
         """Why nobody of the site listens: by class and sender, so worked out once for each."""
         if self._site is None:
             return Reason.NONE
-        said = type(message), message.sender
-        why = self._unheard.get(said)
-        if why is None:
-            why = self._unheard[said] = why_unheard(message, self._site.machines, self._codecs[0].speakers)
+        why = why_unheard(message, self._site.machines, self._codecs[0].speakers)
+        self._unheard[type(message), message.sender] = why
         return why
 
     def finish(self) -> LogVerdict:
@@ -367,13 +384,25 @@ class Checks:
         if found is None:
             if len(self._decoders) >= MOST_CHANNELS:
                 return next(iter(self._decoders.values()))
-            found = self._decoders[channel] = (Decoder(self._codecs[0]), Decoder(self._codecs[1]))
+            fleet, device = (Decoder(codec, is_only_one=True) for codec in self._codecs)
+            found = self._decoders[channel] = fleet, device
         return found
 
     def _count_drops(self, decoder: Decoder) -> None:
         for reason, count in decoder.drops.items():
             self.verdict.unknown[reason.name] += count
         decoder.drops.clear()
+
+
+def _beat_bits(fleet: Codec) -> tuple[int, int]:
+    """The identifier of signs of life, and the bits of their data in which only the mirror's digest stands.
+
+    Data as one little-endian number: no rule reads that digest, and it changes all the time.
+    """
+    beat = Heartbeat(1, 0, 1, 0, 1, KindCode.ANY, MachineState.STARTING, 0)
+    (one,), (other,) = fleet.encode(beat), fleet.encode(replace(beat, mirror_digest=0xFFFF))
+    bits = int.from_bytes(one.data, "little") ^ int.from_bytes(other.data, "little")
+    return fleet.identifier_of(Heartbeat.__name__), bits
 
 
 def _is_of_time(message: Message) -> bool:

@@ -5,15 +5,17 @@ the lift's track), and a lift's gate (index 255), which whoever is over the sill
 its mouth, one pitch away: whoever is there is turned, or turning, and is in both slots.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from itertools import pairwise
+from typing import Any
 
 from onboard.contract.codes import TokenKind
 from onboard.contract.messages import DriveOrder, Progress
 from onboard.core.site import Segment, Site
 from onboard.trace.check.tokens_seen import Token
-from onboard.ways.site import TrackKind, way_site
+from onboard.ways.site import TrackKind, WaySite, way_site
 
 PLATFORM_INDEX = 0
 GATE_INDEX = 255
@@ -21,9 +23,11 @@ GATE_INDEX = 255
 TOLERANCE_MM = 20
 #: Extents whose slots are kept: stops, and moments in between, of a dozen robots over a day.
 _EXTENTS_KEPT = 1 << 14
+#: Tokens of slots that are kept: all of a large site.
+_TOKENS_KEPT = 1 << 12
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class ReportedPosition:
     """A machine as its last ``Progress`` told it: the centre from that of index 1 of ``track``, in mm."""
 
@@ -40,13 +44,17 @@ class ReportedPosition:
         return self.track, self.position_mm
 
 
-def body_of(site: Site, progress: Progress, time_us: int) -> ReportedPosition | None:
+#: ``Segment`` from a tuple of both its fields: half the time of calling the class.
+_segment_of: Callable[[Any], Segment] = partial(tuple.__new__, Segment)
+
+
+def body_of(ways: WaySite, progress: Progress, time_us: int) -> ReportedPosition | None:
     """The body that a message tells of; None where the site has no such track."""
-    ways = way_site(site)
     if progress.track not in ways.tracks:
         return None
-    position_mm = ways.position_mm(Segment(progress.track, progress.index)) + progress.offset_mm
-    return ReportedPosition(progress.sender, progress.track, progress.index, position_mm, progress.speed_mm_s, time_us)
+    track, index = progress.track, progress.index
+    position_mm = ways.position_mm(_segment_of((track, index))) + progress.offset_mm
+    return ReportedPosition(progress.sender, track, index, position_mm, progress.speed_mm_s, time_us)
 
 
 def slots_of(site: Site, track: int, low_mm: float, high_mm: float) -> tuple[Segment, ...]:
@@ -54,12 +62,12 @@ def slots_of(site: Site, track: int, low_mm: float, high_mm: float) -> tuple[Seg
 
     They are asked for again and again, of each body by every rule: what was found is kept with the site.
     """
-    known, extent = way_site(site).extents, (track, low_mm, high_mm)
-    found = known.get(extent)
+    ways, extent = way_site(site), (track, low_mm, high_mm)
+    found = ways.extents.get(extent)
     if found is None:
-        if len(known) >= _EXTENTS_KEPT:
-            known.clear()
-        found = known[extent] = tuple(_slots_of(site, *extent))
+        if len(ways.extents) >= _EXTENTS_KEPT:
+            ways.extents.clear()
+        found = ways.extents[extent] = tuple(_slots_of(site, *extent))
     return found
 
 
@@ -85,19 +93,18 @@ def _goes_on(site: Site, position: Segment) -> bool:
     return position in ways.platforms or position in ways.mouths
 
 
-def occupied(site: Site, body: ReportedPosition) -> tuple[Segment, ...]:
+def occupied(ways: WaySite, body: ReportedPosition) -> tuple[Segment, ...]:
     """Slots that a robot's body is in."""
-    return swept(site, body, body.position_mm)
+    return swept(ways, body, body.position_mm)
 
 
-def swept(site: Site, body: ReportedPosition, until_mm: float) -> tuple[Segment, ...]:
+def swept(ways: WaySite, body: ReportedPosition, until_mm: float) -> tuple[Segment, ...]:
     """Slots that a robot's body is in and comes through until its centre is at ``until_mm`` on the same track."""
-    ways = way_site(site)
     if ways.tracks[body.track].kind is TrackKind.LIFT:
         return (Segment(body.track, body.index),)
     half_mm = ways.carrier_length_mm / 2
-    low_mm, high_mm = sorted((body.position_mm, until_mm))
-    return slots_of(site, body.track, low_mm - half_mm, high_mm + half_mm)
+    low_mm, high_mm = min(body.position_mm, until_mm) - half_mm, max(body.position_mm, until_mm) + half_mm
+    return ways.extents.get((body.track, low_mm, high_mm)) or slots_of(ways, body.track, low_mm, high_mm)
 
 
 def body_at(site: Site, body: ReportedPosition, tape_mm: int) -> ReportedPosition:
@@ -117,20 +124,20 @@ def sent_through(site: Site, body: ReportedPosition, order: DriveOrder) -> Seque
     ways, here = way_site(site), Segment(body.track, body.index)
     if not ways.is_charted:
         if order.across is ways.across(body.track):
-            return swept(site, body, order.target_mm)
+            return swept(ways, body, order.target_mm)
         # Into the spur of this mouth, or out of this one.
         spurs = [end.track for end in ways.links.get(here, ())] if order.across else [body.track]
         return slots_at(site, Segment(spurs[0], 0)) if spurs else [here]
     aim = ways.on_tape(order.target_mm)
     if aim is None or aim.track == body.track:
-        return [] if aim is None else swept(site, body, aim.position_mm)
+        return [] if aim is None else swept(ways, body, aim.position_mm)
     lift = ways.platforms.get(here)
     sills = () if lift is None else ways.tracks[lift].joins
     there = next((ways.beyond(sill) for sill in sills if sill.track == aim.track), None)
     if there is not None:
         # By another door of the platform on which it stands.
         body = replace(body, track=there.track, index=there.index, position_mm=ways.position_mm(there))
-        return swept(site, body, aim.position_mm)
+        return swept(ways, body, aim.position_mm)
     ends = [here] if here in ways.mouths else [end for end in ways.links.get(here, ()) if end.track == aim.track]
     return slots_at(site, ends[0]) if ends else [here]
 
@@ -150,21 +157,22 @@ def slot_at(site: Site, position: Segment) -> Segment:
     return position if lift is None else Segment(lift, PLATFORM_INDEX)
 
 
-def lifts_under(site: Site, body: ReportedPosition) -> set[int]:
+def lifts_under(ways: WaySite, body: ReportedPosition) -> set[int]:
     """Lifts, by track, on whose platform a robot's body is, wholly or in part.
 
     A body is told of when its centre enters a segment, starts or stops: of one that goes away from a platform the last
     word is older than where it is now, so it counts for nothing here.
     """
-    track = way_site(site).tracks[body.track]
+    track = ways.tracks[body.track]
     if track.kind is TrackKind.LIFT:
         return set()
     low_end = 2 * body.position_mm < (track.length - 1) * track.pitch_mm
     if body.speed_mm_s and (body.speed_mm_s > 0) is low_end:
         return set()
-    return {slot.track for slot in occupied(site, body) if slot.index == PLATFORM_INDEX}
+    return {slot.track for slot in occupied(ways, body) if slot.index == PLATFORM_INDEX}
 
 
+@lru_cache(_TOKENS_KEPT)
 def token_of(slot: Segment) -> Token:
     """The token of a slot."""
     return Token(TokenKind.SEGMENT, slot.number)

@@ -24,7 +24,7 @@ from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment, Site
 from onboard.trace.check.geometry import ReportedPosition, body_at, body_of, floors_of
 from onboard.trace.check.tokens_seen import TokensSeen
-from onboard.ways.site import way_site
+from onboard.ways.site import WaySite, way_site
 
 #: A machine that was not heard for so long counts as silent, us: three missing heartbeats (dbc/fleet.dbc).
 SILENT_US = 7_000_000
@@ -55,7 +55,8 @@ class BusPicture:
         #: Boot counter and last sign of life, us of the log, by node.
         self.boots: dict[int, int] = {}
         self.heard_us: dict[int, int] = {}
-        #: The sign of life of each node that was taken up last: the same again tells only that its sender lives.
+        #: The sign of life of each node that was taken up last: one that differs in its mirror's digest only, which
+        #: nothing here reads, tells only that its sender lives.
         self.beats: dict[int, Heartbeat] = {}
         #: Machines that start, or hold for their journals: what they say that they hold is for the others to compare.
         self.announcing: set[int] = set()
@@ -70,12 +71,17 @@ class BusPicture:
         #: Bus time has jumped: until then (us of the log) machines wait for a second word, and decide no call.
         self.clock_settles_us = 0
         self._site = site
+        self._ways = way_site(site) if site is not None else None
+        machines = site.machines.values() if site is not None else ()
+        self._kinds = {machine.node_id: machine.kind for machine in machines}
         #: The body that was told of last, by what and when.
         self._told: tuple[Progress | None, int, ReportedPosition | None] = None, 0, None
         #: What the picture is made of, and what takes it up at a time in us, after the rules have seen it: half of what
         #: is said on a bus is none of it.
         self.taken: dict[type[Message], Callable[[Any, int], None]] = {
-            **dict.fromkeys((TokenGrant, TokenHeld, TokenAssigned, Regeneration), self.tokens.feed),
+            TokenGrant: self.tokens.on_grant,
+            TokenHeld: self.tokens.on_held,
+            **dict.fromkeys((TokenAssigned, Regeneration), self.tokens.on_operator),
             Heartbeat: self._on_heartbeat,
             BusTime: self._on_bus_time,
             Progress: self._on_progress,
@@ -90,6 +96,13 @@ class BusPicture:
         if self._site is None:
             raise ValueError("this rule needs the site file")
         return self._site
+
+    @property
+    def ways(self) -> WaySite:
+        """The site with its tracks. Raises ``ValueError`` as ``site`` does."""
+        if self._ways is None:
+            raise ValueError("this rule needs the site file")
+        return self._ways
 
     @property
     def has_site(self) -> bool:
@@ -115,8 +128,7 @@ class BusPicture:
 
     def kind(self, node: int) -> KindCode | None:
         """Kind of a machine by the site file."""
-        machine = self._site.machines.get(node) if self._site is not None else None
-        return machine.kind if machine is not None else None
+        return self._kinds.get(node)
 
     def bus_us(self, time_us: int) -> int | None:
         """Bus time at a time of the log; None before anybody told it. Low by the time that a frame takes."""
@@ -168,11 +180,11 @@ class BusPicture:
 
     def body_told(self, progress: Progress, time_us: int) -> ReportedPosition | None:
         """The body that a message tells of, worked out once for all rules; None where the site has no such track."""
-        if self._site is None:
+        if self._ways is None:
             return None
         told, told_us, body = self._told
         if told is not progress or told_us != time_us:
-            body = body_of(self._site, progress, time_us)
+            body = body_of(self._ways, progress, time_us)
             self._told = progress, time_us, body
         return body
 

@@ -9,7 +9,7 @@ from onboard.core.serial import is_newer
 from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
-from onboard.trace.check.tokens_seen import VERSION_BITS, Handover, Token
+from onboard.trace.check.tokens_seen import VERSION_BITS, Handover, Token, token_named
 
 #: A statement of what was given on a moment ago may have waited in its sender's queue, us.
 STALE_US = 1_000_000
@@ -38,7 +38,7 @@ class OneHolder(Rule):
 
     def _on_grant(self, event: LogEvent[TokenGrant]) -> None:
         grant = event.message
-        token, version = Token(grant.token_kind, grant.token), grant.version
+        token, version = token_named(grant), grant.version
         if grant.holder == grant.sender:
             self._tell(event, token, (grant.sender,), f"gives {token} to itself")
         last = self.picture.tokens.last(token)
@@ -65,7 +65,7 @@ class OneHolder(Rule):
 
     def _on_held(self, event: LogEvent[TokenHeld]) -> None:
         held = event.message
-        token, tokens = Token(held.token_kind, held.token), self.picture.tokens
+        token, tokens = token_named(held), self.picture.tokens
         last = tokens.last(token)
         if last is None:
             first = tokens.holder(token)

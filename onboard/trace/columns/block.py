@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from onboard.core.frame import CAN_MAX_DLC
+from onboard.core.frame import CAN_EFF_MASK, CAN_MAX_DLC
 from onboard.trace.raw import KEY_BYTES, KEY_IS_LONG, KEY_MARK, RawFrame
 from onboard.trace.readers.faults import LogFault, LogFaults
 
@@ -57,13 +57,28 @@ class FrameBlock:
     @property
     def keys(self) -> list[bytes]:
         """What each classic data frame says, all but time, channel and direction: equal where frames say the same."""
-        parts = np.empty((len(self), KEY_BYTES), np.uint8)
-        parts[:, :CAN_MAX_DLC] = self.data
-        parts[:, CAN_MAX_DLC:-1] = self.can_id.astype("<u4").view(np.uint8).reshape(-1, 4)
-        # Never 0, so nothing of a key is taken for the end of a text.
-        parts[:, -1] = self.length + KEY_MARK + KEY_IS_LONG * self.is_extended
-        keys: list[bytes] = parts.view(f"S{KEY_BYTES}")[:, 0].tolist()
+        keys: list[bytes] = _keys(self.data, self.can_id, self.length, self.is_extended).tolist()
         return keys
+
+    def apart(self, identifier: int, ignored: int) -> tuple[list[bytes | None], Iterator[tuple[int, bytes, bool]]]:
+        """Frames of one message by their keys, and the others: identifier, data, whether that is a long one.
+
+        The first has None for each of the others. ``identifier`` has 0 in its lowest byte, where that of a frame may
+        have any; ``ignored`` are bits of the data, as a little-endian number, that count as 0. No row is in ``others``.
+        """
+        is_mine = self.is_extended & (self.can_id & np.uint32(CAN_EFF_MASK ^ 0xFF) == identifier)
+        mine, left = np.flatnonzero(is_mine), np.flatnonzero(~is_mine)
+        data = (self.words[mine] & ~np.uint64(ignored)).astype("<u8").view(np.uint8).reshape(-1, CAN_MAX_DLC)
+        keys = np.full(len(self), None, object)
+        keys[mine] = _keys(data, self.can_id[mine], self.length[mine], self.is_extended[mine])
+        found: list[bytes | None] = keys.tolist()
+        others = zip(
+            self.can_id[left].tolist(),
+            _cut(self.data[left], self.length[left]),
+            self.is_extended[left].tolist(),
+            strict=True,
+        )
+        return found, others
 
     @property
     def names(self) -> list[str]:
@@ -87,7 +102,6 @@ class FrameBlock:
 
     def frames(self) -> Iterator[RawFrame]:
         """One frame a row, in the order of the log, extended identifiers marked as such."""
-        blob = self.data.tobytes()
         marks = {UNMARKED: None, 0: False, 1: True}
         rows: Iterator[RawFrame] = map(
             _raw_of,
@@ -95,7 +109,7 @@ class FrameBlock:
                 self.time_us.tolist(),
                 self.names,
                 self.can_id.tolist(),
-                [blob[at : at + size] for at, size in zip(range(0, len(blob), 8), self.length.tolist(), strict=True)],
+                _cut(self.data, self.length),
                 self.is_extended.tolist(),
                 repeat(False),
                 repeat(False),
@@ -122,6 +136,26 @@ class FrameBlock:
             for row in rows[back].tolist():
                 faults.add(LogFault.BACKWARDS, int(self.where[row]))
             latest[name] = int(times[-1])
+
+
+def _cut(data: npt.NDArray[np.uint8], length: npt.NDArray[np.uint8]) -> list[bytes]:
+    """The data of each row, as long as they are."""
+    blob = data.tobytes()
+    return [blob[at : at + size] for at, size in zip(range(0, len(blob), CAN_MAX_DLC), length.tolist(), strict=True)]
+
+
+def _keys(
+    data: npt.NDArray[np.uint8],
+    can_id: npt.NDArray[np.uint32],
+    length: npt.NDArray[np.uint8],
+    is_extended: npt.NDArray[np.bool_],
+) -> npt.NDArray[np.bytes_]:
+    parts = np.empty((len(data), KEY_BYTES), np.uint8)
+    parts[:, :CAN_MAX_DLC] = data
+    parts[:, CAN_MAX_DLC:-1] = can_id.astype("<u4").view(np.uint8).reshape(-1, 4)
+    # Never 0, so nothing of a key is taken for the end of a text.
+    parts[:, -1] = length + KEY_MARK + KEY_IS_LONG * is_extended
+    return parts.view(f"S{KEY_BYTES}")[:, 0]
 
 
 def block_of(placed: list[tuple[int, RawFrame]]) -> FrameBlock:

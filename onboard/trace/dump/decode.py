@@ -3,7 +3,6 @@
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from operator import add
 from typing import TYPE_CHECKING
 
 from onboard.core.site import Site
@@ -44,10 +43,14 @@ class _Lines(ABC):
     def _say(self, frame: RawFrame) -> tuple[str | None, bool]:
         """The words of a frame that are its line, if it has any, and whether they are the same whenever it comes."""
 
+    @abstractmethod
+    def _say_whole(self, can_id: int, data: bytes, *, is_extended: bool) -> tuple[str, bool] | None:
+        """The same of a data frame that needs no other frame to be understood; None where ``_say`` must look at it."""
+
     def _each(self, frames: Iterable[RawFrame]) -> Iterator[str]:
         known, prefix = self._known, self._screen.prefix
         for frame in frames:
-            words = known.get(frame[2:9]) or self._new(frame, frame[2:9])
+            words = known.get(frame[2:9]) or self._kept(frame[2:9], self._say(frame))
             if words is not None:
                 yield prefix(frame.time_us, frame.channel) + words
             elif frame.is_error or frame.is_remote or frame.fd_flags is not None:
@@ -55,18 +58,27 @@ class _Lines(ABC):
 
     def _together(self, block: "FrameBlock") -> Iterable[str]:
         """The lines of data frames: words first, those of new frames in the order of the log, then time and channel."""
-        known, words = self._known, []
-        for time_us, channel, key in zip(block.time_us.tolist(), block.names, block.keys, strict=True):
-            words.append(known.get(key) or self._new(RawFrame(time_us, channel, *data_frame(key)), key))
-        if None in words:
-            block, words = (
-                block.only([row for row, one in enumerate(words) if one is not None]),
-                list(filter(None, words)),
-            )
-        return map(add, self._screen.prefixes(block), words)
+        known, new = self._known, self._new
+        times, names = block.time_us.tolist(), block.names
+        words = [
+            known.get(key) or new(time_us, channel, key)
+            for time_us, channel, key in zip(times, names, block.keys, strict=True)
+        ]
+        if (prefixes := self._screen.prefixes(block)) is not None:
+            return [prefix + said for prefix, said in zip(prefixes, words, strict=True) if said is not None]
+        prefix_of = self._screen.prefix
+        rows = zip(times, names, words, strict=True)
+        return (prefix_of(time_us, name) + said for time_us, name, said in rows if said is not None)
 
-    def _new(self, frame: RawFrame, key: object) -> str | None:
-        words, is_fixed = self._say(frame)
+    def _new(self, time_us: int, channel: str, key: bytes) -> str | None:
+        """The words of a data frame that are not known, by its key (``FrameBlock.keys``)."""
+        can_id, data, is_extended = data_frame(key)
+        whole = self._say_whole(can_id, data, is_extended=is_extended)
+        said = whole or self._say(RawFrame(time_us, channel, can_id, data, is_extended))
+        return self._kept(key, said) if said[1] else said[0]
+
+    def _kept(self, key: object, said: tuple[str | None, bool]) -> str | None:
+        words, is_fixed = said
         if is_fixed and words is not None:
             if len(self._known) >= _KEPT:
                 self._known.clear()
@@ -81,6 +93,7 @@ class MessageLines(_Lines):
         super().__init__(screen)
         self._words = Words(site)
         self._listener = Listener(codecs)
+        self._whole = codecs.fleet.whole
 
     def report(self) -> list[str]:
         """What was no message, counted."""
@@ -90,10 +103,16 @@ class MessageLines(_Lines):
         """None where it is not the last of a message, and where it is no data frame."""
         _, message, reason, _ = self._listener.hear(frame)
         if message is not None:
-            return self._words.message(message), is_one_frame(message) and self._words.is_fixed(message)
+            words, is_fixed = self._words.said(message)
+            return words, is_fixed and is_one_frame(message)
         if reason is not None:
             return f"{log_frame(frame)}  ({reason.name.lower().replace('_', ' ')})", False
         return None, False
+
+    def _say_whole(self, can_id: int, data: bytes, *, is_extended: bool) -> tuple[str, bool] | None:
+        """Most frames are whole messages, for which no listener remembers anything (``Listener.hear``)."""
+        message = self._whole(can_id, data) if is_extended else None
+        return None if message is None else self._words.said(message)
 
 
 class DbcLines(_Lines):
@@ -122,6 +141,11 @@ class DbcLines(_Lines):
             self._short[decoded.name] += 1
             return f"{said}  (short frame: {len(frame.data)} of {decoded.length} bytes)", False
         return said, True
+
+    def _say_whole(self, can_id: int, data: bytes, *, is_extended: bool) -> tuple[str, bool] | None:
+        """Most frames are of messages that are cut into signals as they are."""
+        words = self._dbc.words(can_id, data, is_extended=is_extended)
+        return None if words is None else (words, True)
 
 
 def _told(what: str, counts: Counter[str]) -> list[str]:

@@ -103,13 +103,15 @@ class Screen:
             self._second, self._begins = second, f" ({second:010d}."
         return f"{self._begins}{microseconds:06d}) {name}"
 
-    def prefixes(self, block: "FrameBlock") -> Iterable[str]:
-        """The same for each frame of a block."""
+    def prefixes(self, block: "FrameBlock") -> Iterable[str] | None:
+        """The same for each frame of a block; None where one depends on which of those before it are shown."""
         from onboard.trace.columns.stamps import stamps  # noqa: PLC0415  # a board has no numpy, and no blocks
 
-        times = stamps(block.time_us) if self._is_absolute else None
-        if times is None or max(map(len, block.channels), default=0) > self._width:
-            return map(self.prefix, block.time_us.tolist(), block.names)
+        if not self._is_absolute or max(map(len, block.channels), default=0) > self._width:
+            return None
+        times = stamps(block.time_us)
+        if times is None:
+            return None
         names = [self._padded(channel) for channel in block.channels]
         return map(add, times, map(names.__getitem__, block.channel.tolist()))
 

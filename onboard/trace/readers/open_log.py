@@ -26,7 +26,7 @@ _ASC = re.compile(rb"\s*(date\s|base\s+(hex|dec)|//\s*version|begin\s+trigger)",
 _BAR_PERIOD_S = 0.2
 _BAR_WIDTH = 30
 #: What is read at once, bytes, and what is worth reading by columns: a live bus brings less.
-_PIECE_BYTES, _LEAST_BYTES = 1 << 18, 1 << 14
+_PIECE_BYTES, _LEAST_BYTES = 1 << 19, 1 << 14
 #: Longest line, bytes; one of CAN FD in ASC has some four hundred. A hole that a power cut left in a log is one line of
 #: zeros, however long: it is counted, and not kept.
 LONGEST_LINE = 1 << 16

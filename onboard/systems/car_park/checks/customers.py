@@ -140,6 +140,8 @@ class CustomersServed(Rule):
 
     def tick(self, now_us: int) -> None:
         """Who waits for too long."""
+        if not (self._asked or self._tickets):
+            return
         for node, event in list(self._asked.items()):
             if self.picture.waited_us(event.time_us, now_us) > WORD_WITHIN_US:
                 del self._asked[node]

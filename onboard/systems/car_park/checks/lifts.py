@@ -22,7 +22,6 @@ from onboard.trace.check.geometry import (
 )
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
-from onboard.ways.site import way_site
 
 
 class _LiftRule(Rule):
@@ -30,13 +29,18 @@ class _LiftRule(Rule):
 
     needs_site = True
 
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        machines = picture.site.machines.items()
+        self._tracks = {node: machine.home.track for node, machine in machines if machine.kind is KindCode.LIFT}
+
     def handlers(self) -> Handlers:
         """Where lifts are, and with device buses what their drives do and are told."""
         return {Progress: self._on_progress, DriveState: self._on_state, DriveOrder: self._on_order}
 
     def _on_progress(self, event: LogEvent[Progress]) -> None:
-        track = self._track(event.message.sender)
-        body = self.picture.body_told(event.message, event.time_us)
+        track = self._tracks.get(event.message.sender)
+        body = self.picture.body_told(event.message, event.time_us) if track is not None else None
         if track is None or body is None:
             return
         before = self.picture.bodies.get(body.node)
@@ -44,23 +48,18 @@ class _LiftRule(Rule):
             self._moves(event, track, body.node, "moves")
 
     def _on_state(self, event: LogEvent[DriveState]) -> None:
-        track = self._track(event.message.sender)
+        track = self._tracks.get(event.message.sender)
         if track is not None and event.message.mode is DriveMode.MOVING and event.message.speed_mm_s:
             self._moves(event, track, event.message.sender, "moves")
 
     def _on_order(self, event: LogEvent[DriveOrder]) -> None:
-        track = self._track(event.message.sender)
+        track = self._tracks.get(event.message.sender)
         if track is not None:
             self._moves(event, track, event.message.sender, "is sent")
 
     @abstractmethod
     def _moves(self, event: LogEvent[Message], track: int, node: int, how: str) -> None:
         """A lift moves, or is about to."""
-
-    def _track(self, node: int) -> int | None:
-        if self.picture.kind(node) is not KindCode.LIFT:
-            return None
-        return self.picture.site.machines[node].home.track
 
 
 class LiftByGate(_LiftRule):
@@ -105,9 +104,9 @@ class LiftCrush(_LiftRule):
         (self._crossing.add if event.message.crossing else self._crossing.discard)(event.message.sender)
 
     def _moves(self, event: LogEvent[Message], track: int, node: int, how: str) -> None:
-        site, gate = self.picture.site, Segment(track, GATE_INDEX)
+        ways, gate = self.picture.ways, Segment(track, GATE_INDEX)
         over = [
-            body.node for body in self._robots() if gate in occupied(site, body) and track in lifts_under(site, body)
+            body.node for body in self._robots() if gate in occupied(ways, body) and track in lifts_under(ways, body)
         ]
         if not over and node not in self._crossing:
             self._told.discard(node)
@@ -139,7 +138,7 @@ class PlatformThere(Rule):
     def _on_progress(self, event: LogEvent[Progress]) -> None:
         body = self.picture.body_told(event.message, event.time_us)
         if body is not None and self.picture.kind(body.node) is KindCode.ROBOT:
-            self._judge(event, body, occupied(self.picture.site, body), "is over")
+            self._judge(event, body, occupied(self.picture.ways, body), "is over")
 
     def _on_order(self, event: LogEvent[DriveOrder]) -> None:
         body = self.picture.bodies.get(event.message.sender)
@@ -151,13 +150,13 @@ class PlatformThere(Rule):
         self._judge(event, body, slots, "is sent over")
 
     def _judge(self, event: LogEvent[Message], body: ReportedPosition, slots: Sequence[Segment], how: str) -> None:
-        site, wrong = way_site(self.picture.site), False
-        # By floors: an order may lead through one lift to another, and so to a door of another alley.
-        level = site.level(body.track)
+        site, wrong = self.picture.ways, False
         for slot in slots:
-            lift = self.picture.bodies.get(site.stewards.get(slot.track, 0))
-            if slot.index != GATE_INDEX or lift is None or lift.track != slot.track:
+            lift = self.picture.bodies.get(site.stewards.get(slot.track, 0)) if slot.index == GATE_INDEX else None
+            if lift is None or lift.track != slot.track:
                 continue
+            # By floors: an order may lead through one lift to another, and so to a door of another alley.
+            level = site.level(body.track)
             there = {site.level(track) for track in floors_of(site, lift)}
             if lift.speed_mm_s or level not in there:
                 wrong = True

@@ -49,17 +49,17 @@ class InsideAuthority(Rule):
         body = self.picture.body_told(event.message, event.time_us)
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
-        deceleration = way_site(self.picture.site).carrier.acceleration_mm_s2
+        deceleration = self.picture.ways.carrier.acceleration_mm_s2
         was_pushed = self._was_pushed(body)
         self._pushed.pop(body.node, None)
         if was_pushed:
             self._pushed[body.node] = event, body, event.time_us + PUSHED_US
             return
         braking_mm = body.speed_mm_s * abs(body.speed_mm_s) / (2 * deceleration)
-        here = occupied(self.picture.site, body)
+        here = occupied(self.picture.ways, body)
         self._judge(event, body, here, "is in")
         if braking_mm:
-            ahead = swept(self.picture.site, body, body.position_mm + braking_mm)
+            ahead = swept(self.picture.ways, body, body.position_mm + braking_mm)
             self._judge(event, body, [slot for slot in ahead if slot not in here], "cannot stop before")
 
     def _was_pushed(self, body: ReportedPosition) -> bool:
@@ -70,10 +70,12 @@ class InsideAuthority(Rule):
 
     def tick(self, now_us: int) -> None:
         """Who was pushed has had its time."""
+        if not self._pushed:
+            return
         for node, (event, body, due_us) in list(self._pushed.items()):
             if now_us >= due_us:
                 del self._pushed[node]
-                self._judge(event, body, occupied(self.picture.site, body), "was pushed, and stays in", now_us)
+                self._judge(event, body, occupied(self.picture.ways, body), "was pushed, and stays in", now_us)
 
     def _on_order(self, event: LogEvent[DriveOrder]) -> None:
         body = self.picture.bodies.get(event.message.sender)
@@ -95,10 +97,12 @@ class InsideAuthority(Rule):
     ) -> None:
         tokens, at_us = self.picture.tokens, event.time_us if now_us is None else now_us
         for slot in slots:
-            holder = tokens.holder(token_of(slot))
+            token = token_of(slot)
+            holder = tokens.holder(token)
             self.picture.unjudged += holder is None
-            if tokens.may_use(token_of(slot), body.node, at_us):
-                self._told.discard((body.node, slot))
+            if holder == body.node or tokens.may_use(token, body.node, at_us):
+                if self._told:
+                    self._told.discard((body.node, slot))
             elif (body.node, slot) not in self._told:
                 self._told.add((body.node, slot))
                 self.find(event, (body.node,), f"{how} {slot}, which {holder} holds")
@@ -117,39 +121,44 @@ class OneBody(Rule):
         tracks = way_site(picture.site).tracks.values()
         #: Of each track that has linked ends, their mouths.
         self._mouths = {track.number: [mouth for _, mouth in track.ends] for track in tracks if track.ends}
+        self._robots = {node for node in picture.site.machines if picture.kind(node) is KindCode.ROBOT}
 
     def handlers(self) -> Handlers:
         """Reads where bodies say that they are."""
         return {Progress: self._on_progress}
 
     def _on_progress(self, event: LogEvent[Progress]) -> None:
-        site = self.picture.site
-        body = self.picture.body_told(event.message, event.time_us)
-        if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
+        ways, body = self.picture.ways, self.picture.body_told(event.message, event.time_us)
+        if body is None or body.node not in self._robots:
             return
-        lifts = lifts_under(site, body)
+        lifts, near_mm = lifts_under(ways, body), ways.carrier_length_mm - TOLERANCE_MM
         for other in self.picture.bodies.values():
-            if other.node == body.node or self.picture.kind(other.node) is not KindCode.ROBOT:
+            if other.node == body.node or other.node not in self._robots:
                 continue
-            apart_mm = other.position_mm - body.position_mm
-            # Who drove away when it last spoke is farther by now: its power may have failed before its next word.
-            is_gone = apart_mm * other.speed_mm_s > 0
-            is_near = abs(apart_mm) < way_site(site).carrier_length_mm - TOLERANCE_MM
-            if other.track == body.track and is_near and not is_gone:
-                self.find(event, (body.node, other.node), f"{abs(apart_mm)} mm apart on track {body.track}")
-            for lift in sorted(lifts & lifts_under(site, other)) if lifts else ():
+            if other.track == body.track and abs(other.position_mm - body.position_mm) < near_mm:
+                self._judge_near(event, body, other)
+            for lift in sorted(lifts & lifts_under(ways, other)) if lifts else ():
                 self.find(event, (body.node, other.node), f"both on the platform of lift {lift}")
+            if body.track not in self._mouths and other.track not in self._mouths:
+                continue
             for one, two in ((body, other), (other, body)):
                 if two.track in self._mouths and self._is_in_mouth_of(one, two):
                     self.find(event, (body.node, other.node), f"{one.node} in the mouth of {self._name(two.track)}")
 
+    def _judge_near(self, event: LogEvent[Progress], body: ReportedPosition, other: ReportedPosition) -> None:
+        apart_mm = other.position_mm - body.position_mm
+        # Who drove away when it last spoke is farther by now: its power may have failed before its next word.
+        is_gone = apart_mm * other.speed_mm_s > 0
+        if not is_gone:
+            self.find(event, (body.node, other.node), f"{abs(apart_mm)} mm apart on track {body.track}")
+
     def _name(self, track: int) -> str:
-        kind = way_site(self.picture.site).tracks[track].kind
+        kind = self.picture.ways.tracks[track].kind
         return f"{'spur' if kind is TrackKind.SPUR else 'track'} {track}"
 
     def _is_in_mouth_of(self, one: ReportedPosition, two: ReportedPosition) -> bool:
         """Whether a body is where another turns into a track, or comes out of it."""
-        ways = way_site(self.picture.site)
+        ways = self.picture.ways
         here = occupied(ways, two)
         for mouth in self._mouths[two.track]:
             if mouth not in here:
