@@ -1,15 +1,18 @@
 """A place is one robot's: who has lost its place to another leaves its car elsewhere, and nobody brings a second."""
 
 from onboard.contract.codes import Grade, KindCode, LegAction, Reason, ShuttleMode
+from onboard.contract.constants import OUTSIDE
 from onboard.contract.messages import CarAt, Itinerary, Progress, Reference, Stamp
 from onboard.core.authority import station_token
 from onboard.core.effects import Record
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.core.site import Station
 from onboard.holon.holon import Holon
+from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.program import CarHandling, CarStep, StationWork, to_itinerary
 from onboard.systems.car_park.recovery import JournalRecovery
 from onboard.systems.registry import factory_for
+from onboard.ways.tokens import car_token
 from tests.kinds.board import AWARDED, CALL, OTHER, PLACE, ROBOT, SITE, STEWARD, TAKEN, TASK, Board
 
 #: When a robot that was started again goes on, us.
@@ -110,3 +113,14 @@ def test_a_steward_gives_the_right_to_a_place_with_a_car_to_nobody_who_brings_an
     assert steward.behaviour.may_grant(key, ROBOT, 0) is Reason.NONE
     steward.receive(CarAt(OTHER, TASK, PLACE.number, 2, 2_700), 0)
     assert steward.behaviour.may_grant(key, ROBOT, 0) is Reason.TOKEN_NOT_GRANTABLE_YET
+
+
+def test_a_steward_gives_the_right_to_a_car_that_has_left_to_nobody() -> None:
+    steward = Holon(SITE, SITE.machines[STEWARD], factory_for(SITE, KindCode.COMPARTMENT), boot=1)
+    steward.start(0)
+    assert isinstance(steward.behaviour, Compartment)
+    steward.behaviour.stewardship.winners[TASK] = ROBOT
+    steward.receive(CarAt(OTHER, TASK, PLACE.number, 2, 2_700), 0)
+    assert steward.behaviour.may_grant(car_token(*TASK), ROBOT, 0) is Reason.NONE
+    steward.receive(CarAt(OTHER, TASK, OUTSIDE, 3, 2_700), 0)
+    assert steward.behaviour.may_grant(car_token(*TASK), ROBOT, 0) is Reason.TOKEN_NOT_GRANTABLE_YET

@@ -134,17 +134,20 @@ CASES = [
 ]
 
 
+def off(simulation: Simulation, machine: str, at_us: int, lasts_s: float | None) -> None:
+    """The controller of a machine has no power for so long, or for good."""
+    one = machine_named(simulation, machine)
+    simulation.plant.timers.call_at(at_us, partial(simulation.crash, one))
+    if lasts_s is not None:
+        again = partial(simulation.start_controller, one)
+        simulation.plant.timers.call_at(at_us + round(lasts_s * 1e6), again)
+
+
 @pytest.mark.parametrize(("machine", "after_s", "lasts_s"), some(CASES, 9))
 def test_whoever_is_lost_the_customer_gets_the_car(machine: str, after_s: float, lasts_s: float | None) -> None:
     told_us, _ = fetched("nearest").first(DeskOrder, lambda one: one.text is DeskText.GO_TO)
 
-    def faults(simulation: Simulation) -> None:
-        at_us, one = told_us + round(after_s * 1e6), machine_named(simulation, machine)
-        simulation.plant.timers.call_at(at_us, partial(simulation.crash, one))
-        if lasts_s is not None:
-            again = partial(simulation.start_controller, one)
-            simulation.plant.timers.call_at(at_us + round(lasts_s * 1e6), again)
-
+    faults = partial(off, machine=machine, at_us=told_us + round(after_s * 1e6), lasts_s=lasts_s)
     scene = play(two("nearest"), stays((0, 200)), before=faults, limit_s=500)
     if (machine, lasts_s) == ("IOC2", None) and after_s > 1:
         # A robot has the car, and waits before the bay that is off.
@@ -155,3 +158,17 @@ def test_whoever_is_lost_the_customer_gets_the_car(machine: str, after_s: float,
     if (machine, lasts_s) == ("IOC2", None):
         last = [one for _, one in scene.all(TaskReport) if one.phase is TaskPhase.DONE][-1]
         assert ready_at(scene) == [1] and last.task.origin == 1
+
+
+#: Before the customer is told, s: it is in the journal of whoever has won the call, and nobody has heard so.
+@pytest.mark.parametrize("after_s", [-0.007, -0.005])
+def test_a_ticket_that_another_took_meanwhile_is_not_fetched_for_by_who_comes_back(after_s: float) -> None:
+    told_us, _ = fetched("nearest").first(DeskOrder, lambda one: one.text is DeskText.GO_TO)
+    faults = partial(off, machine="IOC2", at_us=told_us + round(after_s * 1e6), lasts_s=15.0)
+    scene = play(two("nearest"), stays((0, 200)), before=faults, limit_s=500)
+    assert_served(scene, 1)
+    fetched_for = {
+        one.task for at_us, one in scene.all(TaskReport) if one.phase is TaskPhase.LOADED and at_us > told_us
+    }
+    assert len(fetched_for) == 1
+    assert not any(one.sender == 2 and one.winner for at_us, one in scene.all(Award) if at_us > told_us)

@@ -310,7 +310,7 @@ class DeskCalls:
         self._told[car] = winner
         if winner != self.fleet.node_id:
             return [self._note(car), self._word(car, winner)]
-        del self.asked[car]
+        # In this life it stays known whose it is: whoever had won it before, and was off, may have it in its journal.
         bay_task.queue_ticket(self.tickets, car, urgent=False)
         return [ticket_record(car, urgent=False), self._word(car, winner)]
 
@@ -368,6 +368,8 @@ class DeskCalls:
             if not is_newer(award.task_version, self.received[mine][1], TASK_VERSION_BITS):
                 return [], None
             del self.received[mine]
+            if mine in self.tickets:
+                self.tickets.remove(mine)
             return [Record(TicketGoneRecord(mine))], mine
         is_known = self.fleet.negotiation.knows(award.sender, award.call) or (award.call and mine is None)
         if award.winner != self.fleet.node_id or is_known:

@@ -26,7 +26,7 @@ from onboard.core.mirror import Obstacle
 from onboard.core.negotiation.winners import patience_us
 from onboard.core.serial import is_newer, successor
 from onboard.core.site import Station
-from onboard.systems.car_park import custody
+from onboard.systems.car_park import bay_task, custody
 from onboard.systems.car_park.bay_memory import BayMemory, job_record, winner_record
 from onboard.systems.car_park.site import car_park
 from onboard.ways.mirror import WayFleet
@@ -266,7 +266,9 @@ class Stewardship:
             return self.fleet.passing_verdict(key, requester, now_us)
         if key.kind is TokenKind.CAR:
             car = Reference(key.number >> 16, key.number & 0xFFFF)
-            return Reason.NONE if self.winners.get(car) == requester else Reason.TOKEN_NOT_GRANTABLE_YET
+            # Of a car that has left there is nothing to fetch, whoever has won to.
+            may_fetch = self.winners.get(car) == requester and not bay_task.is_gone(car, self.fleet.mirror)
+            return Reason.NONE if may_fetch else Reason.TOKEN_NOT_GRANTABLE_YET
         # Where a car stands nobody may bring another: only who is to fetch it has anything to do there.
         cars = custody.others_in(self.fleet.mirror, Station.from_number(key.number))
         may_enter = all(self.winners.get(car) == requester for car in cars)
