@@ -1,9 +1,10 @@
 """What one machine says on the fleet bus, in order, and no more of it at a time than its budgets allow.
 
 Frames of messages without a budget go at once, as they come. What is beyond a budget (``onboard/wire/pace.py``) waits
-here, and with it whatever would come to nothing before it: a request, a place on a way or the digest of a heartbeat
-means nothing to those who have not heard the itinerary. All that is more urgent than an itinerary by its identifier
-stands for itself and passes: stops, grants, bus time, calls, awards and bids.
+here, and with it whatever would come to nothing before it: a request or the digest of a heartbeat means nothing to
+those who have not heard the itinerary. All that is more urgent than an itinerary by its identifier stands for itself
+and passes: stops, grants, bus time, calls, awards and bids. So does a place: a grant of the slot that was left must not
+come before it, and of a plan that is not heard yet it tells where the machine is all the same.
 
 What waits is never more than its subjects: a plan that nobody has heard the beginning of gives way to the next one, a
 heartbeat to a later one, and what waits already is not said twice.
@@ -13,7 +14,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from onboard.contract.codes import Grade
-from onboard.contract.messages import Diagnostic, Heartbeat, Itinerary, Message, TokenRequest
+from onboard.contract.messages import Diagnostic, Heartbeat, Itinerary, Message, Progress, TokenRequest
 from onboard.core.frame import Frame
 from onboard.wire.codec import Codec
 from onboard.wire.pace import HELD_US, Pace
@@ -76,7 +77,8 @@ class Outgoing:
             for frame in frames:
                 self.on_said(frame, now_us)
         subject = frames[0].arbitration_id & ~_NODE_MASK
-        if subject not in self._buckets and (subject < self._head or not self._waiting):
+        passes = subject < self._head or isinstance(message, Progress) or not self._waiting
+        if subject not in self._buckets and passes:
             for frame in frames:
                 self._send(frame)
             return

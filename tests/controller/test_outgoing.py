@@ -87,14 +87,14 @@ def test_legs_beyond_the_budget_follow_at_its_pace_and_make_the_same_itinerary()
     assert said.messages() == [plan(1, 31)]
 
 
-def test_what_is_urgent_passes_and_what_is_about_the_plan_does_not() -> None:
+def test_what_is_urgent_passes_and_so_does_a_place_before_the_slot_that_was_left_is_given_back() -> None:
     said = Said()
     said.say(plan(1, 8))
     grant = TokenGrant(11, TokenKind.SEGMENT, 256, 2, 12)
     said.say(request(1, 1), Progress(11, 1, 0, 1, 2, 0, 0), EmergencyStop(11, Reason.OPERATOR), grant)
-    assert said.names() == ["ItineraryHead", "ItineraryLeg", "EmergencyStop", "TokenGrant"]
+    assert said.names() == ["ItineraryHead", "ItineraryLeg", "Progress", "EmergencyStop", "TokenGrant"]
     said.until(10_000_000)
-    assert said.names()[4:] == ["ItineraryLeg", "TokenRequest", "Progress"]
+    assert said.names()[5:] == ["ItineraryLeg", "TokenRequest"]
 
 
 def test_a_sign_of_life_tells_the_latest_and_waits_no_longer_than_it_may() -> None:

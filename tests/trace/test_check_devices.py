@@ -40,7 +40,7 @@ from onboard.ways.site import way_site
 from tests.sites import one_floor
 from tests.trace.checking import CAR, MR1, MR2, Tape, at, award, bid, call, car_at, one_alley, power_up, report
 
-OPEN, LOCKED, CLOSING = DoorPosition.OPEN, DoorPosition.LOCKED, DoorPosition.CLOSING
+OPEN, LOCKED, CLOSING, OPENING = DoorPosition.OPEN, DoorPosition.LOCKED, DoorPosition.CLOSING, DoorPosition.OPENING
 
 
 def shuttle(mode: ShuttleMode = ShuttleMode.HOME, out_mm: int = 0, node: int = MR1) -> ShuttleState:
@@ -104,6 +104,11 @@ def test_doors_of_a_compartment_in_their_order() -> None:
     tape = before_bay().say(2, doors(OPEN, LOCKED), bay(1400, person=True), bay(1400), doors(CLOSING, LOCKED))
     tape.say(3, doors(LOCKED, LOCKED), DoorOrder(1, 1, DoorName.OUTPUT, DoorAction.OPEN), doors(LOCKED, OPEN))
     assert tape.say(4, shuttle(ShuttleMode.MOVING, 100)).broken() == {}
+
+
+def test_a_person_may_come_out_where_the_word_that_the_door_is_open_was_lost() -> None:
+    tape = before_bay().say(2, doors(OPENING, LOCKED), bay(1400, person=True), bay(1400))
+    assert tape.broken() == {}
 
 
 UNSAFE: dict[str, list[Message]] = {

@@ -10,6 +10,8 @@ from onboard.trace.check.rule import Handlers, Rule
 from onboard.ways.site import way_site
 
 _Seen = LogEvent[DoorState] | LogEvent[BayState] | LogEvent[ShuttleState]
+#: Positions in which nobody passes a door.
+_SHUT = (DoorPosition.CLOSING, DoorPosition.CLOSED, DoorPosition.LOCKED, DoorPosition.FORCED)
 
 
 class Doors(Rule):
@@ -64,7 +66,8 @@ class Doors(Rule):
     def _on_bay(self, event: LogEvent[BayState]) -> None:
         node, inside = event.message.sender, event.message.person_inside
         doors, before = self._doors.get(node), self._inside.get(node, inside)
-        if doors is not None and inside is not before and doors.input_door is not DoorPosition.OPEN:
+        # Of a door that was opening the word that it is open may be lost: only one that was shut is passed by nobody.
+        if doors is not None and inside is not before and doors.input_door in _SHUT:
             self.find(event, (node,), f"a person passes the input door, which is {doors.input_door.name}")
         self._inside[node] = inside
         self._judge_person(event, event.message.sender)
