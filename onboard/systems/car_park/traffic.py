@@ -26,7 +26,7 @@ _SECOND_US = 1_000_000
 MOST_LEGS = 31
 #: What a machine says after its plans, where these wait (``onboard/controller/outgoing.py``).
 _AFTER_PLANS = (
-    *("ItineraryHead", "ItineraryLeg", "TokenRequest", "Progress", "Waiting", "TaskReport", "CarAt"),
+    *("ItineraryHead", "ItineraryLeg", "TokenRequest", "Waiting", "TaskReport", "CarAt"),
     *("Blocked", "Clear", "SyncRequest", "SyncDone", "Heartbeat", "Diagnostic"),
 )
 #: A robot asks for the segments that it covers while it brakes and in this time (kinds/car_park/travel.py), us.
