@@ -122,10 +122,17 @@ class Standing:
     def _leaves_ms(self, itinerary: Itinerary, here: Segment) -> int | None:
         if self._is_at(here, final_position(self.site, itinerary)):
             return None
-        runs = [leg for leg in itinerary.legs if _goes(leg)]
-        # The last run that begins or passes here: before it the machine may work here, or come here again.
-        away = [leg for leg in runs if self._begins_or_passes(leg, here)] or runs
+        legs = itinerary.legs
+        # The last run away from here: before it the machine may work here, or come here again.
+        away = [leg for before, leg in zip((None, *legs), legs, strict=False) if self._leads_away(before, leg, here)]
+        away = away or [leg for leg in legs if _goes(leg)]
         return away[-1].end_ms if away else None
+
+    def _leads_away(self, before: Leg | None, leg: Leg, here: Segment) -> bool:
+        """Whether a run begins or passes here, or goes on from here on another track: its end may be the mouth."""
+        if before is not None and leg.action is LegAction.TRAVEL and leg.track != before.track:
+            return (before.track, before.to_index) == (here.track, here.index)
+        return _goes(leg) and self._begins_or_passes(leg, here)
 
     def _begins_or_passes(self, leg: Leg, here: Segment) -> bool:
         places = {one for one in (here, turned_in(self.site, here)) if one is not None}

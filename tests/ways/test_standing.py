@@ -2,14 +2,37 @@
 
 from dataclasses import replace
 
+from onboard.config.site import parse_site
 from onboard.contract.codes import Grade, KindCode, LegAction, MachineState, Reason, Side
 from onboard.contract.messages import Heartbeat, Itinerary, Leg, Progress, Stamp, Waiting
 from onboard.core.mirror import Mirror
 from onboard.ways.mirror import WayMirror
+from onboard.ways.site import way_site
 from onboard.ways.standing import STANDS_AFTER_US, WAITS_AFTER_US, Standing
 from tests.sites import one_floor
 
 ROBOT, ME = 11, 1
+#: One floor, with a branch of three positions off position 3: track 2.
+BRANCH = """
+[site]
+name = "branch"
+[floors]
+count = 1
+positions = 12
+[[alleys]]
+name = "B"
+from = "p(*,3)"
+positions = 3
+[[compartments]]
+name = "IOC1"
+node = 1
+at = "p(1,7)"
+[[robots]]
+name = "MR1"
+node = 11
+home = "p(1,11)"
+"""
+BRANCH_TRACK = 2
 RUN_MS = 10_000
 
 
@@ -62,6 +85,25 @@ def test_a_machine_that_has_stood_idle_for_long_has_all_the_time_for_a_new_plan(
     standing.hear(plan, now_us)
     assert not standing.stands(ROBOT, now_us + 1_000_000)
     assert standing.stands(ROBOT, now_us + RUN_MS * 1000 + STANDS_AFTER_US)
+
+
+def test_who_works_where_it_came_by_before_stands_there_until_its_plan_turns_out_of_it() -> None:
+    """Into a branch, past its first position to the end and back to it, work there, and out by the mouth."""
+    site = parse_site(BRANCH, "branch.toml")
+    legs = (
+        Leg(LegAction.TRAVEL, BRANCH_TRACK, 1, 1, Side.NEAR, RUN_MS),
+        Leg(LegAction.TRAVEL, BRANCH_TRACK, 1, 3, Side.NEAR, 2 * RUN_MS),
+        Leg(LegAction.TRAVEL, BRANCH_TRACK, 3, 1, Side.NEAR, 3 * RUN_MS),
+        Leg(LegAction.WORK, BRANCH_TRACK, 1, 1, Side.NEAR, 8 * RUN_MS),
+        Leg(LegAction.TRAVEL, 1, 3, 3, Side.NEAR, 9 * RUN_MS),
+        Leg(LegAction.TRAVEL, 1, 3, 1, Side.NEAR, 10 * RUN_MS),
+    )
+    mirror = Mirror(site, ME)
+    mirror.on_itinerary(Itinerary(ROBOT, 1, Grade.FIRM, Stamp(0, ME, 1), legs), 0)
+    standing = Standing(way_site(site), mirror.itineraries)
+    standing.hear(Progress(ROBOT, 1, 2, BRANCH_TRACK, 1, 0, 0), 3 * RUN_MS * 1000)
+    assert not standing.stands(ROBOT, 8 * RUN_MS * 1000)
+    assert standing.stands(ROBOT, 9 * RUN_MS * 1000 + STANDS_AFTER_US)
 
 
 def test_a_machine_at_the_end_of_its_plan_may_stand_there_for_ever() -> None:
