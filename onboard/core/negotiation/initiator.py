@@ -183,7 +183,7 @@ class Initiator:
         )
         self.floor = None if terms.floor is None else terms.floor(self.call, now_us)
         last = self.attempt >= self.timing.max_attempts
-        trusted_not = self.trust.left_out(terms.task, now_us, last_attempt=last)
+        trusted_not = self.trust.left_out(terms.task, now_us, last_attempt=last, kind=terms.kind)
         self.left_out = trusted_not | self.left_out_above | self.of_no_account
         before = [*left_out_words(self.node_id, self.call.call, self.left_out), *self.terms.detail]
         return [*(Send(message) for message in before), Send(self.call)]

@@ -402,7 +402,10 @@ def negotiation_of(
     site: Site, machine: Machine, estimator: Estimator, boot: int, is_obstacle: Callable[[int], bool]
 ) -> Negotiation:
     """That of a machine of a site, in its slot."""
-    slot = slot_of(site, machine.node_id)
-    return Negotiation(
-        machine.node_id, machine.kind, site.timing, estimator, boot=boot, slot=slot, is_obstacle=is_obstacle
-    )
+    of_kind: dict[KindCode | None, set[int]] = {
+        kind: {node for node, one in site.machines.items() if one.kind is kind} for kind in KindCode
+    }
+    negotiation = Negotiation(machine.node_id, machine.kind, site.timing, estimator, boot=boot, is_obstacle=is_obstacle)
+    negotiation.slot = slot_of(site, machine.node_id)
+    negotiation.trust.able = lambda kind: frozenset(node for node in of_kind.get(kind, ()) if not is_obstacle(node))
+    return negotiation

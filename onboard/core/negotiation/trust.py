@@ -5,10 +5,10 @@ calls of this initiator, each time for four times as long. A task that is done e
 initiator: whoever fails again is found again.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import Criterion
+from onboard.contract.codes import Criterion, KindCode
 from onboard.contract.messages import LeftOut, Reference
 from onboard.core.negotiation.bidding import cost_difference
 from onboard.core.serial import to_bus_ms
@@ -40,8 +40,9 @@ class _Record:
 
 @dataclass
 class Trust:
-    """One initiator's memory of its winners. All times are bus time in us."""
+    """One initiator's memory of its winners. Times are bus us. ``able`` tells who of a kind could win now."""
 
+    able: Callable[[KindCode | None], frozenset[int]] = lambda _kind: frozenset()
     _records: dict[int, _Record] = field(default_factory=dict)
     #: For each task in hand: who won it, and the finishing time that it bid (bus ms), None for other criteria.
     _given: dict[Reference, tuple[int, int | None]] = field(default_factory=dict)
@@ -74,8 +75,7 @@ class Trust:
     def done(self, task: Reference, by: int, now_us: int) -> None:
         """A task is done: its winner's fails are forgotten, unless it was far later than it bid and others are not."""
         winner, promised_ms = self._given.pop(task, (by, None))
-        for key in [key for key in self._out_of_task if key[0] == task]:
-            del self._out_of_task[key]
+        self._out_of_task = {key: out for key, out in self._out_of_task.items() if key[0] != task}
         if winner != by:
             return
         record = self._records.setdefault(by, _Record())
@@ -88,14 +88,15 @@ class Trust:
         else:
             record.fails, record.out_until_us = 0, 0
 
-    def left_out(self, task: Reference, now_us: int, *, last_attempt: bool) -> frozenset[int]:
-        """Whose bids for ``task`` do not count; in the last attempt for it only who failed in others too."""
+    def left_out(
+        self, task: Reference, now_us: int, *, last_attempt: bool, kind: KindCode | None = None
+    ) -> frozenset[int]:
+        """Whose bids for ``task`` do not count; in the last attempt only who failed in others too; never all."""
         nodes = {node for node, record in self._records.items() if now_us < record.out_until_us}
-        if not last_attempt:
-            nodes |= {
-                node for (of, node), (_, until_us) in self._out_of_task.items() if of == task and now_us < until_us
-            }
-        return frozenset(nodes)
+        of_task = () if last_attempt else self._out_of_task.items()
+        nodes |= {node for (of, node), (_, until_us) in of_task if of == task and now_us < until_us}
+        able = self.able(kind)
+        return frozenset() if able and able <= nodes else frozenset(nodes)
 
     def _fail(self, node: int, now_us: int) -> None:
         record = self._records.setdefault(node, _Record())

@@ -246,11 +246,16 @@ class BayCalls:
         ahead = self.ahead
         if ahead is not None and not (ahead.winner or ahead.call or ahead.retry_at_us or self._is_open(ahead)):
             effects += self.settle(ahead, now_us)
-        if ahead is not None and ahead.retry_at_us is not None and ahead.retry_at_us <= now_us:
+        if ahead is not None and ahead.retry_at_us is not None and ahead.retry_at_us <= now_us and not self._is_full:
             effects += (
                 self._drop_ahead() if bay_task.is_gone(ahead.car, self.fleet.mirror) else self.call_for(ahead, now_us)
             )
         return effects
+
+    @property
+    def _is_full(self) -> bool:
+        """Whether nobody has won the car that stands in the bay, or comes: the next would stand before a full bay."""
+        return self.job is not None and self.job.operation is Operation.PARK and not self.job.winner
 
     def _drop_ahead(self) -> list[Effect]:
         """The car of the next task has left from another bay."""
@@ -356,7 +361,7 @@ class BayCalls:
 
     def next_wake(self, *, is_job_asked: bool) -> int | None:
         """When a call is made again, or a winner counts as lost; the job's call only where its phase waits for it."""
-        tasks = [self.ahead, self.job if is_job_asked else None]
+        tasks = [None if self._is_full else self.ahead, self.job if is_job_asked else None]
         times = [task.retry_at_us for task in tasks if task is not None]
         times += [task.ask_at_us for task in self.in_hand()]
         times += [self.stewardship.next_wake(), self.unsaid.next_wake()]

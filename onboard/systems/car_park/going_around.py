@@ -326,10 +326,25 @@ class GoingAround:
         return [told, *self.take_up(kept, steps, moved, now_us)]
 
     def _choose_for(self, work: StationWork, now_us: int) -> list[Effect]:
-        """Nothing where there is no other place, or no way there, now: it waits at its own then."""
+        """Nothing where there is no other place, or no way there, now: it waits at its own then.
+
+        Who stands there with it gives back what it has not touched, the last first, where all does not fit into one
+        plan behind another place: whoever waits for that is served by nobody while it stands.
+        """
+        in_hand = self.program.step is not None and self.program.step.work == work
+        untouched = self.untouched() if in_hand else []
+        for first in range(len(untouched), -1, -1):
+            lost = untouched[first:]
+            effects = self._choose_without(lost, work, now_us)
+            if effects:
+                return effects + [word for task in lost for word in self.forfeit(task, Reason.IMPOSSIBLE, now_us)]
+        return []
+
+    def _choose_without(self, lost: Sequence[Reference], work: StationWork, now_us: int) -> list[Effect]:
+        """The same, of a program that has none of ``lost`` any more."""
         in_hand = self.program.step is not None and self.program.step.work == work
         kept, origin, start_us = self.turning([work.call.task] if in_hand else (), now_us)
-        works = self._ahead(self.program.works(), kept)
+        works = [one for one in self._ahead(self.program.works(), kept) if one.call.task not in lost]
         for place in self.places.instead(work, now_us) if work in works else ():
             moved = [one._replace(station=place) if one == work else one for one in works]
             steps = self.generation.reroute(origin, start_us, moved, now_us)

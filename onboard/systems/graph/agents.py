@@ -9,7 +9,7 @@ from zlib import crc32
 from onboard.contract.codes import KindCode, MachineState, Reason
 from onboard.contract.constants import NOBODY
 from onboard.contract.graph import EdgeNotice, EdgeState, NodeAnswer, NodeVerdict, RobotAt, TurnSignal
-from onboard.contract.messages import Heartbeat, Message, TokenGrant
+from onboard.contract.messages import Heartbeat, Message, TokenDispute, TokenGrant
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.effects import Effect, Send
@@ -35,6 +35,9 @@ from onboard.work.plain import NoEstimator
 PROMISE_US = 3_000_000
 #: A robot that waits and has not been heard so long has another way, us: several of its signals are missing then.
 WAITING_US = 6_000_000
+#: A robot that is told to stop for so long may wait for a right that its holder gave back unheard, us: twice what
+#: loading takes, so that hardly anybody is asked who stands there (site file, ``load_ms``).
+DOUBT_US = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -54,10 +57,11 @@ class HostFactory(BehaviourFactory):
 
 @dataclass
 class _Waiting:
-    """A robot before a node: its heading, when it was heard last, and what it was told."""
+    """A robot before a node: its heading, when it was heard last, what it was told, and when its rivals are asked."""
 
     heading: Heading
     heard_us: int
+    doubt_us: int
     answered: NodeVerdict | None = None
 
 
@@ -171,7 +175,9 @@ class NodeAgents:
         if signal.sender in self.strangers or signal.after not in graph.neighbours.get(signal.node, ()):
             return []
         behind = NOWHERE if signal.behind == NO_NODE else signal.behind
-        self.waiting[signal.sender] = _Waiting(Heading(behind, signal.node, signal.after), now_us)
+        heading, was = Heading(behind, signal.node, signal.after), self.waiting.get(signal.sender)
+        doubt_us = was.doubt_us if was is not None and was.heading == heading else now_us + DOUBT_US
+        self.waiting[signal.sender] = _Waiting(heading, now_us, doubt_us)
         decides = self._is_mine(signal.node) and not self.fleet.has_no_rights
         return self._decide(signal.sender, now_us, again=True) if decides else []
 
@@ -216,7 +222,25 @@ class NodeAgents:
         if one.answered is NodeVerdict.STOP and not again:
             return []
         one.answered = NodeVerdict.STOP
-        return [Send(NodeAnswer(self.fleet.node_id, robot, node, NodeVerdict.STOP, wants, 0))]
+        answer = Send(NodeAnswer(self.fleet.node_id, robot, node, NodeVerdict.STOP, wants, 0))
+        return [answer, *self._ask_rivals(one, robot, now_us)]
+
+    def _ask_rivals(self, one: _Waiting, robot: int, now_us: int) -> list[Effect]:
+        """Whoever is believed to have what a robot has waited for says whether it has it, or to whom it gave it.
+
+        While its words did not come through nobody learnt that, and who is only told to stop asks no holder.
+        """
+        node, wants = one.heading.end, one.heading.wants
+        if wants is None or now_us < one.doubt_us:
+            return []
+        one.doubt_us = now_us + DOUBT_US
+        slots = range(1, self.site.capacity + 1) if self.site.rules is Rules.EDGE_AND_NODE else ()
+        effects: list[Effect] = []
+        for key in (edge_token(node, wants), *(slot_token(wants, slot) for slot in slots)):
+            latest = self.fleet.tokens.beliefs.latest(key)
+            if latest.holder not in (keeper(self.site, key), robot, self.fleet.node_id, NOBODY):
+                effects.append(Send(TokenDispute(self.fleet.node_id, *key, latest.version, latest.holder)))
+        return effects
 
     def _grants(self, taken: set[Edge], node: int, after: int) -> bool:
         """Free, and not kept by the agent at its other end (rows G17, G18, G21)."""

@@ -95,6 +95,7 @@ class GraphRobot:
     _signal: tuple[int, int] | None = None
     _signal_at_us: int | None = None
     _loaded_at_us: int | None = None
+    _admissions: int = 0
     _told_at_us: int | None = None
     _told: RobotAt | None = None
     drive: DeviceLink[tuple[RouteAction, int, int]] = field(init=False)
@@ -271,6 +272,10 @@ class GraphRobot:
     def _load(self, now_us: int) -> list[Effect]:
         """Load where the next stop is, for the site's time; then go on, or be free (row G13)."""
         assert self.body is not None
+        if self.fleet.admissions != self._admissions:
+            # Its clock may have been set anew: nobody knows how much of the time is over, and all of it begins anew.
+            self._admissions = self.fleet.admissions
+            self._loaded_at_us = None if self._loaded_at_us is None else now_us + self.site.load_ms * 1000
         self.mode, deed = LOAD_TABLE[self.mode, self._stay(self.body, now_us)]
         match deed:
             case StayDeed.WAIT:

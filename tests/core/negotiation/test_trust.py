@@ -1,6 +1,6 @@
 """Who wins tasks and does not do them is left out, for longer each time."""
 
-from onboard.contract.codes import Criterion
+from onboard.contract.codes import Criterion, KindCode
 from onboard.contract.messages import Reference
 from onboard.core.negotiation.trust import OUT_OF_ALL_US, OUT_OF_TASK_US, Trust, left_out_words
 
@@ -37,6 +37,18 @@ def test_forfeits_in_a_row_are_out_of_all_calls_for_longer_each_time() -> None:
     assert out(trust, 3, OUT_OF_ALL_US) == frozenset()
     fails(trust, 3, OUT_OF_ALL_US)
     assert out(trust, 4, 3 * OUT_OF_ALL_US - 1) == {BAD}
+
+
+def test_whoever_is_the_only_one_that_lives_is_left_out_of_nothing() -> None:
+    trust, alive = Trust(), {GOOD, BAD}
+    trust.able = lambda kind: frozenset(alive) if kind is KindCode.ROBOT else frozenset()
+    fails(trust, 1, 0)
+    fails(trust, 1, 0)
+    task = Reference(1, 1)
+    assert trust.left_out(task, 1, last_attempt=False, kind=KindCode.ROBOT) == {BAD}
+    alive.remove(GOOD)
+    assert trust.left_out(task, 1, last_attempt=False, kind=KindCode.ROBOT) == frozenset()
+    assert trust.left_out(task, 1, last_attempt=False) == {BAD}, "what it claims of the task is as doubtful as before"
 
 
 def test_a_task_that_is_done_ends_it() -> None:
