@@ -16,6 +16,8 @@ class DrawnCarPark:
         #: A branch that comes back to the alley: a loop, which may be driven one way round.
         self.is_loop = self.branch > 1 and draw.random() < 0.6
         self.one_way = draw.choice(("both", "rising", "falling")) if self.is_loop else "both"
+        #: By the name, so that a building that is drawn again has as many: few drawings have room for several.
+        self.robots = random.Random(name).choice((1, 2, 2, 2, 3, 3, 4, 5))
         self._numbers = iter(range(1, 200))
 
     def tables(self) -> Tables:
@@ -128,14 +130,15 @@ class DrawnCarPark:
         ]
 
     def _robots(self) -> Tables:
+        """Most of them on floors and spurs of their own, where they may rest for ever."""
         draw = self.draw
-        homes = [
-            *(f"p({floor},{index})" for floor in range(1, self.floors + 1) for index in range(1, self.positions + 1)),
-            *(f"p({track},1)" for track in range(192, 196)),
-        ]
+        tracks = [f"p({floor},{self._index()})" for floor in range(2, self.floors + 1)]
+        tracks += [f"p({track},1)" for track in range(192, 196)]
+        draw.shuffle(tracks)
+        homes = [*tracks, *(self._place() for _ in range(self.robots))]
         return [
-            ("[[robots]]", {"name": f"MR{number}", "node": 10 + number, "home": draw.choice(homes)})
-            for number in range(1, draw.choice((1, 2, 2, 2, 3, 3, 4, 5)) + 1)
+            ("[[robots]]", {"name": f"MR{number}", "node": 10 + number, "home": home})
+            for number, home in enumerate(homes[: self.robots], start=1)
         ]
 
     def _machines(self) -> Tables:
@@ -145,7 +148,8 @@ class DrawnCarPark:
             tables.append(("[carrier]", {"speed_mm_s": draw.choice((1_000, 2_000, 3_000)), "turn_ms": 5_000}))
         if draw.random() < 0.2:
             tables.append(("[lift]", {"speed_mm_s": draw.choice((500, 2_000))}))
-        if draw.random() < 0.2:
+        if draw.random() < 0.2 and self.robots > 1:
+            # Nobody serves while a lone robot charges.
             tables.append(("[battery]", {"capacity_wh": draw.choice((480, 800)), "charge_w": 1_200}))
         if draw.random() < 0.2:
             tables.append(("[timing]", {"call_window_ms": draw.choice((1_500, 2_500)), "heartbeat_ms": 1_500}))
