@@ -91,7 +91,7 @@ def terminal(name: str, draw: random.Random) -> Tables:
             ("[[stations]]", {"name": f"S{number}", "area": area, "kind": kind, "room": draw.randint(6, 20)})
         )
         if draw.random() < 0.6 or number == 1:
-            names = [f"B{number}_{one}" for one in range(1, draw.randint(3, 6))]
+            names = [f"B{number}_{one}" for one in range(1, 7 if number == 1 else draw.randint(3, 6))]
             boxes.append(("[[boxes]]", {"station": f"S{number}", "type": draw.choice(("T1", "T2")), "names": names}))
     vehicles: Tables = [
         ("[[vehicles]]", {"name": f"R{number}", "node": 10 + number, "home": draw.choice(areas)})
