@@ -88,7 +88,11 @@ class BillsGoDown(BidsGoDown):
 
 
 class OneLathe(Rule):
-    """An order that a lathe has told to have is told by no other, until it is given or taken back; its batch grows."""
+    """An order that a lathe has told to have is told by no other, until it is given or taken back; its batch grows.
+
+    Who was started again since an order was taken back from it may not have heard so: that it has it is what its
+    journal says, and the desk answers. That it has done it nobody else may say.
+    """
 
     name = "one-lathe"
     title = "every order is on one lathe, and its batch only grows"
@@ -97,6 +101,8 @@ class OneLathe(Rule):
     def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._owner: dict[Reference, int] = {}
+        #: From whom an order was taken back, and in which life that was.
+        self._lost: dict[tuple[Reference, int], int | None] = {}
         self._made: dict[Reference, int] = {}
 
     def handlers(self) -> Handlers:
@@ -105,14 +111,18 @@ class OneLathe(Rule):
 
     def _on_award(self, event: LogEvent[Award]) -> None:
         word = event.message
-        if word.result is CallResult.REJECTED and word.sender == word.task.origin:
-            self._owner.pop(word.task, None)
+        if word.result is CallResult.REJECTED and word.sender == word.task.origin and word.task in self._owner:
+            owner = self._owner.pop(word.task)
+            self._lost[word.task, owner] = self.picture.boots.get(owner)
 
     def _on_report(self, event: LogEvent[TaskReport]) -> None:
         word = event.message
         if word.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED):
             if self._owner.get(word.task) == word.sender:
                 del self._owner[word.task]
+            return
+        key, life = (word.task, word.sender), self.picture.boots.get(word.sender)
+        if word.phase is TaskPhase.AWARDED and self._lost.get(key, life) != life and word.task in self._owner:
             return
         owner = self._owner.setdefault(word.task, word.sender)
         if owner != word.sender:
