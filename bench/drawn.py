@@ -64,8 +64,7 @@ def played(numbers: range, options: argparse.Namespace) -> Iterator[TrialResult]
         is_park = options.system == "car-park"
         comes = {"cars": options.cars if is_park else None, "apart": options.apart, "orders": options.orders}
         demand = simulated_of(site).usual(site, comes)
-        limit_s = options.limit if is_park else None
-        plan = CampaignSettings(str(file), options.faults, limit_s, demand, out=options.out, has_baseline=False)
+        plan = CampaignSettings(str(file), options.faults, options.limit, demand, out=options.out, has_baseline=False)
         result = run_seed(plan, number)
         if result.report.verdict not in FAILURES:
             file.unlink()
@@ -89,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--cars", type=int, default=12, help="in a car park")
     parser.add_argument("--orders", type=int, help="on any other site")
     parser.add_argument("--apart", type=float, metavar="SECONDS", help="mean time between two that come")
-    parser.add_argument("--limit", type=float, default=7_200.0, metavar="SECONDS", help="longest run of a car park")
+    parser.add_argument("--limit", type=float, default=7_200.0, metavar="SECONDS", help="longest run")
     parser.add_argument("--out", type=Path, default=Path("drawn"), metavar="DIR", help="what failed is kept here")
     parser.add_argument("--print", action="store_true", dest="prints", help="the site files, and play nothing")
     options = parser.parse_args(arguments)
