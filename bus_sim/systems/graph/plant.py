@@ -138,7 +138,7 @@ class GraphPlant:
             self.note(f"{len(inside)} robots in node {body.node}, which has {self.site.capacity} slots")
 
     def check_end(self, entry: VisitEntry) -> None:
-        """What was told to be done was done: the robot stood in every node in turn, as long as loading takes by its clock."""
+        """What was told to be done was done: the robot stood in each node in turn for its loading."""
         if entry.result is not OrderResult.DONE:
             return
         body = self.bodies.get(entry.robot)
