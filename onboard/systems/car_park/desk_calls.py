@@ -24,7 +24,7 @@ from onboard.contract.codes import (
     TaskPhase,
 )
 from onboard.contract.constants import ANY_STATION, NOBODY, OUTSIDE, TASK_VERSION_BITS
-from onboard.contract.messages import Award, Bid, CallForProposals, Message, Reference, TaskReport
+from onboard.contract.messages import Award, Bid, CallForProposals, CarAt, Message, Reference, TaskReport
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.negotiation import EVENT_TYPES, Awarded, Closed, RequestedTerms
 from onboard.core.negotiation.winners import patience_us
@@ -354,6 +354,9 @@ class DeskCalls:
                 return self._on_award(message)
             case TaskReport() if message.sender in self.park.compartments:
                 return self._on_report(message, now_us), None
+            case CarAt() if message.sender != self.fleet.node_id and bay_task.is_gone(message.car, self.fleet.mirror):
+                # Whatever was not heard of who takes it: nobody need wait for it any more.
+                return [], message.car
             case Promise() if message.car in self.asked:
                 ready_us, spread_us = from_bus_ms(message.ready_ms, now_us), message.spread_ms * 1_000
                 return [self.outputs.promise(message.car, ready_us, spread_us, now_us)], None
