@@ -26,6 +26,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import Permit, authorised
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.site import Machine, Site
+from onboard.systems.graph.clocked import ClockedFleet
 from onboard.systems.graph.errands import TRANSPORT_STOPS, Errand, errand_record, errands, lost_record
 from onboard.systems.graph.fields import NO_NODE, stops_of
 from onboard.systems.graph.network import NOWHERE
@@ -52,6 +53,8 @@ TOLD_US = 2_000_000
 class GraphRobotFactory(BehaviourFactory):
     """Makes robots of a factory graph."""
 
+    fleet_type = ClockedFleet
+
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> RobotPlanning:
         """What its bids come from. Raises ``TypeError`` for a site that is no graph."""
         if not isinstance(site, FactoryGraph):
@@ -60,8 +63,8 @@ class GraphRobotFactory(BehaviourFactory):
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> "GraphRobot":
         """The robot's steps; ``estimator`` is the one made above."""
-        if not isinstance(estimator, RobotPlanning):
-            raise TypeError("a robot needs its own task-generation function")
+        if not isinstance(estimator, RobotPlanning) or not isinstance(fleet, ClockedFleet):
+            raise TypeError("a robot needs its own task-generation function, and the fleet that this factory names")
         return GraphRobot(fleet, estimator)
 
 
@@ -79,7 +82,7 @@ class _Grant:
 class GraphRobot:
     """One robot; of ``tasks`` in hand, which are ``planning.errands``, the first is worked on."""
 
-    fleet: Fleet
+    fleet: ClockedFleet
     planning: RobotPlanning
     kind: KindCode = KindCode.VEHICLE
     body: BodyState | None = None
@@ -95,7 +98,7 @@ class GraphRobot:
     _signal: tuple[int, int] | None = None
     _signal_at_us: int | None = None
     _loaded_at_us: int | None = None
-    _admissions: int = 0
+    _clocks: tuple[int, int] = (0, 0)
     _told_at_us: int | None = None
     _told: RobotAt | None = None
     drive: DeviceLink[tuple[RouteAction, int, int]] = field(init=False)
@@ -272,9 +275,10 @@ class GraphRobot:
     def _load(self, now_us: int) -> list[Effect]:
         """Load where the next stop is, for the site's time; then go on, or be free (row G13)."""
         assert self.body is not None
-        if self.fleet.admissions != self._admissions:
-            # Its clock may have been set anew: nobody knows how much of the time is over, and all of it begins anew.
-            self._admissions = self.fleet.admissions
+        clocks = self.fleet.admissions, self.fleet.clock_sets
+        if clocks != self._clocks:
+            # It slept, or its clock was set: nobody knows how much of the time is over, and all of it begins anew.
+            self._clocks = clocks
             self._loaded_at_us = None if self._loaded_at_us is None else now_us + self.site.load_ms * 1000
         self.mode, deed = LOAD_TABLE[self.mode, self._stay(self.body, now_us)]
         match deed:
