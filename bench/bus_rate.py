@@ -4,10 +4,10 @@ Run from the checkout: ``python -m bench.bus_rate [seconds of virtual time]``. O
 """
 
 import asyncio
-import sys
 import time
 from collections.abc import Callable
 
+from bench._arguments import given
 from bus_sim.can.faults import InjectedFault, parse_fault
 from bus_sim.can.medium import Medium
 from bus_sim.can.node import SimulatedBus
@@ -74,7 +74,7 @@ async def _measure(load: Load, seconds: float, faults: tuple[InjectedFault, ...]
 
 def main() -> None:
     """Print a row for each load: frames per wall second on the simulated bus."""
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else DURATION_S
+    seconds = given(seconds=(float, DURATION_S)).seconds
     fault = parse_fault("omission:receivers=3,probability=0.01,seed=7")
     rows: tuple[tuple[str, Load, tuple[InjectedFault, ...]], ...] = (
         ("every node always has a frame ready", _saturate, ()),

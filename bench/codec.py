@@ -16,6 +16,7 @@ from cantools.database import load_string
 from cantools.database.can.database import Database
 from cantools.database.can.message import Message as DbcMessage
 
+from bench._arguments import given
 from dbc import device_dbc_text, fleet_dbc_text, system_dbc_text, systems
 from onboard.contract.base import FrameCode, Message
 from onboard.contract.codes import Grade, LegAction, Side
@@ -106,6 +107,7 @@ def rows() -> list[Row]:
 
 def main() -> None:
     """Print a row for each message: us to encode and decode, here and with cantools, and the ratios aimed at."""
+    given()
     print("| message | ours: encode us | cantools: encode us | ratio | ours: decode us | cantools: decode us | ratio |")
     print("|---|---|---|---|---|---|---|")
     every = rows()

@@ -4,10 +4,10 @@ Run: ``python bench/day.py [SESSIONS.csv DAY]``; with a file of sessions, that d
 Wall times are this machine's; the ratio of two rows of one site is the cost of the log.
 """
 
-import sys
 import tempfile
 from pathlib import Path
 
+from bench._arguments import given
 from bus_sim.options import RunOptions
 from bus_sim.session import run_site
 from bus_sim.sites import find_site
@@ -28,6 +28,7 @@ def row(name: str, site: str, options: RunOptions) -> RunSummary:
 
 def main() -> None:
     """Print a row for each shipped site: how many times faster than real time its day is played."""
+    words = given(sessions=(Path, ""), day=(str, ""))
     print("| what runs | cars in/out | wall s | times real time | fleet frames | fleet frames/s |")
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
@@ -47,8 +48,8 @@ def main() -> None:
             "standard",
             RunOptions(demand=ParkingDay(window="busiest"), quiet=True),
         )
-        if len(sys.argv) == 3:
-            sessions, day = Path(sys.argv[1]), sys.argv[2]
+        if words.day:
+            sessions, day = words.sessions, words.day
             row(
                 f"standard, {day}, no log",
                 "standard",

@@ -95,7 +95,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         numbers = read_seeds(options.sites)
     except DemandError as error:
-        parser.error(str(error))
+        parser.error(str(error).removeprefix("--seeds "))
     if options.prints:
         print("\n".join(drawn_site(options.system, number) for number in numbers), end="")
         return 0

@@ -8,6 +8,7 @@ reason counted (must be 0), size of all tables over time, frames a second.
 import sys
 import time
 
+from bench._arguments import a_count, a_site, given
 from bus_sim.campaign.fuzz import Fuzzer, record
 from bus_sim.sites import find_site
 from onboard.contract.codes import KindCode
@@ -23,9 +24,9 @@ def one_of_each_kind(site: Site) -> list[Machine]:
 
 
 def main() -> int:
-    frames = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
-    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    sites, failed = [find_site(name) for name in sys.argv[3:] or ["small"]], False
+    words = given(frames=(a_count, 1_000_000), seed=(a_count, 1), sites=(a_site, "small"), rest="sites")
+    frames, seed, failed = words.frames, words.seed, False
+    sites = [find_site(name) for name in words.sites]
     said = {site.name: record(site, seed) for site in sites}
     for site, machine in [(one, machine) for one in sites for machine in one_of_each_kind(one)]:
         fuzzer, began_s = Fuzzer(site, machine, seed, corpus=said[site.name]), time.process_time()

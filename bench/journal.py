@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from bench._arguments import a_count, a_site, given
 from bus_sim.campaign.trial import STEP_US, stage_of
 from bus_sim.faults.scenario import FaultScenario
 from bus_sim.run import run_until
@@ -109,7 +110,8 @@ async def started(site: Site, node: int, entries: list[Entry]) -> tuple[int, flo
 
 def main() -> None:
     """Take site, cars played and cars asked for from the command line; print a row for each machine."""
-    name, cars, wanted = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    words = given(site=(a_site, "small"), cars=(a_count, 160), wanted=(a_count, 10_000))
+    name, cars, wanted = words.site, words.cars, words.wanted
     site = find_site(name)
     journals = played(site, name, cars)
     numbers = [int(one["number"]) for entries in journals.values() for one in entries if one["record"] == "number"]

@@ -7,11 +7,11 @@ one compartment robots do not meet at lifts.) Virtual time: the figures are the 
 import asyncio
 import dataclasses
 import statistics
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from bench._arguments import a_count, a_site, given
 from bus_sim.options import RunOptions
 from bus_sim.run import run_until
 from bus_sim.sites import find_site
@@ -132,9 +132,8 @@ def _share(values: list[int], per_cent: int) -> int:
 
 def main() -> None:
     """Print a table for each site."""
-    names = sys.argv[1:2] or ["standard"]
-    cars = int(sys.argv[2]) if len(sys.argv) > 2 else 12
-    seeds = range(1, 1 + (int(sys.argv[3]) if len(sys.argv) > 3 else 5))
+    words = given(site=(a_site, "standard"), cars=(a_count, 12), seeds=(a_count, 5))
+    names, cars, seeds = [words.site], words.cars, range(1, 1 + words.seeds)
     for name in names:
         intervals = f"intervals {INTERVAL_S[0]:.0f} s +- {INTERVAL_S[1]:.0f} s"
         print(f"{name}: {cars} cars in and out, {intervals}, {len(seeds)} seeds")

@@ -16,11 +16,11 @@ with one whom the initiator does not know, with the award and without (row P11).
 
 import asyncio
 import random
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+from bench._arguments import a_count, given
 from bus_sim.can.faults import FaultKind, InjectedFault
 from bus_sim.can.medium import Medium
 from bus_sim.can.node import NodeOptions, SimulatedBus
@@ -386,7 +386,7 @@ def _print_slower_boards(calls: int) -> None:
 
 def main() -> None:
     """Print bids and messages for each protocol and fleet size; calls a row from the command line."""
-    calls = int(sys.argv[1]) if len(sys.argv) > 1 else CALLS
+    calls = given(calls=(a_count, CALLS)).calls
     timing = alley(FLEETS[0]).timing
     print(
         f"{calls} calls a row, seed {SEED}; idle robots at random among {POSITIONS} places; {PROCESSING_US} us to read "

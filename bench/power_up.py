@@ -8,6 +8,7 @@ SEALS is off, watch or required (``docs/seals.md``).
 import statistics
 import sys
 
+from bench._arguments import a_count, given
 from bus_sim.campaign.power_up import PowerUp, large_with, power_up
 
 LOSS = 0.1
@@ -20,10 +21,8 @@ def _line(title: str, found: PowerUp) -> str:
 
 def main() -> int:
     """Exit status 1 where somebody never takes part."""
-    words = sys.argv[1:]
-    seals = words.pop() if words and not words[-1].isdecimal() else "off"
-    numbers = [int(word) for word in words]
-    machines, seeds, bitrate = [*numbers, *(26, 20, 500_000)[len(numbers) :]]
+    words = given(machines=(a_count, 26), seeds=(int, 20), bitrate=(a_count, 500_000), seals=(str, "off"))
+    machines, seeds, bitrate, seals = words.machines, words.seeds, words.bitrate, words.seals
     site = large_with(machines, bitrate, seals)
     whole = power_up(site)
     print(_line(f"{machines} machines, nothing lost", whole), flush=True)

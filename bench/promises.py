@@ -8,7 +8,6 @@ processor time.
 """
 
 import csv
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, timedelta
@@ -16,6 +15,7 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
+from bench._arguments import a_count, a_site, given
 from bus_sim.options import RunOptions
 from bus_sim.session import play
 from bus_sim.sites import find_site
@@ -104,9 +104,10 @@ def row(name: str, days: Sequence[Sequence[PromiseSeen]]) -> str:
 
 def main() -> None:
     """Print a row for each month, and one for all."""
-    path, name = Path(sys.argv[1]) if len(sys.argv) > 1 else None, sys.argv[2] if len(sys.argv) > 2 else "small"
+    words = given(sessions=(str, ""), site=(a_site, "small"), days=(a_count, DAYS), out=(str, ""))
+    name = words.site
     site = replace(car_park(find_site(name)), promises=True)
-    days, left_out = working_days(path, site, int(sys.argv[3]) if len(sys.argv) > 3 else DAYS)
+    days, left_out = working_days(Path(words.sessions) if words.sessions else None, site, words.days)
     demand = DaysInOne(days)
     stage = play(site, RunOptions(demand=demand, quiet=True))
     assert isinstance(stage, CarParkStage)
@@ -127,8 +128,8 @@ def main() -> None:
     for month in dict.fromkeys((day.year, day.month) for day in seen):
         print(row(f"{month[0]}-{month[1]:02d}", [one for day, one in seen.items() if (day.year, day.month) == month]))
     print(row("all", every))
-    if len(sys.argv) > 4:
-        with Path(sys.argv[4]).open("w", encoding="utf-8", newline="") as file:
+    if words.out:
+        with Path(words.out).open("w", encoding="utf-8", newline="") as file:
             table = csv.writer(file)
             table.writerow(["day", *PromiseSeen._fields])
             table.writerows((day, *one) for day, found in seen.items() for one in found)

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
+from bench._arguments import a_count, a_site, given
 from bus_sim.campaign.points import Single, count, points, reference
 from bus_sim.campaign.trial import play
 from bus_sim.faults.injection import AnyFault, Injection
@@ -51,9 +52,9 @@ def faults_of(site: Site, runs: int, chance: random.Random) -> dict[str, list[An
 
 
 def main() -> int:
-    site = find_site(sys.argv[1] if len(sys.argv) > 1 else "small")
-    runs = int(sys.argv[2]) if len(sys.argv) > 2 else 20
-    site = replace(site, bitrate=int(sys.argv[3]) if len(sys.argv) > 3 else site.bitrate)
+    words = given(site=(a_site, "small"), runs=(a_count, 20), bitrate=(a_count, 0))
+    site, runs = find_site(words.site), words.runs
+    site = replace(site, bitrate=words.bitrate or site.bitrate)
     alone = reference(site.name, None)
     began_s, longest, seen, hours = time.process_time(), dict[str, int](), dict[str, int](), 0.0
     for title, faults in faults_of(site, runs, random.Random(1)).items():

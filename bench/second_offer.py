@@ -15,12 +15,12 @@ Of each task the most that any look found counts. Virtual time: the figures are 
 """
 
 import asyncio
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import NamedTuple
 
+from bench._arguments import a_count, a_site, given
 from bus_sim.options import RunOptions
 from bus_sim.run import run_until
 from bus_sim.sites import find_site
@@ -200,18 +200,21 @@ def probed(site: Site, interval_s: tuple[float, float], cars: int, who: str, see
 
 def main() -> None:
     """One row for each case and seed."""
-    given = sys.argv[1:]
-    name, mean, sigma, cars, seeds, who = [*given, *("standard", "30", "15", "12", "1", MIP)[len(given) :]]
-    interval_s = float(mean), float(sigma)
-    print(f"{name}: {cars} cars in and out, intervals {mean} s +- {sigma} s; {who}\n")
+    words = given(
+        site=(a_site, "standard"), mean=(float, 30.0), sigma=(float, 15.0), cars=(a_count, 12), seeds=(a_count, 1),
+        who=(str, MIP),
+    )  # fmt: skip
+    name, mean, sigma, cars, seeds, who = words.site, words.mean, words.sigma, words.cars, words.seeds, words.who
+    interval_s = mean, sigma
+    print(f"{name}: {cars} cars in and out, intervals {mean:g} s +- {sigma:g} s; {who}\n")
     print("| seed | the others plan | tasks that waited | sooner by 5 s or more | together, s | a task of all, s |")
     print("|---|---|---|---|---|---|")
-    for seed in range(1, 1 + int(seeds)):
-        probe = probed(find_site(name), interval_s, int(cars), who, seed)
+    for seed in range(1, 1 + seeds):
+        probe = probed(find_site(name), interval_s, cars, who, seed)
         for case in Around:
             gains = [us for (_, one), us in probe.gains_us.items() if one is case and us >= WORTH_US]
             total_s = sum(gains) / 1e6
-            mean_s = total_s / (2 * int(cars))
+            mean_s = total_s / (2 * cars)
             print(
                 f"| {seed} | {case.value} | {len(probe.tasks)} | {len(gains)} | {total_s:.0f} | {mean_s:.2f} |",
                 flush=True,

@@ -7,6 +7,7 @@ Same plant, same bus, same robots, same durations; only who decides differs.
 import random
 from dataclasses import replace
 
+from bench._arguments import given
 from bus_sim.options import RunOptions
 from bus_sim.sites import find_site
 from bus_sim.systems.terminal.central import play_auction, play_central
@@ -45,6 +46,7 @@ def missions(site: Terminal, seed: int) -> Terminal:
 
 
 def main() -> None:
+    given()
     site = terminal(find_site("terminal"))
     print("seed  decided by  boxes  waiting mean/max s  finishing mean/max s  last s  plans anew  frames")
     totals: dict[str, list[tuple[float, float]]] = {"auction": [], "central": []}

@@ -6,11 +6,11 @@ desk. Then as many codes beside no desk at all, as if the lock were not there.
 """
 
 import random
-import sys
 from collections import Counter
 from collections.abc import Callable
 from typing import NamedTuple
 
+from bench._arguments import a_count, given
 from bus_sim.sites import find_site
 from onboard.contract.codes import DeskInput, Reason
 from onboard.contract.messages import DeskEvent, Reference, TicketRead
@@ -79,7 +79,7 @@ def beside_a_desk(guesses: int, chance: random.Random, codes: TicketCodes) -> in
 
 def main() -> None:
     """How many tickets the first argument says; a million without one."""
-    guesses = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
+    guesses = given(guesses=(a_count, 1_000_000)).guesses
     chance = random.Random(1)
     codes = TicketCodes((chance.randbytes(32),))
     found = at_a_desk(guesses, chance, codes)
