@@ -10,6 +10,7 @@ import sys
 
 from bench._arguments import a_count, given
 from bus_sim.campaign.power_up import PowerUp, large_with, power_up
+from onboard.config.problems import ConfigError
 
 LOSS = 0.1
 
@@ -23,7 +24,11 @@ def main() -> int:
     """Exit status 1 where somebody never takes part."""
     words = given(machines=(a_count, 26), seeds=(int, 20), bitrate=(a_count, 500_000), seals=(str, "off"))
     machines, seeds, bitrate, seals = words.machines, words.seeds, words.bitrate, words.seals
-    site = large_with(machines, bitrate, seals)
+    try:
+        site = large_with(machines, bitrate, seals)
+    except (ValueError, ConfigError) as error:
+        print(f"power_up.py: error: {error}", file=sys.stderr)
+        return 2
     whole = power_up(site)
     print(_line(f"{machines} machines, nothing lost", whole), flush=True)
     lossy = [power_up(site, LOSS, seed) for seed in range(1, seeds + 1)]

@@ -44,6 +44,7 @@ def test_a_word_that_no_bench_knows_is_one_line(
         ("recovery.py", ["nowhere"], "no such file, and no such shipped site"),
         ("fuzz.py", ["0"], "frames: 0: must be a whole number, 1 or more"),
         ("power_up.py", ["many"], "machines: many: must be a whole number, 1 or more"),
+        ("power_up.py", ["9"], "error: 9 machines: 18 to 108 can start together here"),
         ("drawn.py", ["3-1"], "error: 3-1: must be a seed"),
     ],
 )
