@@ -5,6 +5,7 @@ from me says so, and so does who saw it taken. What is known better elsewhere ta
 until a person has decided (docs/protocol.md, Restart).
 """
 
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -30,6 +31,8 @@ from onboard.core.serial import is_newer
 
 #: A digest that a peer tells was mine at most so long ago where nothing was missed, us: frames wait behind others.
 FRAMES_WAIT_US = 300_000
+#: Who has said so many words that change digests within so long, us, asks nobody: two plans that answer each other.
+RESTLESS, RESTLESS_US = 4, 6_000_000
 #: A machine's digest may be heard so long before the word that made it, us: the word waits for the journal.
 WORDS_WAIT_US = 20_000
 #: Whoever has nothing to say that makes mirrors equal is asked at so many heartbeats, then at every so many.
@@ -86,8 +89,8 @@ class Witness:
     #: My mirror's digest, and until when it was another.
     digest: int | None = None
     digests_before: dict[int, int] = field(default_factory=dict)
-    #: When words of mine last changed it.
-    _told_us: int = -FRAMES_WAIT_US
+    #: When words of mine changed it, the last few times.
+    _told: deque[int] = field(default_factory=lambda: deque([-RESTLESS_US] * RESTLESS, RESTLESS))
     #: Whose digest is another than mine: both, and how often in a row it was told so.
     _apart: dict[int, tuple[int, int, int]] = field(default_factory=dict)
     #: What machines that were started again held by their own word before, until they say so again.
@@ -137,8 +140,9 @@ class Witness:
         if self._was_mine(told, now_us):
             self._apart.pop(beat.sender, None)
             return
-        if now_us - self._told_us < FRAMES_WAIT_US:
-            # Others hear one by one what I said in one step: what they believed in between I never did.
+        if now_us - self._told[-1] < FRAMES_WAIT_US or now_us - self._told[0] < RESTLESS_US:
+            # Others hear one by one what I said in one step: what they believed in between I never did. Where I say
+            # one word after the other, the last ones wait for my share of the bus, and all are behind me.
             return
         before = self._apart.get(beat.sender, (0, 0, 0))
         times = before[2] + 1 if before[:2] == (told, mine) else 1
@@ -174,7 +178,7 @@ class Witness:
         digested = self.mirror.digested
         if not any(isinstance(effect, Send) and isinstance(effect.message, digested) for effect in effects):
             return False
-        self._told_us = now_us
+        self._told.append(now_us)
         return True
 
     def _was_mine(self, digest: int, now_us: int) -> bool:
@@ -208,7 +212,7 @@ class Witness:
                 # Who has just come has no earlier life because the time was set.
                 peer.since_us += by_us
             self.digests_before.clear()
-            self._told_us += by_us
+            self._told = deque((told_us + by_us for told_us in self._told), RESTLESS)
 
     def slept(self, now_us: int) -> None:
         """I heard nothing for a while, or my clock has jumped: who has not answered has had no time to."""

@@ -122,6 +122,7 @@ TIMES: dict[str, tuple[Time, ...]] = {
         Time("T_turn", witness.SLOT_US, _FIXED, "slot of a question, times the number of lower node-IDs"),
         Time("T_wait", witness.WORDS_WAIT_US, _FIXED, "a digest may be heard so long before its word"),
         Time("T_mine", witness.FRAMES_WAIT_US, _FIXED, "a digest that was mine so recently is equal"),
+        Time("T_restless", witness.RESTLESS_US, _FIXED, "four words of mine in so long: I ask nobody"),
         Time("T_compare", witness.COMPARING_BEATS * _TIMING.heartbeat_us, "4 T_beat", "all have compared by then"),
     ),
     "halting": (

@@ -386,7 +386,7 @@ class GoingAround:
     def _turn_away(self, other: int, now_us: int) -> list[Effect]:
         """Plan anew as if who stands face to face with me stood there for ever; without a way all stays as it is."""
         mirror, machine = self.fleet.mirror, self.fleet.site.machines[other]
-        kept, origin, start_us = self.turning((), now_us)
+        kept, origin, start_us = self._aboard(now_us) or self.turning((), now_us)
         if kept or other in mirror.obstacles.machines:
             return []
         # Rights that it has beyond me it cannot use: it grants them to me, who goes first then.
@@ -400,6 +400,16 @@ class GoingAround:
             return []
         self.standoff.turned(other, now_us)
         return self.take_up(0, steps, works, now_us)
+
+    def _aboard(self, now_us: int) -> tuple[int, Segment, int] | None:
+        """From where to plan for who stands aboard a lift and was to leave it: it rides on instead.
+
+        Who stands before the sill may have nowhere else to go than onto the platform, in an alley that ends behind it.
+        """
+        here, step = self.carriage.standing_at, self.program.step
+        if here is None or step is None or self.carriage.target is not None or step.action is not LegAction.TRAVEL:
+            return None
+        return None if lift_at(self.fleet.site, here) is None else (0, here, now_us)
 
     def _is_trapped(self, now_us: int) -> bool:
         """Whether the ride in hand is with a lift that is an obstacle."""
