@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import Reason, TokenKind
+from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import CarAt, Reference
 from onboard.core.authority import TokenBook
 from onboard.core.serial import is_newer
@@ -48,9 +49,9 @@ class CarWords:
         key = car_token(*statement.car)
         held = self.tokens.held.get(key)
         if held is not None and statement.sender != self.node_id:
-            # The giver says again where the car stood, under the version before mine, until it has heard me: news only
-            # where my journal has lost what was said of it before it became mine.
-            if statement.car not in self.cars and statement.version == (held - 1) & _MASK:
+            # The giver says again where the car stood, under the version before mine, until it has heard me: news where
+            # my journal has lost what was said of it before it became mine, or words came in another order.
+            if statement.version == (held - 1) & _MASK and self._is_unplaced(statement):
                 self.take_up(statement)
             self.drops[Reason.RIGHT_CLAIMED] += not is_newer(held & _MASK, statement.version, VERSION_BITS)
             return
@@ -63,6 +64,12 @@ class CarWords:
         self._unproven[statement.car] = statement
         if len(self._unproven) > MAX_UNPROVEN:
             del self._unproven[next(iter(self._unproven))]
+
+    def _is_unplaced(self, statement: CarAt) -> bool:
+        """Whether I know of no place of a car, or have it from the same machine under the same version as aboard it."""
+        known = self.cars.get(statement.car)
+        aboard = statement.sender, statement.version, ANY_STATION
+        return known is None or (known.custodian, known.version, known.station) == aboard
 
     def settle(self, key: TokenKey) -> CarAt | None:
         """A word about a car that what was just heard of its token has proven."""
