@@ -17,6 +17,7 @@ import time
 from bus_sim.sites import find_site
 from onboard.config.site import parse_site
 from onboard.core.site import Segment
+from onboard.io.collector import SOME, rare_looks
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.occupancy import standing_segments, travel_windows
@@ -127,25 +128,32 @@ def measure_bound(length: int, calls: int) -> float:
     return (time.process_time_ns() - before) / 1000 / calls
 
 
+def tables(queries: int, seed: int) -> None:
+    """Measure and print all rows."""
+    heads = ["segments", "others", "median", "99 %", "most", "exp. median", "exp. most", "found", "delayed"]
+    print("  ".join(f"{head:>11}" for head in heads))
+    for length, others in ((20, 0), (40, 0), (20, 5), (40, 5), (40, 20)):
+        print("  ".join(f"{cell:>11}" for cell in measure(length, others, queries, seed)))
+    print()
+    print("  ".join(f"{head:>11}" for head in ("floors", *heads[1:], "pops mean")))
+    fleets = max(1, queries // QUERIES_A_FLEET)
+    for floors, length, compartments, busy in FLEETS:
+        row = measure_floors(park(floors, length, compartments), busy, queries, fleets, seed)
+        print("  ".join(f"{cell:>11}" for cell in (f"{floors} x {length}", *row)))
+    row = measure_floors(car_park(find_site("large")), 11, queries, fleets, seed)
+    print("  ".join(f"{cell:>11}" for cell in ("large", *row)))
+    print(f"free-flow bound, two visits: {measure_bound(40, 20_000):.1f} us")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--queries", type=int, default=1_000, help="queries in each row (default %(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="of the random problems (default %(default)s)")
     options = parser.parse_args()
     print(f"seed {options.seed}, {options.queries} queries a row; processor times in us")
-    heads = ["segments", "others", "median", "99 %", "most", "exp. median", "exp. most", "found", "delayed"]
-    print("  ".join(f"{head:>11}" for head in heads))
-    for length, others in ((20, 0), (40, 0), (20, 5), (40, 5), (40, 20)):
-        print("  ".join(f"{cell:>11}" for cell in measure(length, others, options.queries, options.seed)))
-    print()
-    print("  ".join(f"{head:>11}" for head in ("floors", *heads[1:], "pops mean")))
-    fleets = max(1, options.queries // QUERIES_A_FLEET)
-    for floors, length, compartments, busy in FLEETS:
-        row = measure_floors(park(floors, length, compartments), busy, options.queries, fleets, options.seed)
-        print("  ".join(f"{cell:>11}" for cell in (f"{floors} x {length}", *row)))
-    row = measure_floors(car_park(find_site("large")), 11, options.queries, fleets, options.seed)
-    print("  ".join(f"{cell:>11}" for cell in ("large", *row)))
-    print(f"free-flow bound, two visits: {measure_bound(40, 20_000):.1f} us")
+    # As in a robot's own process.
+    with rare_looks(SOME, settled=True):
+        tables(options.queries, options.seed)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ from outside, the page, processes, a hurried beginning, and the end.
 """
 
 import asyncio
-import gc
 import signal
 import time
 from collections.abc import AsyncIterator, Callable
@@ -28,10 +27,9 @@ from bus_sim.systems.stage import EndedRun, PersonAtKeys, RunFigures, Show, Syst
 from bus_sim.systems.system import SimulatedSystem
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.site import Site
+from onboard.io.collector import MANY, rare_looks
 from onboard.io.signals import ended_by
 
-#: So many things are made before cycles among the newest are looked for (``gc.set_threshold``).
-GC_THRESHOLD = 50_000
 #: A run that only a person ends, us: a century.
 FOREVER_US = 100 * 366 * 86_400 * 1_000_000
 
@@ -61,17 +59,15 @@ def play(
 def _on_loop(site: Site, options: RunOptions, system: SimulatedSystem[Any, Any]) -> tuple[SystemStage[Any], RunFigures]:
     _check(site, options)
     loop = VirtualTimeLoop(pace=options.speed)
-    before = gc.get_threshold()
     # Words and beliefs make no cycles: to look for some as often as usual takes a tenth of the time.
-    gc.set_threshold(max(before[0], GC_THRESHOLD))
-    try:
-        asyncio.set_event_loop(loop)
-        session = _Session(site, options, system, loop)
-        return session.stage, loop.run_until_complete(_to_its_end(session))
-    finally:
-        gc.set_threshold(*before)
-        asyncio.set_event_loop(None)
-        loop.close()
+    with rare_looks(MANY):
+        try:
+            asyncio.set_event_loop(loop)
+            session = _Session(site, options, system, loop)
+            return session.stage, loop.run_until_complete(_to_its_end(session))
+        finally:
+            asyncio.set_event_loop(None)
+            loop.close()
 
 
 async def _to_its_end(session: "_Session") -> RunFigures:

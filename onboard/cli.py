@@ -20,6 +20,7 @@ from onboard.gateway.options import add_mqtt_arguments
 from onboard.gateway.settings import GatewayError
 from onboard.holon.holon import Holon
 from onboard.io.broker_address import is_mqtt_installed
+from onboard.io.collector import SOME, rare_looks
 from onboard.io.console import ConsoleTelemetry, ManyTelemetry
 from onboard.io.endings import ExitStatus
 from onboard.io.journal import FileJournal
@@ -138,7 +139,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         keys = machine_keys(journal, config.site, config.machine.node_id)
         gateway = _beside(args, config) if args.mqtt is not None else None
         secrets = _secrets(config, journal)
-        return asyncio.run(run(config, fleet_settings, journal, gateway, keys, secrets))
+        # Site, tables and modules stay: a look through them all would hold motion up (docs/decisions.md).
+        with rare_looks(SOME, settled=True):
+            return asyncio.run(run(config, fleet_settings, journal, gateway, keys, secrets))
     except (ConfigError, BusOpenError, BrokerError, GatewayError, SealLivesError, OwnedFileError) as error:
         print(error if isinstance(error, ConfigError) else f"onboard: {error}", file=sys.stderr)
         return 2

@@ -1,65 +1,74 @@
 """When a run may arrive where: worked out once for all runs that end alike, from wherever they come."""
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
-
 from onboard.core.site import Segment
 from onboard.ways.departures import Departures
+from onboard.ways.kinematics import ceil_ms
+from onboard.ways.reservations import FOREVER
+from onboard.ways.states import States
+
+#: Windows of arrivals in order: their begins, from a whole millisecond on as runs take whole ones, their ends, and the
+#: numbers of the safe intervals in which they are. Plain tuples of integers, as few as can be: what refers to nothing
+#: else the collector of garbage leaves alone, but it looks at each once.
+Arriving = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
+#: A key is index | tail << ``TAIL_SHIFT``: indices on the wire are bytes, and a platform may be behind the last.
+TAIL_SHIFT = 9
+INDEX_MASK = (1 << TAIL_SHIFT) - 1
+#: Behind all that is forbidden: no safe interval ends later.
+_NEVER = FOREVER, FOREVER
 
 
-class Safe(Protocol):
-    """A safe interval ``[from_us, to_us)`` for standing, and its number."""
+class Arrivals(dict[int, Arriving]):
+    """Of the runs along a track, by where and how they end: ``key``; worked out when asked for."""
 
-    number: int
-    from_us: int
-    to_us: int
-
-
-class Arriving(NamedTuple):
-    """Windows ``[from_us, to_us)`` of arrivals in order, each with the number of the safe interval; and their ends."""
-
-    windows: list[tuple[int, int, int]]
-    lates_us: list[int]
-
-
-class Arrivals(dict[tuple[Segment, int], Arriving]):
-    """Of the runs to positions, by the position and how they end (``Roads.tails``); worked out when asked for."""
-
-    def __init__(self, departures: Departures, states: Callable[[Segment], Sequence[Safe]]) -> None:
+    def __init__(self, departures: Departures, states: States, track: int) -> None:
         super().__init__()
-        self._departures, self._states = departures, states
+        self._departures, self._states, self._track = departures, states, track
+        self._held = departures.held_on(track)
 
-    def __missing__(self, key: tuple[Segment, int]) -> Arriving:
-        forbidden = self._forbidden(*key)
-        found: list[tuple[int, int, int]] = []
-        place, count = 0, len(forbidden)
-        for state in self._states(key[0]):
-            from_us, to_us = state.from_us, state.to_us
-            while place < count and forbidden[place][0] < to_us and from_us < to_us:
-                last_us, next_us = forbidden[place]
+    def __missing__(self, key: int) -> Arriving:
+        there = Segment(self._track, key & INDEX_MASK)
+        forbidden = self._forbidden(there, key >> TAIL_SHIFT)
+        forbidden.append(_NEVER)
+        firsts_us: list[int] = []
+        lates_us: list[int] = []
+        numbers: list[int] = []
+        place, (last_us, next_us) = 0, forbidden[0]
+        for state in self._states[there]:
+            number, to_us = state.number, state.to_us
+            from_us = ceil_ms(state.from_us)
+            while last_us < to_us:
                 if from_us <= last_us and from_us < next_us:
-                    found.append((from_us, last_us + 1, state.number))
-                from_us = max(from_us, next_us)
-                place += next_us < to_us
+                    firsts_us.append(from_us)
+                    lates_us.append(last_us + 1)
+                    numbers.append(number)
+                if from_us < next_us:
+                    from_us = ceil_ms(next_us)
+                if next_us >= to_us:
+                    break
+                place += 1
+                last_us, next_us = forbidden[place]
             if from_us < to_us:
-                found.append((from_us, to_us, state.number))
-        arriving = self[key] = Arriving(found, [late_us for _, late_us, _ in found])
+                firsts_us.append(from_us)
+                lates_us.append(to_us)
+                numbers.append(number)
+        arriving = self[key] = tuple(firsts_us), tuple(lates_us), tuple(numbers)
         return arriving
 
     def _forbidden(self, there: Segment, tail: int) -> list[tuple[int, int]]:
         """Arrivals that others forbid, in order: all between the last one before and the next one behind."""
-        roads, departures = self._departures.roads, self._departures
         found: list[tuple[int, int]] = []
-        held = departures.held_on(there.track)
-        if not held and roads.lift_at(there) is None:
+        roads, held = self._departures.roads, self._held
+        is_aboard = roads.lift_at(there) is not None
+        if not held and not is_aboard:
             return found
-        step, sweeps = roads.tails[tail]
+        (step, sweeps), index = roads.tails[tail], there.index
         for offset, enter_us, leave_us in sweeps:
-            windows = held.get(there.index + step * offset)
-            if offset == 0 and roads.lift_at(there) is not None:
-                # It crosses the sill while the platform is there.
-                windows = departures.held(there)
+            # It crosses the sill of a lift while the platform is there.
+            windows = self._departures.held(there) if is_aboard and not offset else held.get(index + step * offset)
             if windows is not None:
-                found += [(begin_us - leave_us, end_us - enter_us) for begin_us, end_us in zip(*windows, strict=True)]
+                begins, ends = windows
+                found += [
+                    (begin_us - leave_us, end_us - enter_us) for begin_us, end_us in zip(begins, ends, strict=True)
+                ]
         found.sort()
         return found

@@ -9,7 +9,7 @@ more, free in the gaps between the others' uses: for the rides.
 """
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from onboard.core.site import Segment
 from onboard.ways.lift_uses import HOME_INDEX, Gap, floor_intervals, lift_gaps
@@ -21,7 +21,7 @@ from onboard.ways.roads import Roads
 _ALL_TIME = 2 * FOREVER
 
 #: What others hold of a segment: the begins of the windows in order, and their ends. They do not overlap.
-Held = tuple[Sequence[int], Sequence[int]]
+Held = tuple[tuple[int, ...], tuple[int, ...]]
 _NOTHING: Held = ((), ())
 
 
@@ -34,23 +34,20 @@ class Departures:
         self.roads = roads
         self._lift_floors = lift_floors
         self._gaps_of: dict[int, list[Gap]] = {}
-        self._reservations = reservations
+        self._planned = reservations.planned()
         self._owner = owner
         self._start_us = start_us
-        self._free: dict[Segment, list[Interval]] = {}
+        #: Where nobody plans to be: one list for all.
+        self._always = [Interval(start_us, FOREVER)]
         self._held: dict[Segment, Held] = {}
-        self._standing: dict[Segment, list[Interval]] = {}
         self._tracks: dict[int, dict[int, Held]] = {}
 
     def standing(self, segment: Segment) -> list[Interval]:
         """When a body may stand at a segment: all that it touches there must be free."""
-        found = self._standing.get(segment)
-        if found is None:
-            touched = self.roads.touched(segment)
-            found = self._free_intervals(touched[0])
-            for other in touched[1:]:
-                found = _without(found, self.held(other))
-            self._standing[segment] = found
+        touched = self.roads.touched(segment)
+        found = self._free(touched[0])
+        for other in touched[1:]:
+            found = _without(found, self.held(other))
         return found
 
     def held(self, segment: Segment) -> Held:
@@ -60,7 +57,7 @@ class Departures:
             begins: list[int] = []
             ends: list[int] = []
             from_us = self._start_us
-            for gap in self._free_intervals(segment):
+            for gap in self._free(segment):
                 if gap.from_us > from_us:
                     begins.append(from_us)
                     ends.append(gap.from_us)
@@ -68,7 +65,7 @@ class Departures:
             if from_us < FOREVER:
                 begins.append(from_us)
                 ends.append(_ALL_TIME)
-            found = self._held[segment] = (begins, ends) if begins else _NOTHING
+            found = self._held[segment] = (tuple(begins), tuple(ends)) if begins else _NOTHING
         return found
 
     def held_until_us(self, segment: Segment) -> int:
@@ -86,25 +83,21 @@ class Departures:
                     found[position.index] = self.held(position)
         return found
 
-    def _free_intervals(self, segment: Segment) -> list[Interval]:
-        found = self._free.get(segment)
-        if found is None:
-            found = self._free[segment] = self._find_free(segment)
-        return found
-
-    def _find_free(self, segment: Segment) -> list[Interval]:
+    def _free(self, segment: Segment) -> list[Interval]:
         stop = self.roads.lift_at(segment)
         if stop is not None:
             return floor_intervals(self.roads.site, stop[0], self.gaps(stop[0]), stop[1])
         if segment.index == PLATFORM_INDEX:
             return [Interval(gap.from_us, gap.to_us) for gap in self.gaps(segment.track)]
-        return self._reservations.safe_intervals(segment, self._owner, self._start_us)
+        if not self._planned.on(segment):
+            return self._always
+        return self._planned.safe_intervals(segment, self._owner, self._start_us)
 
     def gaps(self, lift_track: int) -> list[Gap]:
         """The gaps between the others' uses of one lift."""
         found = self._gaps_of.get(lift_track)
         if found is None:
-            uses = self._reservations.uses(lift_track, self._owner)
+            uses = self._planned.uses(lift_track, self._owner)
             standing_index = self._lift_floors.get(lift_track, HOME_INDEX)
             found = self._gaps_of[lift_track] = lift_gaps(uses, self._start_us, standing_index)
         return found

@@ -9,16 +9,17 @@ wherever they come from: when one may arrive is worked out once for all of them 
 """
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Mapping
+from collections.abc import Generator, Mapping
 
 from onboard.core.site import Segment
-from onboard.ways.arrivals import Arrivals
+from onboard.ways.arrivals import TAIL_SHIFT, Arrivals
 from onboard.ways.departures import Departures, Held
 from onboard.ways.kinematics import ceil_ms
 from onboard.ways.lifts import platform
 from onboard.ways.occupancy import Sweep, junction_segments
-from onboard.ways.reservations import FOREVER, Interval, Reservations
+from onboard.ways.reservations import FOREVER, Reservations
 from onboard.ways.roads import Roads
+from onboard.ways.states import Edge, State, States
 from onboard.ways.stops import paying_until_us
 
 _MS = 1_000
@@ -27,40 +28,10 @@ _MAX_GOAL_SETS = 4
 #: Searches from different times, or of different machines, whose edges are kept.
 _MAX_KEPT = 4
 
-
-class State:
-    """A safe interval ``[from_us, to_us)`` for standing at a position; its number is its place among all states."""
-
-    __slots__ = ("edges", "from_us", "number", "segment", "since_us", "to_goals", "to_us")
-
-    def __init__(self, number: int, segment: Segment, from_us: int, to_us: int) -> None:
-        self.number = number
-        self.segment = segment
-        self.from_us = from_us
-        self.to_us = to_us
-        #: Edges hold for whoever stands here at ``since_us`` or later; those to goals by the goals' own set.
-        self.since_us = FOREVER
-        self.edges: list[Edge] = []
-        self.to_goals: dict[frozenset[Segment], list[Edge]] = {}
-
-
-def number_on(numbered: list[State], segment: Segment, safe: Iterable[Interval]) -> list[State]:
-    """The states of a position's safe intervals, in order; they join those that are ``numbered`` already."""
-    found = [State(number, segment, *interval) for number, interval in enumerate(safe, start=len(numbered))]
-    numbered += found
-    return found
-
-
-#: A move that leads from one state to another if it departs during ``[first, last)``: first, last, until, duration, the
-#: number of the state that it leads to, what the carrier drives in mm (nothing on a lift), is safe. It pays to make it
-#: only while one stands here before ``until``. Departures are bounds, some may be safe at most, unless all are. A plain
-#: tuple of integers: thousands are kept, and what refers to nothing else the collector of garbage leaves alone.
-Edge = tuple[int, int, int, int, int, int, bool]
-#: What is left of a bound that was looked at.
-NO_EDGE: Edge = (0, 0, 0, 0, 0, 0, True)
-
 #: An index of a track and until when stopping there may pay.
 _Paying = tuple[int, int]
+#: Departures ``[from, to)``; the first of them are clear of what others hold until the third.
+_Left = tuple[int, int, int]
 #: Departures between which none is safe, both of them excluded.
 _Forbidden = tuple[int, int]
 
@@ -75,25 +46,15 @@ def _forbid(found: list[_Forbidden], windows: Held, times: tuple[int, int], edge
         place += 1
 
 
-class _Shared:
-    """What runs in one direction share: the ``known`` first sweeps, and the departures ``[from, to)`` that these leave.
+def _shared(
+    longest: tuple[Sweep, ...], held: dict[int, Held], index: int, step: int, from_us: int, to_us: int
+) -> Generator[_Left, int, None]:
+    """What runs in one direction share: told how many of their first sweeps, it tells the departures that these leave.
 
-    The first departures are clear of them until ``clear_us``.
+    The last one told is the greatest: runs come the nearest first.
     """
-
-    __slots__ = ("_held", "_index", "_longest", "_step", "clear_us", "from_us", "known", "to_us")
-
-    def __init__(
-        self, longest: tuple[Sweep, ...], held: dict[int, Held], index: int, step: int, from_us: int, to_us: int
-    ) -> None:
-        self._longest, self._held, self._index, self._step = longest, held, index, step
-        self.from_us, self.to_us = from_us, to_us
-        self.clear_us, self.known = FOREVER, 0
-
-    def take(self, count: int) -> None:
-        """Take the first ``count`` sweeps into account."""
-        from_us, to_us, clear_us, known = self.from_us, self.to_us, self.clear_us, self.known
-        held, longest, index, step = self._held, self._longest, self._index, self._step
+    clear_us, known, count = FOREVER, 0, 0
+    while True:
         while known < count and from_us < to_us:
             offset, enter_us, leave_us = longest[known]
             known += 1
@@ -115,7 +76,7 @@ class _Shared:
                 while meets < windows_count and begins[meets] - leave_us < to_us - 1:
                     to_us = begins[meets] - leave_us + 1
                     meets = bisect_right(ends, to_us - 1 + enter_us)
-        self.from_us, self.to_us, self.clear_us, self.known = from_us, to_us, clear_us, known
+        count = yield from_us, to_us, clear_us
 
 
 def _cut(edge: Edge, clear_us: int) -> list[Edge]:
@@ -133,18 +94,15 @@ class Edges:
     def __init__(self, departures: Departures) -> None:
         self.departures = departures
         self._roads: Roads = departures.roads
+        self._states = States(departures)
         #: All states that were asked for, by their numbers.
-        self.numbered: list[State] = []
-        self._states: dict[Segment, list[State]] = {}
+        self.numbered = self._states.numbered
         self._paying: dict[int, list[_Paying]] = {}
-        self._arrivals = Arrivals(departures, self.states)
+        self._arrivals: dict[int, Arrivals] = {}
 
     def states(self, segment: Segment) -> list[State]:
         """The safe intervals for standing at a position, in order."""
-        found = self._states.get(segment)
-        if found is None:
-            found = self._states[segment] = number_on(self.numbered, segment, self.departures.standing(segment))
-        return found
+        return self._states[segment]
 
     def state_at(self, segment: Segment, time_us: int) -> State | None:
         """The state of standing at a segment at a time, or None."""
@@ -155,20 +113,23 @@ class Edges:
 
     def edges(self, state: State, from_us: int) -> list[Edge]:
         """Moves from a state to where stopping may pay, for departures from ``from_us`` on, in the roads' order."""
-        if from_us < state.since_us:
-            state.since_us = from_us
-            state.to_goals.clear()
-            state.edges = self._runs(state, from_us, self._paying_on(state.segment.track))
+        found = state.edges
+        if found is None or from_us < state.since_us:
+            state.since_us, state.to_goals = from_us, None
+            found = state.edges = self._runs(state, from_us, self._paying_on(state.segment.track))
             if self._roads.hops(state.segment):
-                state.edges += self._hops(state, from_us)
-        return state.edges
+                found += self._hops(state, from_us)
+        return found
 
     def to_goals(self, state: State, goals: frozenset[Segment]) -> list[Edge]:
         """Runs to those of ``goals`` on the same track at which stopping does not always pay, the earliest first.
 
         For departures from when ``edges`` was asked for on.
         """
-        found = state.to_goals.get(goals)
+        kept = state.to_goals
+        if kept is None:
+            kept = state.to_goals = {}
+        found = kept.get(goals)
         if found is None:
             track = state.segment.track
             always = {index for index, until_us in self._paying_on(track) if until_us >= FOREVER}
@@ -177,9 +138,9 @@ class Edges:
                 for one in goals
                 if one.track == track and one.index not in always and self._roads.knows(one)
             )
-            if len(state.to_goals) >= _MAX_GOAL_SETS:
-                state.to_goals.clear()
-            found = state.to_goals[goals] = self._runs(state, state.since_us, on_track) if on_track else []
+            if len(kept) >= _MAX_GOAL_SETS:
+                kept.clear()
+            found = kept[goals] = self._runs(state, state.since_us, on_track) if on_track else []
             found.sort(key=_arrival_us)
         return found
 
@@ -201,29 +162,39 @@ class Edges:
         if not paying:
             return found
         here = state.segment
-        held, arrivals, runs = self.departures.held_on(here.track), self._arrivals, self._roads.runs(here)
-        shared = _Shared(self._roads.longest(here.track), held, here.index, step, from_us, state.to_us)
-        leaves_by_us = self._leaves_by_us(state)
+        track, from_index = here.track, here.index
+        held, runs = self.departures.held_on(track), self._roads.runs(track)
+        arrivals = self._arrivals_on(track)
+        shared = _shared(self._roads.longest(track), held, from_index, step, from_us, state.to_us)
+        depart_us, end_us, clear_us = next(shared)
+        known, leaves_by_us = 0 if held else FOREVER, self._leaves_by_us(state)
         for index, pays_us in paying:
-            if pays_us <= from_us or (run := runs[index]) is None:
+            if pays_us <= from_us or (run := runs[index - from_index]) is None:
                 continue
-            there, duration_us, distance_mm, alike, tail, leave_us = run
-            if held and shared.known < alike:
-                shared.take(alike)
-            depart_us, to_us = shared.from_us, min(shared.to_us, leaves_by_us - leave_us + 1)
-            if depart_us >= shared.to_us:
+            duration_us, distance_mm, alike, tail, leave_us = run
+            if known < alike:
+                depart_us, end_us, clear_us = shared.send(alike)
+                known = alike
+            if depart_us >= end_us:
                 break
-            windows, lates_us = arrivals[there, tail]
+            to_us = end_us if leaves_by_us >= FOREVER else min(end_us, leaves_by_us - leave_us + 1)
+            firsts_us, lates_us, numbers = arrivals[index | tail << TAIL_SHIFT]
             for place in range(bisect_right(lates_us, depart_us + duration_us), len(lates_us)):
-                arrive_us, late_us, number = windows[place]
-                first_us = max(depart_us, -((duration_us - arrive_us) // _MS) * _MS)
+                first_us = at_us if (at_us := firsts_us[place] - duration_us) > depart_us else depart_us
                 if first_us >= to_us:
                     break
-                last_us, clear_us = min(late_us - duration_us, to_us), shared.clear_us
-                if first_us < last_us <= clear_us:
+                last_us = by_us if (by_us := lates_us[place] - duration_us) < to_us else to_us
+                number = numbers[place]
+                if last_us <= clear_us:
                     found.append((first_us, last_us, pays_us, duration_us, number, distance_mm, True))
-                elif first_us < last_us:
+                else:
                     found += _cut((first_us, last_us, pays_us, duration_us, number, distance_mm, False), clear_us)
+        return found
+
+    def _arrivals_on(self, track: int) -> Arrivals:
+        found = self._arrivals.get(track)
+        if found is None:
+            found = self._arrivals[track] = Arrivals(self.departures, self._states, track)
         return found
 
     def _leaves_by_us(self, state: State) -> int:
@@ -236,13 +207,17 @@ class Edges:
 
     def _hops(self, state: State, from_us: int) -> list[Edge]:
         """Hops to other tracks and rides on a lift."""
-        return [
-            (first_us, last_us, FOREVER, duration_us, one.number, distance_mm, False)
-            for there, duration_us, distance_mm, _ in self._roads.hops(state.segment)
-            for one in self.states(there)
-            if (first_us := max(from_us, ceil_ms(one.from_us - duration_us)))
-            < (last_us := min(one.to_us - duration_us, state.to_us))
-        ]
+        found: list[Edge] = []
+        states, until_us = self._states, state.to_us
+        for there, duration_us, distance_mm, _ in self._roads.hops(state.segment):
+            for one in states[there]:
+                last_us = min(one.to_us - duration_us, until_us)
+                if last_us <= from_us:
+                    continue
+                first_us = max(from_us, ceil_ms(one.from_us - duration_us))
+                if first_us < last_us:
+                    found.append((first_us, last_us, FOREVER, duration_us, one.number, distance_mm, False))
+        return found
 
     def looked_at(self, here: State, edge: Edge) -> list[Edge]:
         """What a bound comes to: all its departures that are safe."""

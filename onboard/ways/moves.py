@@ -7,7 +7,7 @@ that move one step at a time (``onboard.ways.steps``).
 from typing import Protocol
 
 from onboard.core.site import Segment
-from onboard.ways.edges import Edge, State
+from onboard.ways.states import Edge, State
 
 
 class TimesToGoals(Protocol):

@@ -39,16 +39,45 @@ class Interval(NamedTuple):
     to_us: int
 
 
-class Reservations:
+class Planned:
+    """Windows by segment and uses by lift, sorted by their start: what a search has to know of them."""
+
+    def __init__(self, windows: dict[Segment, list[tuple[int, int, int]]], uses: dict[int, list[Use]]) -> None:
+        self._windows = windows
+        self._uses = uses
+
+    def safe_intervals(self, segment: Segment, owner: int, from_us: int) -> list[Interval]:
+        """Gaps that the windows of all but ``owner`` leave from ``from_us`` on, in order; the last may be endless."""
+        gaps: list[Interval] = []
+        free_us = from_us
+        for start_us, end_us, holder in self._windows.get(segment, ()):
+            if holder == owner or end_us <= free_us:
+                continue
+            if start_us > free_us:
+                gaps.append(Interval(free_us, start_us))
+            free_us = end_us
+        if free_us < FOREVER:
+            gaps.append(Interval(free_us, FOREVER))
+        return gaps
+
+    def on(self, segment: Segment) -> Sequence[tuple[int, int, int]]:
+        """Begin, end and owner of all windows on a segment, by their begins."""
+        return self._windows.get(segment, ())
+
+    def uses(self, lift_track: int, excluding: int) -> list[Use]:
+        """Uses of one lift by all but ``excluding``, sorted by begin, end and owner."""
+        return [use for use in self._uses.get(lift_track, ()) if use.owner != excluding]
+
+
+class Reservations(Planned):
     """Windows by segment and uses by lift, sorted by their start. Those of different owners may overlap.
 
     A mirror can be wrong.
     """
 
     def __init__(self) -> None:
-        self._windows: dict[Segment, list[tuple[int, int, int]]] = {}
+        super().__init__({}, {})
         self._segments: dict[int, set[Segment]] = {}
-        self._uses: dict[int, list[Use]] = {}
         self._fixed: set[int] = set()
         #: What was worked out around all but one owner, by that and more: forgotten when another's windows change.
         self.kept: dict[tuple[int, Hashable], object] = {}
@@ -87,19 +116,12 @@ class Reservations:
     def _forget(self, owner: int) -> None:
         self.kept = {key: found for key, found in self.kept.items() if key[0] == owner}
 
-    def safe_intervals(self, segment: Segment, owner: int, from_us: int) -> list[Interval]:
-        """Gaps that the windows of all but ``owner`` leave from ``from_us`` on, in order; the last may be endless."""
-        gaps: list[Interval] = []
-        free_us = from_us
-        for start_us, end_us, holder in self._windows.get(segment, ()):
-            if holder == owner or end_us <= free_us:
-                continue
-            if start_us > free_us:
-                gaps.append(Interval(free_us, start_us))
-            free_us = end_us
-        if free_us < FOREVER:
-            gaps.append(Interval(free_us, FOREVER))
-        return gaps
+    def planned(self) -> Planned:
+        """The same windows and uses, whenever one looks, without what is ``kept``.
+
+        For what is kept itself: if it referred to where it is kept, only the collector of garbage could free it.
+        """
+        return Planned(self._windows, self._uses)
 
     def copy(self) -> "Reservations":
         """The same, to be changed by itself."""
@@ -138,10 +160,6 @@ class Reservations:
         ]
         return min(starts, default=None)
 
-    def uses(self, lift_track: int, excluding: int) -> list[Use]:
-        """Uses of one lift by all but ``excluding``, sorted by begin, end and owner."""
-        return [use for use in self._uses.get(lift_track, ()) if use.owner != excluding]
-
     def conflicts(self, owner: int, windows: Iterable[SlotWindow]) -> list[tuple[SlotWindow, int]]:
         """Each of ``windows`` that overlaps one of another node, with that node."""
         return [
@@ -157,10 +175,6 @@ class Reservations:
             return False
         ahead = [window for window in windows if window.to_us > now_us]
         return any(holder in self._fixed for _, holder in self.conflicts(owner, ahead))
-
-    def on(self, segment: Segment) -> Sequence[tuple[int, int, int]]:
-        """Begin, end and owner of all windows on a segment, by their begins."""
-        return self._windows.get(segment, ())
 
     def earliest_other_start(self, owner: int, segment: Segment, now_us: int) -> int | None:
         """Start of anybody else's first window on a segment that is not over at ``now_us``, or None."""

@@ -49,7 +49,7 @@ class Roads:
         self._hops: dict[Segment, list[Move]] = {}
         self._junctions: dict[int, list[Segment]] = {}
         self._platforms: dict[Segment, tuple[int, int]] = {}
-        self._runs: dict[Segment, RunsFrom] = {}
+        self._runs: dict[int, RunsOn] = {}
         self._touched: dict[Segment, list[Segment]] = {}
         self._longest: dict[int, tuple[Sweep, ...]] = {}
         self._swept: dict[tuple[int, int], tuple[tuple[Sweep, ...], int]] = {}
@@ -122,20 +122,19 @@ class Roads:
             found = self._touched[position] = aboard + alley_segments(self.site, position)
         return found
 
-    def runs(self, here: Segment) -> "RunsFrom":
-        """Runs from a position along its track, by the index to which they lead."""
-        found = self._runs.get(here)
+    def runs(self, track: int) -> "RunsOn":
+        """Runs along a track by the steps that they go, lower indices below 0: they are the same from everywhere."""
+        found = self._runs.get(track)
         if found is None:
-            found = self._runs[here] = RunsFrom(self, here)
+            found = self._runs[track] = RunsOn(self, track)
         return found
 
-    def run(self, here: Segment, there: Segment) -> "_Run":
-        """The run from a position to another on its track."""
-        track, steps = here.track, there.index - here.index
-        sweeps, alike = self.swept(track, abs(steps))
+    def run(self, track: int, steps: int) -> "_Run":
+        """The run over so many steps of a track, lower indices below 0."""
+        count = abs(steps)
+        sweeps, alike = self.swept(track, count)
         pitch_mm, reach = self.site.tracks[track].pitch_mm, -sweeps[0].offset
-        tail = self._tail(track, steps)
-        return there, self._run_us[track][abs(steps)], abs(steps) * pitch_mm, alike, tail, sweeps[reach].leave_us
+        return self._run_us[track][count], count * pitch_mm, alike, self._tail(track, steps), sweeps[reach].leave_us
 
     def _tail(self, track: int, steps: int) -> int:
         """How runs over so many steps end, lower indices below 0: their place among ``tails``."""
@@ -155,9 +154,9 @@ class Roads:
             self.tails.append((step, tail))
         return number
 
-    def leads(self, here: Segment, index: int) -> bool:
-        """Whether a run from a position may end at an index of its track."""
-        return index in self._positions[here.track]
+    def leads(self, track: int, steps: int) -> bool:
+        """Whether a run along a track may go so many steps, lower indices below 0."""
+        return steps != 0
 
     def hops(self, here: Segment) -> Sequence[Move]:
         """Hops and rides from a position, in the order of the site's tracks."""
@@ -259,17 +258,19 @@ class Roads:
             yield one, durations[abs(here.index - one.index)]
 
 
-class RunsFrom(dict[int, "_Run | None"]):
-    """Runs from one position by the index to which they lead, None where there is none; worked out when asked for."""
+class RunsOn(dict[int, "_Run | None"]):
+    """Runs along one track by their steps, None where none may go there; worked out when asked for.
 
-    def __init__(self, roads: Roads, here: Segment) -> None:
+    Nothing is asked of where a run begins or ends: both are positions of the track.
+    """
+
+    def __init__(self, roads: Roads, track: int) -> None:
         super().__init__()
-        self._roads, self._here = roads, here
+        self._roads, self._track = roads, track
 
-    def __missing__(self, index: int) -> "_Run | None":
-        roads, here = self._roads, self._here
-        there = Segment(here.track, index)
-        found = self[index] = roads.run(here, there) if index != here.index and roads.leads(here, index) else None
+    def __missing__(self, steps: int) -> "_Run | None":
+        roads, track = self._roads, self._track
+        found = self[steps] = roads.run(track, steps) if roads.leads(track, steps) else None
         return found
 
 
@@ -298,9 +299,9 @@ class DirectedRoads(Roads):
         ahead = [(index, rest_us) for index, rest_us in ways if track.goes(origin.index, index)]
         return min((durations[abs(origin.index - index)] + rest_us for index, rest_us in ahead), default=FOREVER)
 
-    def leads(self, here: Segment, index: int) -> bool:
-        """Whether a run from a position may end at an index of its track."""
-        return super().leads(here, index) and self.site.tracks[here.track].goes(here.index, index)
+    def leads(self, track: int, steps: int) -> bool:
+        """Whether a run along a track may go so many steps, lower indices below 0."""
+        return super().leads(track, steps) and self.site.tracks[track].goes(0, steps)
 
     def _junctions_before(self, here: Segment) -> Iterator[tuple[Segment, int]]:
         track = self.site.tracks[here.track]
@@ -311,9 +312,9 @@ def _build(site: WaySite) -> Roads:
     return DirectedRoads(site) if any(track.one_way for track in site.tracks.values()) else Roads(site)
 
 
-#: Where it leads, duration, distance in mm, how many of its first sweeps it shares with the longest run of the track,
-#: how it ends (its place among ``Roads.tails``), and when it leaves the segment where it began.
-_Run = tuple[Segment, int, int, int, int, int]
+#: Duration, distance in mm, how many of its first sweeps it shares with the longest run of the track, how it ends (its
+#: place among ``Roads.tails``), and when it leaves the segment where it began.
+_Run = tuple[int, int, int, int, int]
 #: By track: index and time from there to a goal.
 _Ways = dict[int, list[tuple[int, int]]]
 

@@ -19,13 +19,14 @@ from typing import NamedTuple
 
 from onboard.contract.codes import LegAction
 from onboard.core.site import Segment
-from onboard.ways.edges import NO_EDGE, Edge, State, edges_of
+from onboard.ways.edges import edges_of
 from onboard.ways.effort import POP_STEPS, Search, at_once
 from onboard.ways.kinematics import ceil_ms
 from onboard.ways.moves import Ground, Moves
 from onboard.ways.reservations import FOREVER, Reservations
 from onboard.ways.roads import roads_of
 from onboard.ways.site import WaySite
+from onboard.ways.states import NO_EDGE, Edge, State
 
 #: A search may pause after each so many states taken off its queue.
 PAUSE_POPS = 8
@@ -137,7 +138,7 @@ def searching(
     state = moves.state_at(start, start_us)
     if state is None:
         return NoRoute(f"the start {start} is reserved by another machine", 0)
-    root = _Node(0, state, start_us, None, LegAction.STAND, start_us, (), (0, 0, 0))
+    root = _Node(0, state, (start_us, 0, 0, 0, -start_us), None, LegAction.STAND, ())
     found = yield from _IntervalSearch(ground, moves, visits, refuges).run(root, max_expansions)
     yield found.pops % PAUSE_POPS * POP_STEPS
     return found
@@ -147,33 +148,36 @@ def searching(
 plan_route, find_route = at_once(planning), at_once(searching)
 
 
-#: What breaks ties: time standing or riding on platforms, which others may want, then distance, then moves.
-_Effort = tuple[int, int, int]
+#: How a state is reached, of several the least: arrival; time standing or riding on platforms, which others may want,
+#: then distance, then moves; minus the last move's beginning.
+_Label = tuple[int, int, int, int, int]
 
 
 class _Node(NamedTuple):
-    """A state reached at ``time_us`` from ``parent`` by a leg that began at ``begin_us``."""
+    """A state reached from ``parent``."""
 
     phase: int
     state: State
-    time_us: int
+    label: _Label
     parent: "_Node | None"
     action: LegAction
-    begin_us: int
     visit_ends_us: tuple[int, ...]
-    effort: _Effort
 
     @property
-    def label(self) -> "_Label":
-        """Of those of a state the least is how it is reached."""
-        return self.time_us, *self.effort, -self.begin_us
+    def time_us(self) -> int:
+        """When it is reached."""
+        return self.label[0]
+
+    @property
+    def begin_us(self) -> int:
+        """When the leg that leads here began."""
+        return -self.label[4]
 
 
-#: Arrival, effort, minus the last move's beginning.
-_Label = tuple[int, int, int, int, int]
-#: (End of the last visit, arrival in a refuge), (effort, minus the last move's beginning), order of discovery, node.
-#: That is the order of the states that it comes from, then of runs by index, then of hops: nothing kept changes it.
-_Entry = tuple[tuple[int, int], tuple[int, int, int, int], tuple[int, bool, Segment, int], _Node]
+#: End of the last visit, arrival in a refuge, label without its arrival, order of discovery; the state's key, node. The
+#: order is that of the states that it comes from, then runs before hops, then that of positions: nothing kept changes
+#: it. One tuple: thousands are made in a search.
+_Entry = tuple[int, int, int, int, int, int, int, bool, Segment, int, int, _Node]
 
 
 class _IntervalSearch:
@@ -189,7 +193,7 @@ class _IntervalSearch:
         self.visits = visits
         self.refuges = refuges
         self._targets = (*(frozenset((visit.segment,)) for visit in visits), refuges)
-        self._ways_us = [roads.ways_us(goals) for goals in self._targets]
+        self._ways_us = [roads.ways_us(goals).to_us for goals in self._targets]
         self._tails = _tails(roads, visits)
         self._queue: list[_Entry] = []
         self.expansions = 0
@@ -203,26 +207,25 @@ class _IntervalSearch:
 
     def run(self, root: _Node, max_expansions: int) -> Search[Route | NoRoute]:
         """Search from ``root``; see ``plan_route``. It may pause after each ``PAUSE_POPS``."""
-        self._push(root)
-        pops = 0
-        while self._queue:
-            *_, node = heappop(self._queue)
+        self._push(root, self._key(root))
+        pops, queue = 0, self._queue
+        while queue:
+            *_, key, node = heappop(queue)
             pops += 1
             if not pops % PAUSE_POPS:
                 yield PAUSE_POPS * POP_STEPS
-            phase, state = node.phase, node.state
-            key = self._key(node)
-            if self._best[phase][key] != node.label or self._is_over(phase):
+            phase, state, label, _, _, visit_ends_us = node
+            if self._best[phase][key] is not label or self._is_over(phase):
                 continue
             if self._is_goal(phase, state):
-                finish_us = node.visit_ends_us[-1] if node.visit_ends_us else node.time_us
-                return Route(tuple(_legs(self.roads, node)), node.visit_ends_us, finish_us, self.expansions, pops)
+                finish_us = visit_ends_us[-1] if visit_ends_us else node.time_us
+                return Route(tuple(_legs(self.roads, node)), visit_ends_us, finish_us, self.expansions, pops)
             if self.expansions >= max_expansions:
                 return NoRoute("the search's bound of expansions is reached", self.expansions, pops)
             self.expansions += 1
             # From now on one has to be earlier; until now it was enough to be as early, with less effort. A state can
             # come up again earlier after the last visit only: by a route that ends that visit later.
-            self._best[phase][key] = node.time_us, -1, 0, 0, 0
+            self._best[phase][key] = label[0], -1, 0, 0, 0
             self._expand(node)
         return NoRoute("no order of waits and moves leads to the goal and a refuge", self.expansions, pops)
 
@@ -248,24 +251,24 @@ class _IntervalSearch:
 
         A bound that promises one is looked at, and what it comes to meets its turn in this very loop.
         """
-        phase, state, time_us, _, came, _, visit_ends_us, (aboard_us, travel_mm, moves) = node
+        phase, state, (time_us, aboard_us, travel_mm, moves, _), _, came, visit_ends_us = node
         best, is_aboard = self._best[phase], self.roads.lift_at(state.segment) is not None
         # A lift comes for who rides: nobody drives onto its platform to make room, and off it again.
         is_to_ride = is_aboard and came is LegAction.TRAVEL
         is_last, is_any_over = phase == len(self.visits), False
         for place, (first_us, last_us, until_us, duration_us, number, distance_mm, is_safe) in enumerate(edges):
-            depart_us = max(first_us, time_us)
+            depart_us = first_us if first_us > time_us else time_us
             if depart_us >= last_us or until_us <= time_us:
                 continue
             if is_to_ride and distance_mm:
                 continue
-            arrival_us = depart_us + duration_us
-            known = best.get(number if distance_mm else ~number)
+            arrival_us, key = depart_us + duration_us, number if distance_mm else ~number
+            known = best.get(key)
             if (known is not None and arrival_us > known[0]) or (is_last and arrival_us > self._found[1]):
                 continue
             waited_us = ((depart_us if distance_mm else arrival_us) - time_us) if is_aboard else 0
-            effort = aboard_us + waited_us, travel_mm + distance_mm, moves + 1
-            if known is not None and (arrival_us, *effort, -depart_us) >= known:
+            label = arrival_us, aboard_us + waited_us, travel_mm + distance_mm, moves + 1, -depart_us
+            if known is not None and label >= known:
                 continue
             if not is_safe:
                 edges += self.edges.looked_at(state, edges[place])
@@ -273,7 +276,7 @@ class _IntervalSearch:
                 is_any_over = True
                 continue
             leg, there = LegAction.TRAVEL if distance_mm else LegAction.RIDE, self.edges.numbered[number]
-            self._push(_Node(phase, there, arrival_us, node, leg, depart_us, visit_ends_us, effort))
+            self._push(_Node(phase, there, label, node, leg, visit_ends_us), key)
         if is_any_over:
             edges[:] = [edge for edge in edges if edge is not NO_EDGE]
 
@@ -288,37 +291,31 @@ class _IntervalSearch:
         end_us = begin_us + ceil_ms(visit.dwell_us)
         self._open[node.phase].discard(node.state)
         if end_us <= node.state.to_us:
-            self._push(
-                node._replace(
-                    phase=node.phase + 1,
-                    time_us=end_us,
-                    parent=node,
-                    action=LegAction.WORK,
-                    begin_us=begin_us,
-                    visit_ends_us=(*node.visit_ends_us, end_us),
-                )
-            )
+            label = end_us, *node.label[1:4], -begin_us
+            after = _Node(node.phase + 1, node.state, label, node, LegAction.WORK, (*node.visit_ends_us, end_us))
+            self._push(after, self._key(after))
 
-    def _push(self, node: _Node) -> None:
+    def _push(self, node: _Node, key: int) -> None:
         """Queue a node whose label is better than the best of its state."""
-        phase, state = node.phase, node.state
-        way_us = self._ways_us[phase].to_us(state.segment)
+        phase, state, label, before, _, visit_ends_us = node
+        segment, best, time_us = state.segment, self._best[phase], label[0]
+        known = best.get(key)
+        if known is not None and label >= known:
+            return
+        way_us = self._ways_us[phase](segment)
         if phase < len(self.visits):
             work_us, floor_us = self._tails[phase]
             # Before the last visit is over the second is the time itself: the same end leads to the same refuge.
-            ends_us = max(node.time_us + way_us + work_us, floor_us), node.time_us
+            ends_us = max(time_us + way_us + work_us, floor_us), time_us
         else:
             # Without visits all ends are equal.
-            ends_us = node.visit_ends_us[-1] if node.visit_ends_us else 0, node.time_us + way_us
-        label, key = node.label, self._key(node)
-        known = self._best[phase].get(key)
-        if max(ends_us) < FOREVER and ends_us <= self._found and (known is None or label < known):
-            self._best[phase][key] = label
+            ends_us = visit_ends_us[-1] if visit_ends_us else 0, time_us + way_us
+        if ends_us <= self._found and max(ends_us) < FOREVER:
+            best[key] = label
             if self._is_goal(phase, state):
                 self._found = ends_us
-            here = state.segment if node.parent is None else node.parent.state.segment
-            order = self.expansions, state.segment.track != here.track, state.segment, state.from_us
-            heappush(self._queue, (ends_us, label[1:], order, node))
+            is_hop = before is not None and before.state.segment.track != segment.track
+            heappush(self._queue, (*ends_us, *label[1:], self.expansions, is_hop, segment, state.from_us, key, node))
 
 
 def _fits(state: State, visit: Visit) -> bool:

@@ -9,9 +9,9 @@ to begin, as each enters once the one before has begun to leave. With one other 
 from collections.abc import Callable, Iterable, Sequence
 
 from onboard.core.site import Segment
-from onboard.ways.edges import Edge, State, number_on
 from onboard.ways.network import Network
 from onboard.ways.reservations import FOREVER, Reservations, SlotWindow
+from onboard.ways.states import Edge, State, number_on
 
 #: One step, as reservations count time: a whole millisecond.
 STEP_US = 1_000
@@ -107,9 +107,9 @@ class StepMoves:
 
     def edges(self, state: State, from_us: int) -> list[Edge]:
         """Steps to the cells beside a state's, all of them sure."""
-        if state.since_us >= FOREVER:
+        if state.edges is None:
             # Once for all departures: there are few.
-            state.since_us = state.from_us
+            found: list[Edge] = []
             here = state.segment.index
             for to, _ in self._network.ways[here]:
                 for there in self.states(cell_segment(to)):
@@ -118,7 +118,8 @@ class StepMoves:
                         first_us += STEP_US
                     last_us = min(state.to_us, there.to_us - STEP_US)
                     if first_us < last_us:
-                        state.edges.append((first_us, last_us, FOREVER, STEP_US, there.number, 1, True))
+                        found.append((first_us, last_us, FOREVER, STEP_US, there.number, 1, True))
+            state.edges = found
         return state.edges
 
     def _is_in_ring(self, here: int, to: int, depart_us: int) -> bool:

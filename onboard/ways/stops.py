@@ -8,7 +8,6 @@ every run goes the same way, so it passes what is held at the same times. (Up to
 milliseconds.)
 """
 
-from onboard.core.site import Segment
 from onboard.ways.departures import Departures
 from onboard.ways.occupancy import body_mm
 from onboard.ways.reservations import FOREVER
@@ -21,15 +20,14 @@ def paying_until_us(departures: Departures, track: int) -> list[tuple[int, int]]
     For a goal it always pays, which is for the caller to add.
     """
     roads = departures.roads
-    found: dict[int, int] = {}
     far = settling_segments(roads, track)
-    for middle in roads.positions(track):
-        held_us = departures.held_until_us(middle)
-        for index in range(middle.index - far, middle.index + far + 1) if held_us else ():
-            if found.get(index, 0) < held_us:
-                found[index] = held_us
-    found.update((one.index, FOREVER) for one in roads.junctions(track))
-    return sorted((index, until_us) for index, until_us in found.items() if roads.knows(Segment(track, index)))
+    held_us = {one.index: departures.held_until_us(one) for one in roads.positions(track)}
+    first, last = min(held_us), max(held_us)
+    # Beyond both ends of the track nobody holds anything.
+    until_us = [held_us.get(index, 0) for index in range(first - far, last + far + 1)]
+    found = {index: max(until_us[index - first : index - first + 2 * far + 1]) for index in sorted(held_us)}
+    found.update((one.index, FOREVER) for one in roads.junctions(track) if one.index in held_us)
+    return [(index, pays_us) for index, pays_us in found.items() if pays_us]
 
 
 def settling_segments(roads: Roads, track: int) -> int:

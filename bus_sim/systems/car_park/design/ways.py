@@ -81,12 +81,12 @@ class ModelTraffic:
                 yield self._hop(here, move, time_us, owner)
         alley = self.alleys[here.track]
         for there in (*roads.junctions(here.track), *goals):
-            run = roads.runs(here)[there.index] if there != here else None
+            run = roads.runs(here.track)[there.index - here.index]
             if run is not None:
                 low, high = min(here.index, there.index), max(here.index, there.index)
-                begin_us = alley.free_from(time_us, run[1], low, high, owner)
-                turn = Stretch(begin_us, begin_us + run[1], low, high, owner)
-                yield ModelLeg(here, there, begin_us, begin_us + run[1], ((here.track, turn),), None, run[2])
+                begin_us = alley.free_from(time_us, run[0], low, high, owner)
+                turn = Stretch(begin_us, begin_us + run[0], low, high, owner)
+                yield ModelLeg(here, there, begin_us, begin_us + run[0], ((here.track, turn),), None, run[1])
 
     def _ride(self, here: Segment, move: Move, track: int, time_us: int) -> ModelLeg:
         lift, boards, leaves = self.lifts[track], self.roads.lift_at(here), self.roads.lift_at(move.destination)
