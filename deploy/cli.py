@@ -64,10 +64,10 @@ def build_parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     archive = commands.add_parser("archive", help="the program and its libraries in one file")
-    archive.add_argument("--out", type=Path, default=Path("dist/onboard.pyz"), metavar="FILE")
+    archive.add_argument("--out", type=_file, default=Path("dist/onboard.pyz"), metavar="FILE")
     deb = commands.add_parser("deb", help="a Debian package of it, with the systemd service")
     name = f"dist/onboard-fleet_{onboard.__version__}_all.deb"
-    deb.add_argument("--out", type=Path, default=Path(name), metavar="FILE")
+    deb.add_argument("--out", type=_file, default=Path(name), metavar="FILE")
     root = commands.add_parser("root", help="kernel and read-only root file system for 64-bit ARM boards")
     root.add_argument("--out", type=Path, default=Path("dist/root"), metavar="DIR")
     _add_image(commands)
@@ -88,7 +88,7 @@ def build_parser() -> argparse.ArgumentParser:
         "lock", help="deploy/locks anew: versions and digests of what each extra installs, as pip chooses"
     )
     bill = commands.add_parser("sbom", help="what boards and extras are made of, as CycloneDX (JSON)")
-    bill.add_argument("--out", type=Path, default=Path("dist/onboard.cdx.json"), metavar="FILE")
+    bill.add_argument("--out", type=_file, default=Path("dist/onboard.cdx.json"), metavar="FILE")
     audit = commands.add_parser("audit", help="whether any pinned library has a known weakness, by pip-audit")
     audit.add_argument("--tool", default="pip-audit", metavar="PROGRAM", help="where it is installed (pip-audit)")
     return parser
@@ -100,6 +100,12 @@ def _days(text: str) -> int:
     return int(text)
 
 
+def _file(text: str) -> Path:
+    if not Path(text).name:
+        raise argparse.ArgumentTypeError(f'"{text}": names no file')
+    return Path(text)
+
+
 def _existing(text: str) -> Path:
     if not Path(text).is_file():
         raise argparse.ArgumentTypeError(f"{text}: no such file")
@@ -108,7 +114,7 @@ def _existing(text: str) -> Path:
 
 def _add_image(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     image = commands.add_parser("image", help="the image that 64-bit ARM boards are flashed with")
-    image.add_argument("--out", type=Path, default=Path("dist/onboard.img"), metavar="FILE")
+    image.add_argument("--out", type=_file, default=Path("dist/onboard.img"), metavar="FILE")
     image.add_argument(
         "--key",
         type=_existing,
@@ -124,9 +130,9 @@ def _add_image(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="Debian's package raspi-firmware, not free software; a Raspberry Pi does not start without it",
     )
     keys = commands.add_parser("keys", help="a pair of keys for updates")
-    keys.add_argument("--out", type=Path, default=SECRET, metavar="FILE", help=f"the secret one ({SECRET})")
+    keys.add_argument("--out", type=_file, default=SECRET, metavar="FILE", help=f"the secret one ({SECRET})")
     update = commands.add_parser("update", help="a signed update for boards with such an image")
-    update.add_argument("--out", type=Path, metavar="FILE", help="dist/onboard-VERSION.update")
+    update.add_argument("--out", type=_file, metavar="FILE", help="dist/onboard-VERSION.update")
     update.add_argument(
         "--secret", type=_existing, required=True, metavar="PEM", help="the secret key (python -m deploy keys)"
     )

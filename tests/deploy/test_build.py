@@ -187,3 +187,11 @@ def test_a_site_that_is_wrong_is_told_and_nothing_is_written(
     assert deploy(["machines", str(tmp_path / "no.toml"), "--out", str(tmp_path / "out")]) == 2
     assert "no.toml" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("out", ["", "/", "."])
+def test_a_path_that_names_no_file_is_one_line(out: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        deploy(["deb", f"--out={out}"])
+    assert ended.value.code == 2
+    assert f'"{out}": names no file' in capsys.readouterr().err.splitlines()[-1]
