@@ -77,8 +77,7 @@ class Nearby:
 
     def _survey(self, pickup: int) -> None:
         """A pick-up that was not seen before: what is near it, and what ends there by now."""
-        near = [(cell, steps) for cell, steps in enumerate(self.floor.steps_to(pickup)) if steps < RANGE]
-        self._before[pickup] = near
-        for cell, steps in near:
+        self._before[pickup] = self.floor.near_to(pickup, RANGE)
+        for cell, steps in self._before[pickup]:
             self._after[cell].append((pickup, steps))
             self._end[pickup][steps] += self._ends_in[cell]
