@@ -19,7 +19,7 @@ import json
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.resources import as_file, files
 from itertools import pairwise
 from pathlib import Path
@@ -50,11 +50,13 @@ class Rule:
     waits: bool
 
 
+#: The same whatever is open.
+BEFORE = BidWeights(younger=0, younger_at_last=0, crowded_wait=100, crowded_loaded=50, nearby=0, shorter=0)
 #: The rule of the robots, the one before it, and that one with nothing for the way with the load.
 RULES = {
     "negotiated": Rule(BidWeights(), waits=True),
-    "before": Rule(BidWeights(younger=0), waits=False),
-    "without-loaded": Rule(BidWeights(loaded=0, younger=0), waits=False),
+    "before": Rule(BEFORE, waits=False),
+    "without-loaded": Rule(replace(BEFORE, loaded=0, crowded_loaded=0), waits=False),
 }
 
 

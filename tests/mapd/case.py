@@ -2,9 +2,9 @@
 
 from onboard.contract.mapd import PathHead, PathMoves, StepRound, StepState
 from onboard.contract.messages import Bid, Message
-from onboard.systems.mapd.auction import TransportTask
 from onboard.systems.mapd.calls import award_of, call_of
 from onboard.systems.mapd.fields import NO_TASK
+from onboard.systems.mapd.tasks import TransportTask
 from tests.conformance.case import Case
 from tests.mapd.sites import drawn, made, site_text
 

@@ -14,11 +14,13 @@ from bus_sim.systems.mapd.published import TOKEN_PASSING
 from bus_sim.systems.mapd.steps import SteppedDay
 from onboard.config.site import parse_site
 from onboard.core.serial import to_bus_ms
-from onboard.systems.mapd.auction import Availability, Backlog, BidWeights, TransportTask, cost, winners
+from onboard.systems.mapd.auction import Availability, Backlog, BidWeights, cost, winners
 from onboard.systems.mapd.calls import call_of
 from onboard.systems.mapd.floor import grid_floor
 from onboard.systems.mapd.knowledge import Knowledge
+from onboard.systems.mapd.nearby import Nearby
 from onboard.systems.mapd.site import Mapd
+from onboard.systems.mapd.tasks import TransportTask
 
 DATA = Path(bus_sim.__file__).parent / "data" / "mapd"
 
@@ -71,7 +73,7 @@ def test_thirty_robots_serve_a_trickle_of_tasks() -> None:
 def test_the_lowest_bid_of_all_wins_first_and_its_robot_falls_silent() -> None:
     floor = grid_floor(["........"])
     tasks = [TransportTask(1, 0, 3, 4), TransportTask(2, 0, 6, 7)]
-    won = winners(floor, BidWeights(), [Availability(11, 0, 0), Availability(12, 4, 0)], tasks)
+    won = winners(Nearby(floor), BidWeights(), [Availability(11, 0, 0), Availability(12, 4, 0)], tasks, 0)
     assert {robot: task.number for robot, (task, _) in won.items()} == {12: 1, 11: 2}
 
 
@@ -93,12 +95,12 @@ def test_no_task_waits_for_ever_behind_new_ones_that_are_nearer() -> None:
 
     def chosen(later: int) -> int:
         tasks = [TransportTask(1, 5, 29, 0), TransportTask(2, 5 + later, 1, 2)]
-        return winners(floor, BidWeights(), [Availability(11, 0, 0)], tasks)[11][0].number
+        return winners(Nearby(floor), BidWeights(), [Availability(11, 0, 0)], tasks, 5 + later)[11][0].number
 
     assert chosen(0) == 2
-    # 28 steps more to the pick-up and 28 more with the load, at 100 and 50, against 20 for each step: half of it, as
-    # there are two tasks for one robot.
-    assert (chosen(419), chosen(421)) == (2, 1)
+    # 28 steps more to the pick-up and 28 more with the load, at 100 and 27, less 5 at 50 as the old one ends beside the
+    # other, against 20 for each step: half of it, as there are two tasks for one robot.
+    assert (chosen(330), chosen(331)) == (2, 1)
 
 
 @pytest.mark.parametrize(("tasks", "robots", "later"), [(1, 1, 200), (10, 10, 200), (2, 10, 200), (40, 10, 50)])
@@ -106,8 +108,10 @@ def test_age_counts_less_where_many_would_wait_for_an_old_task(tasks: int, robot
     floor, offer = grid_floor(["........."]), Availability(11, 4, 0)
     old, young = TransportTask(1, 3, 5, 4), TransportTask(2, 13, 5, 4)
     backlog = Backlog(3, tasks, robots)
-    assert cost(floor, BidWeights(), offer, old, backlog) == 150
-    assert cost(floor, BidWeights(), offer, young, backlog) == 150 + later
+    # One step to the pick-up and one with the load.
+    least = 127 if tasks == 40 else 150
+    assert cost(floor, BidWeights(), offer, old, backlog) == least
+    assert cost(floor, BidWeights(), offer, young, backlog) == least + later
 
 
 def known_calls(*calls: tuple[int, int]) -> Knowledge:

@@ -1,12 +1,12 @@
 """What is open, and who comes to a cell first, as a machine hears it."""
 
 from onboard.contract.mapd import PathHead, StepState
-from onboard.systems.mapd.auction import TransportTask
 from onboard.systems.mapd.calls import call_of
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.floor import grid_floor
 from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.paths import Path
+from onboard.systems.mapd.tasks import TransportTask
 
 DESK, ONE, TWO = 1, 2, 3
 

@@ -11,12 +11,12 @@ from onboard.contract.messages import SyncRequest
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.motion_authority import acts
 from onboard.holon.holon import Holon
-from onboard.systems.mapd.auction import TransportTask
 from onboard.systems.mapd.calls import award_of, call_of
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.records import PathRecord
 from onboard.systems.mapd.robot import UnitRobot
 from onboard.systems.mapd.steps import LAST, STEP_TABLE, GridStepPhase, StepDeed, StepFinding
+from onboard.systems.mapd.tasks import TransportTask
 from onboard.systems.registry import factory_for
 from tests.mapd.sites import made
 

@@ -7,11 +7,13 @@ others have published, in the order of the bids; then all move at once.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from onboard.systems.mapd.auction import Availability, BidWeights, TransportTask, winners
+from onboard.systems.mapd.auction import Availability, BidWeights, winners
 from onboard.systems.mapd.calls import CALLS_A_ROUND
 from onboard.systems.mapd.floor import Floor
+from onboard.systems.mapd.nearby import Nearby
 from onboard.systems.mapd.paths import Path, Paths
 from onboard.systems.mapd.search import find_path
+from onboard.systems.mapd.tasks import TransportTask
 from onboard.systems.mapd.waiting import WaitingPlaces
 
 
@@ -56,6 +58,7 @@ class SteppedDay:
         self.waiting = sorted(self.tasks, key=lambda task: (task.release, task.number))[::-1]
         self.open: dict[int, TransportTask] = {}
         self.fresh = False
+        self._nearby = Nearby(self.floor)
         self._working: set[int] = set()
         self._waiting = [WaitingPlaces(self.floor, self.ends) for _ in self.robots]
         # Whether somebody who planned right at its pick-up took the goods: the others see that in the next step.
@@ -127,7 +130,8 @@ class SteppedDay:
         # By their words on this step, as on the bus.
         self._working = {robot.number for robot in self.robots if robot.task is not None}
         asking = {robot.number for robot in self.robots if self._wants_turn(robot)}
-        won = winners(self.floor, self.rule, [self._offer(one) for one in self.robots], list(self.open.values()))
+        offers, tasks = [self._offer(one) for one in self.robots], list(self.open.values())
+        won = winners(self._nearby, self.rule, offers, tasks, self.step)
         first: list[tuple[SteppingRobot, TransportTask | None]] = []
         then: list[tuple[int, int, TransportTask]] = []
         last: list[SteppingRobot] = []

@@ -5,7 +5,7 @@ from onboard.contract.mapd import StepRound
 from onboard.contract.messages import Award, Bid, CallForProposals, Reference
 from onboard.core.negotiation import RequestedTerms
 from onboard.core.serial import to_bus_ms
-from onboard.systems.mapd.auction import TransportTask
+from onboard.systems.mapd.tasks import TransportTask
 
 #: Bits of a round in a bid, and of a step in an award (dbc/fleet.dbc: itinerary_version, task_version).
 _ROUND, _STEP = 0xFF, 0x7F

@@ -16,7 +16,6 @@ from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import Entry, records_in
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.core.records import BootRecord
-from onboard.systems.mapd.auction import TransportTask
 from onboard.systems.mapd.calls import (
     CALL_AGAIN_US,
     CALLS_A_ROUND,
@@ -31,6 +30,7 @@ from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.records import AwardsRecord, RoundRecord, ServedRecord, TransportRecord
 from onboard.systems.mapd.rights import resource_of
 from onboard.systems.mapd.site import Mapd
+from onboard.systems.mapd.tasks import TransportTask
 from onboard.work.plain import Plain
 
 #: Robots that are missed are asked this long after the step could have begun, and again after as long, us: a lost frame

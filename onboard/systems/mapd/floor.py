@@ -28,6 +28,7 @@ class Floor:
     ways: tuple[tuple[int, ...], ...]
     resources: tuple[int, ...]
     _fields: dict[int, list[int]] = field(default_factory=dict, compare=False, repr=False)
+    _near: dict[tuple[int, int], list[tuple[int, int]]] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def size(self) -> int:
@@ -46,6 +47,14 @@ class Floor:
         found = self._fields.get(goal)
         if found is None:
             found = self._fields[goal] = self.steps_to_any((goal,))
+        return found
+
+    def near_to(self, goal: int, below: int) -> list[tuple[int, int]]:
+        """The cells from which a goal is fewer than ``below`` steps away, and in how many steps. Kept."""
+        found = self._near.get((goal, below))
+        if found is None:
+            near = [(cell, steps) for cell, steps in enumerate(self.steps_to(goal)) if steps < below]
+            found = self._near[goal, below] = near
         return found
 
     def steps_to_any(self, goals: Iterable[int]) -> list[int]:

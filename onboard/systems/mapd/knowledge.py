@@ -9,12 +9,14 @@ from dataclasses import dataclass, field, replace
 from onboard.contract.mapd import PathHead, PathMoves, StepState
 from onboard.contract.messages import Bid, CallForProposals
 from onboard.core.serial import is_newer, ms_after
-from onboard.systems.mapd.auction import BidWeights, TransportTask
+from onboard.systems.mapd.auction import Backlog, BidWeights
 from onboard.systems.mapd.calls import task_of
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.floor import Floor
 from onboard.systems.mapd.moves import Assembly
+from onboard.systems.mapd.nearby import Nearby
 from onboard.systems.mapd.paths import Path, Paths
+from onboard.systems.mapd.tasks import TransportTask
 from onboard.ways.steps import STEP_US, cell_segment
 
 #: The weights that all robots bid by, unless they are told others.
@@ -54,6 +56,7 @@ class Knowledge:
     def __post_init__(self) -> None:
         self.paths = Paths(self.floor.network)
         self._all = frozenset(self.robots)
+        self._nearby = Nearby(self.floor)
 
     # --- tasks and steps ---------------------------------------------------------------------------------------
 
@@ -110,7 +113,7 @@ class Knowledge:
         if state.cell >= self.floor.size:
             return False
         empty, loaded = self.floor.steps_to(task.pickup)[state.cell], self.floor.steps_to(task.delivery)[task.pickup]
-        return bid.cost >= min(rule.wait, rule.empty) * empty + rule.loaded * loaded
+        return bid.cost >= rule.least(empty, loaded)
 
     def task_of(self, robot: int) -> int:
         """The task that a robot has by its last word, ``NO_TASK`` for none."""
@@ -121,6 +124,11 @@ class Knowledge:
     def open_tasks(self) -> Sequence[TransportTask]:
         """Tasks that nobody has picked up, lowest number first."""
         return self._looked_at[0]
+
+    def backlog(self, step: int) -> Backlog:
+        """What is open in this step, as it counts in a bid."""
+        self._nearby.see(self.open_tasks)
+        return Backlog.of(self._nearby, self.open_tasks, len(self.robots), step)
 
     @property
     def wanted_cells(self) -> frozenset[int]:

@@ -28,7 +28,7 @@ from onboard.core.behaviour import NEVER_US
 from onboard.core.effects import Effect, Send
 from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import successor, to_bus_ms
-from onboard.systems.mapd.auction import Availability, Backlog, BidWeights, bids
+from onboard.systems.mapd.auction import Availability, BidWeights, bids
 from onboard.systems.mapd.bidding import Round, UnitGeneration, bid_timing
 from onboard.systems.mapd.calls import CALL_AGAIN_US, mark_of
 from onboard.systems.mapd.driving import Driving
@@ -430,7 +430,7 @@ class UnitRobot(Plain):
     def _costs(self) -> list[tuple[int, int]]:
         """What each open task would cost, with its number: the task-generation function of this system."""
         tasks = self.knowledge.open_tasks
-        return bids(self.site.floor, self.rule, self._offer(), tasks, Backlog.of(tasks, len(self.site.robots)))
+        return bids(self.site.floor, self.rule, self._offer(), tasks, self.knowledge.backlog(self.step))
 
     def _offer(self) -> Availability:
         """Where and when it will be free: at once, or where it delivers what it carries."""

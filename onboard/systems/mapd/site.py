@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from onboard.contract.codes import KindCode
 from onboard.core.site import MotionNeeds, Site
-from onboard.systems.mapd.auction import TransportTask
 from onboard.systems.mapd.floor import FREE, Floor, NetworkLine, grid_floor, network_floor
 from onboard.systems.mapd.rights import cell_station
+from onboard.systems.mapd.tasks import TransportTask
 from onboard.ways.rests import lasting_rests
 
 __all__ = [
