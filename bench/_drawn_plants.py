@@ -1,4 +1,4 @@
-"""Sites of the other systems drawn by chance: a factory graph, a terminal, a manufacturing cell, a turning cell."""
+"""Sites of the other systems drawn by chance: a graph, a terminal, a manufacturing or turning cell, a floor of shelves."""
 
 import random
 from itertools import pairwise
@@ -188,3 +188,30 @@ def _tool(number: int, works: list[str], draw: random.Random, depth_mm: float, f
         "edge_eur": draw.randint(5, 9),
         "life_min": draw.choice((10, 15, 20)),
     }
+
+
+def mapd(name: str, draw: random.Random) -> Tables:
+    """Shelves of any length between aisles, some crossed by gaps, endpoints beside them, homes at the sides."""
+    columns, rows = draw.randint(7, 16), 2 * draw.randint(2, 6) + 1
+    floor = [["."] * columns for _ in range(rows)]
+    shelves = draw.choice((0.6, 0.8, 0.9))
+    for row in range(1, rows, 2):
+        for column in range(2, columns - 2):
+            if draw.random() < shelves:
+                floor[row][column] = "@"
+    free = [(row, column) for row in range(rows) for column in range(columns) if floor[row][column] == "."]
+    inner = [(row, column) for row, column in free if 2 <= column < columns - 2]
+    sides = [(row, column) for row, column in free if column in (0, columns - 1)]
+    endpoints = draw.sample(inner, min(len(inner), draw.randint(3, 12)))
+    homes = draw.sample(sides, min(len(sides), draw.randint(1, 8)))
+    return [
+        _site(name, "mapd", draw),
+        ("[steps]", {"step_ms": draw.choice((500, 1_000, 1_000, 2_000))}),
+        ("[map]", {"rows": ["".join(row) for row in floor]}),
+        *_desks(draw, 1),
+        *(
+            ("[[robots]]", {"name": f"R{number}", "node": 10 + number, "home": f"{row},{column}"})
+            for number, (row, column) in enumerate(homes, start=1)
+        ),
+        ("[demand]", {"endpoints": [f"{row},{column}" for row, column in endpoints]}),
+    ]

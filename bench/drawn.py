@@ -36,6 +36,7 @@ DRAWN: dict[str, Callable[[str, random.Random], Tables]] = {
     "terminal": _drawn_plants.terminal,
     "cell": _drawn_plants.cell,
     "turning": _drawn_plants.turning,
+    "mapd": _drawn_plants.mapd,
 }
 
 

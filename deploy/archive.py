@@ -53,7 +53,9 @@ def build_archive(to: Path) -> Path:
                 entry = zipfile.ZipInfo(name, _TIME)
                 entry.external_attr = 0o644 << 16
                 archive.writestr(entry, content, zipfile.ZIP_DEFLATED, 9)
-    to.chmod(0o755)
+    # A device, such as /dev/null, keeps the rights that everybody else needs.
+    if to.is_file():
+        to.chmod(0o755)
     return to
 
 
