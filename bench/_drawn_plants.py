@@ -1,4 +1,4 @@
-"""Sites of the other systems drawn by chance: a graph, a terminal, a manufacturing or turning cell, a floor of shelves."""
+"""Sites of the other systems drawn by chance: graph, terminal, manufacturing and turning cell, pick-up and delivery."""
 
 import random
 from itertools import pairwise

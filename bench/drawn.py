@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from bench import _drawn_plants
+from bench import _drawn_lines, _drawn_plants
 from bench._drawn_car_park import DrawnCarPark
 from bench._drawn_tables import Tables, site_text
 from bus_sim.campaign.command import read_seeds
@@ -32,6 +32,7 @@ MOST_DRAWINGS = 2_000
 #: What is drawn of each system.
 DRAWN: dict[str, Callable[[str, random.Random], Tables]] = {
     "car-park": lambda name, draw: DrawnCarPark(name, draw).tables(),
+    "lines": _drawn_lines.lines,
     "graph": _drawn_plants.graph,
     "terminal": _drawn_plants.terminal,
     "cell": _drawn_plants.cell,
@@ -62,7 +63,7 @@ def played(numbers: range, options: argparse.Namespace) -> Iterator[TrialResult]
         file = options.out / f"d{number}.toml"
         file.write_text(drawn_site(options.system, number), encoding="utf-8")
         site = find_site(str(file))
-        is_park = options.system == "car-park"
+        is_park = site.system == "car-park"
         comes = {"cars": options.cars if is_park else None, "apart": options.apart, "orders": options.orders}
         demand = simulated_of(site).usual(site, comes)
         plan = CampaignSettings(str(file), options.faults, options.limit, demand, out=options.out, has_baseline=False)
@@ -84,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Play them, one after another."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sites", nargs="?", default="1-8", help="a number, or the first and the last of several")
-    parser.add_argument("--system", default="car-park", choices=DRAWN)
+    parser.add_argument("--system", default="car-park", choices=DRAWN, help="lines: a car park with lifts in line")
     parser.add_argument("--faults", default="all", choices=PROFILES)
     parser.add_argument("--cars", type=int, default=12, help="in a car park")
     parser.add_argument("--orders", type=int, help="on any other site")
