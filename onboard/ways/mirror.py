@@ -80,7 +80,9 @@ class WayMirror(CarMirror):
             return False
         if is_continued and node in self.plans:
             self.replaced[node] = self.plans[node]
-        self.plans[node] = next_plan(self.plans.get(node), itinerary, now_us)
+        known = self.plans.get(node)
+        in_hand = 0 if known is None else self.order.leg_in_hand(known)
+        self.plans[node] = next_plan(known, in_hand, itinerary, now_us)
         if node not in self.aside:
             self._count_on(self.plans[node], now_us)
         return True

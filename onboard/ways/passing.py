@@ -17,16 +17,17 @@ class BegunItinerary(NamedTuple):
     first_begin_us: int
 
 
-def next_plan(known: BegunItinerary | None, itinerary: Itinerary, now_us: int) -> BegunItinerary:
+def next_plan(known: BegunItinerary | None, in_hand: int, itinerary: Itinerary, now_us: int) -> BegunItinerary:
     """The plan that ``itinerary`` tells after ``known``: a first leg that was planned before keeps its begin.
 
-    An itinerary names the ends of its legs and its award; a leg under way began long after that.
+    An itinerary names the ends of its legs and its award; a leg under way began long after that. Legs of ``known``
+    before number ``in_hand`` are over: a first leg like one of these is of the next trip by the same way.
     """
     award_us = from_bus_ms(itinerary.stamp.award_ms, now_us)
     if known is None or not itinerary.legs:
         return BegunItinerary(itinerary, award_us)
     begins_us = leg_begins_us(known.itinerary, now_us, known.first_begin_us)
-    for leg, begin_us in zip(known.itinerary.legs, begins_us, strict=True):
+    for leg, begin_us in [*zip(known.itinerary.legs, begins_us, strict=True)][in_hand:]:
         if _way(leg) == _way(itinerary.legs[0]):
             return BegunItinerary(itinerary, min(begin_us, from_bus_ms(itinerary.legs[0].end_ms, now_us)))
     return BegunItinerary(itinerary, award_us)

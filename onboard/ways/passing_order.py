@@ -76,6 +76,11 @@ class _Way:
             if turn.to_come < self.in_hand or (turn.to_come == self.in_hand and segment not in self.left):
                 yield turn
 
+    def ends_as(self, told: "_Way") -> bool:
+        """Whether a plan ``told`` anew has what is left of this one: who makes the same trip once more begins again."""
+        count = len(told.moves)
+        return count <= self.in_hand + 1 and self.moves[len(self.moves) - count :] == told.moves
+
     def go_on(self, known: "_Way", more: int) -> None:
         """With the leg that was in hand in the plan told before, of which this one has ``more`` moving legs behind it.
 
@@ -133,7 +138,7 @@ class PassingOrder:
         node = plan.itinerary.sender
         known = self._ways.get(node)
         way = self._way(plan, now_us)
-        continued = known is not None and known.moves[len(known.moves) - len(way.moves) :] == way.moves
+        continued = known is not None and known.ends_as(way)
         before, same = (0, 0) if known is None or continued else _shared(known, way)
         if known is not None and (continued or same):
             way.go_on(known, 0 if continued else len(way.moves) - before)
@@ -231,6 +236,11 @@ class PassingOrder:
             Meeting(segment, one, two, self._agreed_first(node, other, segment, one, two))
             for segment, one, two in sorted(_meet(mine, theirs), key=lambda met: met[0])
         ]
+
+    def leg_in_hand(self, plan: BegunItinerary) -> int:
+        """Number of the leg that a machine has come to in a plan that counts; 0 of any other."""
+        way = self._ways.get(plan.itinerary.sender)
+        return way.leg if way is not None and way.itinerary is plan.itinerary else 0
 
     def place(self, node: int) -> Segment | None:
         """Where the body of a machine that counts is, by its own word."""

@@ -6,7 +6,7 @@ from onboard.contract.codes import Grade, LegAction, Reason, Side
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Itinerary, Leg, Progress, Stamp
 from onboard.core.site import Segment
-from onboard.ways.passing import BegunItinerary
+from onboard.ways.passing import BegunItinerary, next_plan
 from onboard.ways.passing_order import PassingOrder
 from tests.sites import one_floor
 
@@ -95,6 +95,26 @@ def test_a_plan_told_anew_drops_what_is_over() -> None:
     tell(order, plan(ALICE, [(8, 4, 41)], version=2))
     order.on_progress(progress(ALICE, 0, 5, version=2))
     assert order.predecessor(BOB, Segment(1, 7)) == NOBODY
+
+
+def test_who_makes_the_same_trip_once_more_is_at_its_begin_again() -> None:
+    there_and_back = [(2, 8, 20), (8, 2, 40)]
+    order = order_of(plan(ALICE, there_and_back))
+    order.on_progress(progress(ALICE, 1, 2))
+    tell(order, plan(ALICE, [(2, 8, 120), (8, 2, 140)], version=2, begin_s=100))
+    tell(order, plan(BOB, [(12, 12, 160), (12, 6, 180)]))
+    assert order.predecessor(ALICE, Segment(1, 7)) == NOBODY, "it comes here by its plan"
+    assert order.predecessor(BOB, Segment(1, 7)) == ALICE
+
+
+def test_the_same_trip_once_more_did_not_begin_with_the_first_one() -> None:
+    order = PassingOrder(SITE)
+    first = next_plan(None, 0, plan(ALICE, [(2, 8, 20), (8, 2, 40)]), 0)
+    order.on_plan(first, 0)
+    again = plan(ALICE, [(2, 8, 120), (8, 2, 140)], version=2, begin_s=100)
+    assert next_plan(first, order.leg_in_hand(first), again, 0).first_begin_us == 0, "nobody has heard that it set off"
+    order.on_progress(progress(ALICE, 1, 2))
+    assert next_plan(first, order.leg_in_hand(first), again, 0).first_begin_us == 100_000_000
 
 
 def test_a_released_plan_is_nobodys_predecessor() -> None:
