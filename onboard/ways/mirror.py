@@ -1,6 +1,7 @@
 """The mirror of a site with ways: what everybody's plans occupy, who passes first, and what is in the way there."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -89,8 +90,11 @@ class WayMirror(CarMirror):
 
     def _count_on(self, plan: BegunItinerary, now_us: int) -> None:
         """Plan around a machine's plan, and keep its place in the order of passing."""
-        itinerary = plan.itinerary
         self.order.on_plan(plan, now_us)
+        self._occupy(plan, now_us)
+
+    def _occupy(self, plan: BegunItinerary, now_us: int) -> None:
+        itinerary = plan.itinerary
         self.reservations.release(itinerary.sender)
         self.reservations.reserve(
             itinerary.sender,
@@ -145,7 +149,25 @@ class WayMirror(CarMirror):
         self.obstacles.let_go(node)
         if node in self.plans:
             self._count_on(self.plans[node], now_us)
+        if node in self.progress:
+            self.order.on_progress(self.progress[node])
         return True
+
+    @contextmanager
+    def as_obstacle(self, node: int, slots: frozenset[Segment], now_us: int) -> Iterator[None]:
+        """Plan as if a machine that takes part stood at ``slots`` for ever; how far it has come is not forgotten."""
+        order = self.order.copy()
+        self.set_aside(node, slots, Reason.NOT_AUTHORISED, now_us)
+        yield
+        self.admit(node, now_us)
+        self.order = order
+
+    @contextmanager
+    def as_told(self, plan: BegunItinerary, now_us: int) -> Iterator[None]:
+        """Plan around this plan of a machine, as if it had told that and no other."""
+        self._occupy(plan, now_us)
+        yield
+        self._occupy(self.plans[plan.itinerary.sender], now_us)
 
     def slots_of(self, machine: Machine, holder_of: Callable[[TokenKey], int]) -> frozenset[Segment]:
         """Slots that a machine is in by its last word, and those whose tokens it holds."""

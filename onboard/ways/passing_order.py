@@ -11,7 +11,7 @@ All times are bus time in us. Pure: plans, progress and grants in, an order out.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise, takewhile
 from typing import NamedTuple
 
@@ -130,6 +130,10 @@ class PassingOrder:
 
     def __post_init__(self) -> None:
         self._reach = {track: reach_segments(self.site, track) for track in self.site.tracks}
+
+    def copy(self) -> "PassingOrder":
+        """The same order, of which machines may be dropped."""
+        return replace(self, _ways=dict(self._ways), _agreed=dict(self._agreed))
 
     # --- what is heard -----------------------------------------------------------------------------------------
 

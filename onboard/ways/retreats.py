@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 from onboard.contract.codes import LegAction
 from onboard.contract.messages import Itinerary, Leg, Stamp
-from onboard.core.serial import ms_after
+from onboard.core.serial import from_bus_ms, ms_after, to_bus_ms
 from onboard.core.site import Segment
+from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lifts import lift_at
 from onboard.ways.occupancy import final_position, leg_begins_us
 from onboard.ways.passing import BegunItinerary
@@ -68,6 +69,41 @@ def held_back(site: WaySite, plan: BegunItinerary, leg_in_hand: int, from_us: in
     if place is None or not any(moves(leg) for leg in legs[kept:]):
         return None
     return HeldBack(plan._replace(itinerary=stays), place, ends_us[kept - 1])
+
+
+def put_off(site: WaySite, plan: BegunItinerary, leg_in_hand: int, place: Segment, until_us: int) -> Itinerary | None:
+    """What is left of a plan whose machine stands at ``place`` until ``until_us``, and then does the rest as planned.
+
+    None amid a ride or a hop, or where the plan leads through no such place.
+    """
+    legs, number = plan.itinerary.legs, leg_in_hand
+    while number < len(legs) and not moves(legs[number]) and not _is_through(legs[number], place):
+        # A wait that was told with the run behind it, so that all know when that began.
+        number += 1
+    if number >= len(legs) or any(leg.track not in site.tracks for leg in legs) or not _is_through(legs[number], place):
+        return None
+    begins_us = leg_begins_us(plan.itinerary, until_us, plan.first_begin_us)
+    ends_us = [*begins_us[1:], max(begins_us[-1], from_bus_ms(legs[-1].end_ms, until_us))]
+    run = legs[number]
+    told = [
+        run._replace(action=LegAction.STAND, from_index=place.index, end_ms=to_bus_ms(until_us), to_index=place.index)
+    ]
+    if run.action is LegAction.TRAVEL and place.index != run.to_index:
+        until_us += run_duration_us(abs(run.to_index - place.index) * site.tracks[run.track].pitch_mm, site.carrier)
+        told.append(run._replace(from_index=place.index, end_ms=to_bus_ms(until_us)))
+    for leg, begin_us, end_us in zip(legs[number + 1 :], begins_us[number + 1 :], ends_us[number + 1 :], strict=True):
+        until_us += end_us - begin_us
+        told.append(leg._replace(end_ms=to_bus_ms(until_us)))
+    return replace(plan.itinerary, legs=tuple(told))
+
+
+def _is_through(leg: Leg, place: Segment) -> bool:
+    """Whether a run, or standing or work, is or comes by at a place; a hop and a ride are not told by their indices."""
+    if leg.track != place.track or leg.action is LegAction.RIDE:
+        return False
+    if leg.action is LegAction.TRAVEL and leg.from_index == leg.to_index:
+        return False
+    return min(leg.from_index, leg.to_index) <= place.index <= max(leg.from_index, leg.to_index)
 
 
 def _worked(itinerary: Itinerary) -> int:

@@ -27,7 +27,9 @@ from onboard.systems.car_park.travel import Carriage
 from onboard.ways.lifts import gate, lift_at
 from onboard.ways.mirror import WayFleet
 from onboard.ways.occupancy import itinerary_windows
+from onboard.ways.passing import BegunItinerary
 from onboard.ways.reservations import FOREVER, SlotWindow
+from onboard.ways.retreats import put_off
 from onboard.ways.tokens import car_token
 
 #: A plan that finds no way is tried again after this, us: others' plans change within seconds.
@@ -39,6 +41,8 @@ KEEP_US = 12_000_000
 #: FORFEITED is said again so often and so many times, until the task is called or awarded anew: a lost word would leave
 #: a customer waiting.
 SAY_AGAIN_US, SAY_AGAIN = 1_000_000, 20
+#: Who makes room for another has so long until that goes on, us: as long as a run of ten positions.
+ASIDE_US = 16_000_000
 #: A plan is made anew for so much that all its work is done sooner, us: what two plans that answer it cost (4 s each);
 #: and for so long after an obstacle came or went: what stood in the way is given back within ``KEEP_US``.
 SOONER_US, SOONER_FOR_US = 8_000_000, 30_000_000
@@ -384,7 +388,7 @@ class GoingAround:
         return effects + self.drop([task], now_us) + self.forfeit(task, Reason.IMPOSSIBLE, now_us)
 
     def _turn_away(self, other: int, now_us: int) -> list[Effect]:
-        """Plan anew as if who stands face to face with me stood there for ever; without a way all stays as it is."""
+        """Plan anew as if who stands face to face with me stood there for ever, or else until I am out of its way."""
         mirror, machine = self.fleet.mirror, self.fleet.site.machines[other]
         kept, origin, start_us = self._aboard(now_us) or self.turning((), now_us)
         if kept or other in mirror.obstacles.machines:
@@ -392,14 +396,32 @@ class GoingAround:
         # Rights that it has beyond me it cannot use: it grants them to me, who goes first then.
         slots = mirror.obstacles.slots_of(machine, mirror.progress.get(other), lambda slot: NOBODY)
         works = self.program.works()
-        mirror.set_aside(other, slots, Reason.NOT_AUTHORISED, now_us)
-        steps = self.generation.reroute(origin, start_us, works, now_us)
-        mirror.admit(other, now_us)
+        with mirror.as_obstacle(other, slots, now_us):
+            steps = self.generation.reroute(origin, start_us, works, now_us)
         self._seen = mirror.obstacles.changes
+        if not steps:
+            # None, or to stand in the other's way for ever.
+            aside = self._step_aside(other, origin, start_us, now_us)
+            steps = steps if aside is None else aside
         if steps is None:
             return []
         self.standoff.turned(other, now_us)
         return self.take_up(0, steps, works, now_us)
+
+    def _step_aside(self, other: int, origin: Segment, start_us: int, now_us: int) -> tuple[CarStep, ...] | None:
+        """The same work by a way that leads around all that ``other`` has left to do, once I have made room for it."""
+        mirror = self.fleet.mirror
+        plan, progress = mirror.plans.get(other), mirror.progress.get(other)
+        if plan is None or progress is None:
+            return None
+        place = Segment(progress.track, progress.index)
+        # By its own word, not by the order of passing, which has led here.
+        leg = progress.leg if progress.itinerary_version == plan.itinerary.version else 0
+        later = put_off(self.fleet.site, plan, leg, place, now_us + ASIDE_US)
+        if later is None:
+            return None
+        with mirror.as_told(BegunItinerary(later, now_us), now_us):
+            return self.generation.reroute(origin, start_us, self.program.works(), now_us)
 
     def _aboard(self, now_us: int) -> tuple[int, Segment, int] | None:
         """From where to plan for who stands aboard a lift and was to leave it: it rides on instead.
