@@ -1,16 +1,17 @@
 """Alleys and lifts as servers: who has which stretch, or which platform, from when to when.
 
-A stretch is held for the whole of a run, so that two robots follow each other no closer than one run; the plant's
-slots are freed one by one. A platform is held from when somebody drives onto it until he has left it, and goes
-empty from stop to stop in between (``onboard.ways.lift_uses``).
+A run's track is held in parts (``ways.MOST_PARTS``), each until it is left, so that one follows another; the plant's
+slots are freed one by one. Who works or rests holds where it stands. A platform is held from when somebody drives onto
+it until he has left it, and goes empty from stop to stop in between (``onboard.ways.lift_uses``).
 """
 
 from bisect import insort
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from bus_sim.systems.car_park.design.times import RIDE_US
 from onboard.ways.kinematics import RestToRest, time_at_us
-from onboard.ways.lift_uses import ride_us, run_up_us
+from onboard.ways.lift_uses import run_up_us
 from onboard.ways.site import WaySite
 
 #: Of what was over so long ago nobody asks any more, us: a call is made half a minute ahead at most.
@@ -55,6 +56,13 @@ class AlleyServer:
                     begin_us, waits = turn.end_us, True
         return begin_us
 
+    def next_turn(self, time_us: int, index: int, owner: int) -> Stretch | None:
+        """The next turn of another from ``time_us`` on over an index, or the one that is under way."""
+        for turn in self.turns:
+            if turn.end_us > time_us and turn.low <= index <= turn.high and turn.owner != owner:
+                return turn
+        return None
+
     def take(self, turn: Stretch) -> None:
         """Take a turn that is free."""
         insort(self.turns, turn)
@@ -91,7 +99,7 @@ class LiftServer:
         """How long a ride takes."""
         found = self._ride_us.get((board, leave))
         if found is None:
-            found = self._ride_us[board, leave] = ride_us(self.site, self.track, board, leave)
+            found = self._ride_us[board, leave] = run_up_us(self.site, self.track, board, leave) + RIDE_US
         return found
 
     def _empty(self, here: int, there: int) -> int:

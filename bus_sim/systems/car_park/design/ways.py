@@ -1,17 +1,17 @@
 """How a robot of the model goes from one position to another: the earliest way, around the turns of the others."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from heapq import heappop, heappush
 from typing import NamedTuple
 
 from bus_sim.systems.car_park.design.servers import KEPT_US, AlleyServer, LiftServer, PlatformUse, Stretch
+from bus_sim.systems.car_park.design.times import LEG_US
 from onboard.core.site import Segment
+from onboard.ways.reservations import FOREVER
 from onboard.ways.roads import Move, Roads, roads_of
 from onboard.ways.site import WaySite
-
-#: Between two legs: the end is sensed and told, and the next order given. Measured in the plant (docs/design-tool.md).
-LEG_US = 300_000
 
 
 class ModelLeg(NamedTuple):
@@ -26,6 +26,11 @@ class ModelLeg(NamedTuple):
     distance_mm: int = 0
 
 
+#: A run's track is taken and left in parts of so many slots, each from when the first is entered; no more than so many.
+PART, MOST_PARTS = 2, 6
+
+#: Until when one stands where one is to be, by when one arrives, us.
+Stays = Callable[[int], int]
 #: A position with the way to it: legs, the last first, as a chain.
 _Chain = tuple[ModelLeg, "_Chain | None"]
 
@@ -38,6 +43,7 @@ class ModelTraffic:
     roads: Roads = field(init=False)
     alleys: dict[int, AlleyServer] = field(init=False)
     lifts: dict[int, LiftServer] = field(init=False)
+    _run_parts: dict[tuple[Segment, Segment], list[tuple[int, int, int, int]]] = field(default_factory=dict)
     _rests_us: dict[frozenset[Segment], dict[Segment, int]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -45,48 +51,102 @@ class ModelTraffic:
         self.alleys = {track: AlleyServer() for track in self.site.tracks if track not in self.site.lifts}
         self.lifts = {track: LiftServer(self.site, track) for track in self.site.lifts}
 
-    def plan(self, origin: Segment, ready_us: int, goals: frozenset[Segment], owner: int) -> list[ModelLeg] | None:
-        """The legs by which a robot is at any of ``goals`` first, none where it stands there; None without a way."""
+    def plan(
+        self, origin: Segment, ready_us: int, goals: frozenset[Segment], owner: int, stays: Stays | None = None
+    ) -> list[ModelLeg] | None:
+        """The legs by which a robot is at any of ``goals`` first, none where it stands there; None without a way.
+
+        With ``stays`` it waits, and stands at the goal until then, where nobody's turn is meanwhile; else anywhere.
+        """
         by_track: dict[int, list[Segment]] = {}
         for goal in goals:
             by_track.setdefault(goal.track, []).append(goal)
-        # As many times as there are positions are kept for each set of goals: an estimate never above the way itself.
+        # As many times as there are positions are kept for each set of goals. They count a gate as plans do, a quarter
+        # of a second a ride more than is taken: of two ways that differ by less, either is found.
         rest_us = self._rests_us.setdefault(goals, {})
-        open_: list[tuple[int, int, int, Segment, _Chain | None]] = [(ready_us, 0, ready_us, origin, None)]
-        seen: set[Segment] = set()
+        until_us = FOREVER if stays is None else self._until_us(origin, ready_us, owner)
+        open_: list[tuple[int, int, int, int, Segment, _Chain | None]] = [
+            (ready_us, 0, ready_us, until_us, origin, None)
+        ]
+        seen: set[tuple[Segment, int]] = set()
         number = 0
         while open_:
-            _, _, time_us, here, chain = heappop(open_)
-            if here in seen:
+            _, _, time_us, until_us, here, chain = heappop(open_)
+            if (here, until_us) in seen:
                 continue
-            if here in goals:
+            if here in goals and (stays is None or stays(time_us) <= until_us):
                 return _legs(chain)
-            seen.add(here)
-            for leg in self._legs_from(here, time_us, by_track.get(here.track, ()), owner):
-                there = leg.there
-                if there not in seen:
+            seen.add((here, until_us))
+            for leg in self._legs_from(here, time_us, until_us, by_track.get(here.track, ()), owner):
+                there, there_us = leg.there, leg.end_us + LEG_US
+                until_there_us = FOREVER if stays is None else self._until_us(there, leg.end_us, owner)
+                if (there, until_there_us) not in seen:
                     number += 1
                     if there not in rest_us:
                         rest_us[there] = self.roads.nearest_us(there, goals)
-                    there_us = leg.end_us + LEG_US
-                    heappush(open_, (there_us + rest_us[there], number, there_us, there, (leg, chain)))
+                    heappush(open_, (there_us + rest_us[there], number, there_us, until_there_us, there, (leg, chain)))
         return None
 
-    def _legs_from(self, here: Segment, time_us: int, goals: Sequence[Segment], owner: int) -> Iterator[ModelLeg]:
+    def _until_us(self, here: Segment, time_us: int, owner: int) -> int:
+        """Until when one may stand somewhere: the begin of another's turn there."""
+        turn = self.alleys[here.track].next_turn(time_us, here.index, owner)
+        return FOREVER if turn is None else turn.begin_us
+
+    def _legs_from(
+        self, here: Segment, time_us: int, until_us: int, goals: Sequence[Segment], owner: int
+    ) -> Iterator[ModelLeg]:
+        """Legs that begin by ``until_us``: the first to each position, and those after others' turns there."""
         roads = self.roads
         for move in roads.hops(here):
             if move.lift_track is not None:
-                yield self._ride(here, move, move.lift_track, time_us)
+                ride = partial(self._ride, here, move, move.lift_track)
+                yield from self._each(ride, time_us, until_us, owner)
             else:
-                yield self._hop(here, move, time_us, owner)
-        alley = self.alleys[here.track]
+                yield from self._each(partial(self._hop, here, move, owner), time_us, until_us, owner)
         for there in (*roads.junctions(here.track), *goals):
-            run = roads.runs(here.track)[there.index - here.index]
+            run = roads.runs(here.track)[there.index - here.index] if there != here else None
             if run is not None:
-                low, high = min(here.index, there.index), max(here.index, there.index)
-                begin_us = alley.free_from(time_us, run[0], low, high, owner)
-                turn = Stretch(begin_us, begin_us + run[0], low, high, owner)
-                yield ModelLeg(here, there, begin_us, begin_us + run[0], ((here.track, turn),), None, run[1])
+                yield from self._each(partial(self._run, here, there, run[0:2], owner), time_us, until_us, owner)
+
+    def _each(self, leg_from: Callable[[int], ModelLeg], time_us: int, until_us: int, owner: int) -> Iterator[ModelLeg]:
+        leg = leg_from(time_us)
+        # Whoever rests somewhere is in the way for ever.
+        while leg.begin_us <= until_us and leg.end_us < FOREVER:
+            yield leg
+            after = self.alleys[leg.there.track].next_turn(leg.end_us, leg.there.index, owner)
+            if after is None or after.end_us >= FOREVER:
+                return
+            # It ends no sooner than the other has gone from there.
+            leg = leg_from(after.end_us - (leg.end_us - leg.begin_us))
+
+    def _run(self, here: Segment, there: Segment, run: tuple[int, int], owner: int, time_us: int) -> ModelLeg:
+        """A run along a track; whoever follows comes into each part of it as soon as it is left."""
+        alley, (duration_us, distance_mm) = self.alleys[here.track], run
+        low, high, begin_us = min(here.index, there.index), max(here.index, there.index), time_us
+        parts = self._parts(here, there)
+        if alley.free_from(begin_us, duration_us, low, high, owner) > begin_us:
+            waits = True
+            while waits:
+                waits = False
+                for enter_us, leave_us, first, last in parts:
+                    free_us = alley.free_from(begin_us + enter_us, leave_us - enter_us, first, last, owner) - enter_us
+                    waits, begin_us = waits or free_us > begin_us, free_us
+        turns = tuple((here.track, Stretch(begin_us + one[0], begin_us + one[1], *one[2:], owner)) for one in parts)
+        return ModelLeg(here, there, begin_us, begin_us + duration_us, turns, None, distance_mm)
+
+    def _parts(self, here: Segment, there: Segment) -> list[tuple[int, int, int, int]]:
+        """From when until when, after the begin of a run, it takes each part of it, from index to index."""
+        found = self._run_parts.get((here, there))
+        if found is None:
+            step, count = (1 if there.index > here.index else -1), abs(there.index - here.index)
+            sweeps = [one for one in self.roads.swept(here.track, count)[0] if 0 <= one.offset <= count]
+            found, size = [], max(PART, -(-len(sweeps) // MOST_PARTS))
+            for number in range(0, len(sweeps), size):
+                part = sweeps[number : number + size]
+                ends = sorted((here.index + step * part[0].offset, here.index + step * part[-1].offset))
+                found.append((part[0].enter_us, part[-1].leave_us, ends[0], ends[1]))
+            self._run_parts[here, there] = found
+        return found
 
     def _ride(self, here: Segment, move: Move, track: int, time_us: int) -> ModelLeg:
         lift, boards, leaves = self.lifts[track], self.roads.lift_at(here), self.roads.lift_at(move.destination)
@@ -95,7 +155,7 @@ class ModelTraffic:
         end_us = begin_us + lift.ride_us(boards[1], leaves[1])
         return ModelLeg(here, move.destination, begin_us, end_us, (), (track, lift.use(begin_us, boards[1], leaves[1])))
 
-    def _hop(self, here: Segment, move: Move, time_us: int, owner: int) -> ModelLeg:
+    def _hop(self, here: Segment, move: Move, owner: int, time_us: int) -> ModelLeg:
         """A turn through a mouth takes the slots at both of its ends."""
         there, begin_us, waits = move.destination, time_us, True
         while waits:
@@ -111,6 +171,11 @@ class ModelTraffic:
         """A robot stands and works somewhere."""
         if end_us > begin_us:
             self.alleys[at.track].take(Stretch(begin_us, end_us, at.index, at.index, owner))
+
+    def stands_no_more(self, at: Segment, begin_us: int, end_us: int, owner: int) -> None:
+        """A robot does not stand there after all."""
+        if end_us > begin_us:
+            self.alleys[at.track].give_back(Stretch(begin_us, end_us, at.index, at.index, owner))
 
     def take(self, legs: list[ModelLeg]) -> None:
         """Take all that these legs need."""
@@ -134,6 +199,10 @@ class ModelTraffic:
             alley.forget(now_us - KEPT_US)
         for lift in self.lifts.values():
             lift.forget(now_us - KEPT_US)
+
+
+def _leaves(there_us: int) -> int:
+    return there_us
 
 
 def arrival_us(legs: list[ModelLeg], ready_us: int) -> int:
