@@ -5,7 +5,7 @@ slots are freed one by one. Who works or rests holds where it stands. A platform
 it until he has left it, and goes empty from stop to stop in between (``onboard.ways.lift_uses``).
 """
 
-from bisect import insort
+from bisect import bisect_right, insort
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -108,20 +108,32 @@ class LiftServer:
             found = self._empty_us[here, there] = run_up_us(self.site, self.track, here, there)
         return found
 
-    def boards_at(self, ready_us: int, board: int, leave: int) -> int:
-        """When a robot that could be aboard at ``ready_us`` is: the platform has come, and nobody else misses it."""
+    def boards_at(self, ready_us: int, board: int, leave: int, called_us: int = 0) -> int:
+        """When a robot that could be aboard at ``ready_us`` is: the platform has come, and nobody else misses it.
+
+        It sets off for nobody before he has said that he comes, at ``called_us``.
+        """
         lasts_us, free_us, here = self.ride_us(board, leave) + self.edge_us, 0, self._stands_at
-        for use in self.uses:
-            begin_us = max(ready_us, free_us + self._empty(here, board) + self.edge_us)
+        # Before who boards sooner than that there is no gap for it.
+        first = bisect_right(self.uses, ready_us, key=lambda use: use.begin_us)
+        if first:
+            free_us, here = self.uses[first - 1].end_us, self.uses[first - 1].leave
+        for use in self.uses[first:]:
+            begin_us = max(ready_us, max(free_us, called_us) + self._empty(here, board) + self.edge_us)
             if begin_us + lasts_us + self._empty(leave, use.board) <= use.begin_us:
                 return begin_us
             free_us, here = use.end_us, use.leave
-        return max(ready_us, free_us + self._empty(here, board) + self.edge_us)
+        return max(ready_us, max(free_us, called_us) + self._empty(here, board) + self.edge_us)
 
     def use(self, aboard_us: int, board: int, leave: int) -> PlatformUse:
         """What a ride that begins at ``aboard_us`` takes of the platform's time."""
         end_us = aboard_us + self.ride_us(board, leave) + self.edge_us
         return PlatformUse(aboard_us - self.edge_us, end_us, board, leave)
+
+    def meet(self, one: PlatformUse, other: PlatformUse) -> bool:
+        """Whether the platform cannot serve both, going empty from one to the other."""
+        first, second = sorted((one, other))
+        return first.end_us + self._empty(first.leave, second.board) > second.begin_us
 
     def take(self, use: PlatformUse) -> None:
         """Take a use that is free."""

@@ -6,6 +6,9 @@ in its queue. Medians of the shipped days of ``small``, ``standard`` and ``ring`
 and devices and not of a site; ``tests/design/test_model.py`` holds them to the plant by one car on each of two sites.
 """
 
+from onboard.systems.car_park.generation import AWARD_LATENCY_US, HANDLING_OVERHEAD_US
+from onboard.ways.lift_uses import GATE_US
+
 #: From a call's end until its winner sets off: award, journal and first rights.
 AWARD_US = 30_000
 #: From the end of a leg until the next begins, or the work: the end is sensed and told, and the next order given.
@@ -20,3 +23,7 @@ REACH_US = 200_000
 STEP_US = 20_000
 #: From the end of a desk's call for the bays' bids until the winner does something.
 DESK_US = 20_000
+#: What plans, and so bids, allow for beyond these: at the award, for a ride, and for a shuttle's work.
+BID_AWARD_US = AWARD_LATENCY_US - AWARD_US
+BID_RIDE_US = GATE_US - RIDE_US
+BID_WORK_US = HANDLING_OVERHEAD_US - WORK_US
