@@ -7,14 +7,24 @@ import pytest
 from bus_sim.sites import find_site, site_text
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.design.days import DayPlan, fill_and_empty, overload
+from bus_sim.systems.car_park.design.fleet import FleetModel
 from bus_sim.systems.car_park.design.measure import Mean, Outcome, Trial, fill_trial, modelled, played
 from bus_sim.systems.car_park.design.model import DayModel
-from bus_sim.systems.car_park.design.options import Size, size_of
+from bus_sim.systems.car_park.design.offers import Offers
+from bus_sim.systems.car_park.design.options import Size, option_of, size_of
+from bus_sim.systems.car_park.design.retreats import Retreats
+from bus_sim.systems.car_park.design.robots import Work
 from bus_sim.systems.car_park.design.servers import AlleyServer, LiftServer, Stretch
+from bus_sim.systems.car_park.design.times import AWARD_US, REACH_US
 from bus_sim.systems.car_park.design.ways import ModelTraffic, arrival_us
 from onboard.core.site import Segment
+from onboard.systems.car_park.fetching import to_fetch_from
+from onboard.systems.car_park.pipeline import ENTERED_US
 from onboard.systems.car_park.site import CallAt, CarPark, DeskPolicy, car_park
+from onboard.ways.reservations import FOREVER
 
+#: When who wins a call that is made at 0 sets off.
+START_US = 1_000_000 + AWARD_US
 #: The model is to be within this of the plant (issue of the tool).
 WITHIN = 0.15
 S = 1_000_000
@@ -124,14 +134,188 @@ def test_a_lift_comes_empty_and_misses_nobody_who_has_asked_before() -> None:
 
 def test_two_robots_do_not_meet_in_an_alley() -> None:
     traffic = ModelTraffic(park("small"))
-    goal = frozenset((Segment(1, 2),))
-    first = traffic.plan(Segment(1, 9), 0, goal, 11)
+    first = traffic.plan(Segment(1, 7), 0, frozenset((Segment(1, 2),)), 11)
     assert first is not None
     traffic.take(first)
     second = traffic.plan(Segment(1, 8), 0, frozenset((Segment(1, 3),)), 12)
     assert second is not None
-    assert second[0].begin_us >= first[0].end_us
+    assert 0 < second[0].begin_us < first[0].end_us < second[0].end_us, "it follows, and does not wait for the end"
+    assert (1, Stretch(0, second[0].begin_us, 8, 8, 12)) in second[0].turns, "meanwhile it is in the way"
+    for track, mine in second[0].turns:
+        for other, his in first[0].turns:
+            is_apart = mine.high < his.low or his.high < mine.low
+            assert track != other or is_apart or mine.begin_us >= his.end_us or his.begin_us >= mine.end_us
     assert arrival_us([], 7) == 7
+
+
+def test_who_works_or_rests_in_the_way_is_waited_for() -> None:
+    traffic = ModelTraffic(park("level1"))
+    traffic.stands(Segment(1, 4), 0, 100 * S, 11)
+    goal = frozenset((Segment(1, 2),))
+    past = traffic.plan(Segment(1, 6), 0, goal, 12, lambda there_us: there_us)
+    assert past is not None and past[-1].end_us > 100 * S
+    traffic.stands(Segment(1, 4), 100 * S, FOREVER, 11)
+    assert traffic.plan(Segment(1, 6), 0, goal, 12, lambda there_us: there_us) is None
+
+
+def test_nobody_works_where_another_comes_by_meanwhile() -> None:
+    traffic = ModelTraffic(park("level1"))
+    comes_by = traffic.plan(Segment(1, 8), 20 * S, frozenset((Segment(1, 2),)), 11)
+    assert comes_by is not None
+    traffic.take(comes_by)
+    goal = frozenset((Segment(1, 4),))
+    short = traffic.plan(Segment(1, 7), 0, goal, 12, lambda there_us: there_us + S)
+    long = traffic.plan(Segment(1, 7), 0, goal, 12, lambda there_us: there_us + 20 * S)
+    assert short is not None and short[-1].end_us < 20 * S
+    assert long is None, "whoever comes by ends behind it, and has to pass where it stands"
+
+
+def test_a_car_can_be_taken_after_another_has_come_by_as_well() -> None:
+    traffic = ModelTraffic(park("standard"))
+    comes_by = traffic.plan(Segment(1, 2), 40 * S, frozenset((Segment(1, 18),)), 11)
+    assert comes_by is not None
+    traffic.take(comes_by)
+    ways = traffic.plans(Segment(192, 1), 0, frozenset((Segment(1, 12),)), 12, lambda there_us: there_us + S)
+    ends_us = [way[-1].end_us for way in ways]
+    assert ends_us[0] < 40 * S < ends_us[1] < comes_by[-1].end_us
+
+
+def test_nobody_waits_on_a_platform() -> None:
+    """Somebody comes by meanwhile: the way out of it that would be nearest is a lift's platform."""
+    traffic = ModelTraffic(park("standard"))
+    comes_by = traffic.plan(Segment(1, 4), 55 * S, frozenset((Segment(192, 1),)), 11)
+    assert comes_by is not None
+    traffic.take(comes_by)
+    goal = frozenset((Segment(1, 9),))
+    legs = traffic.plan(Segment(1, 10), 56 * S, goal, 12, lambda there_us: there_us + 20 * S) or []
+    for leg, then in zip(legs, [*legs[1:], None], strict=True):
+        is_onto = leg.ride is None and traffic.roads.lift_at(leg.there) is not None
+        assert not is_onto or (then is not None and then.ride is not None)
+
+
+def test_a_platform_sets_off_for_nobody_before_he_is_called() -> None:
+    site = park("small")
+    lift = LiftServer(site, next(iter(site.lifts)))
+    there_us = lift.boards_at(0, 3, 1)
+    assert lift.boards_at(200 * S, 3, 1, 100 * S) == 200 * S, "it is there by then"
+    assert lift.boards_at(200 * S, 3, 1, 200 * S) == 200 * S + there_us
+
+
+def test_a_robot_rests_beside_the_lift_by_which_it_came() -> None:
+    """Lifts beside the alley part a floor into stretches of refuges: nobody drives to the end of the floor."""
+    site = park("changi")
+    fleet, front = FleetModel(site), site.compartments[1].segment
+    assert fleet.park(front, 0, 30 * S) is not None
+    (robot,) = [one for one in fleet.robots if one.busy_us]
+    assert (robot.node, robot.rests_at) == (11, Segment(2, 8)), "the lower one of two that are as near, as in the plant"
+
+
+@pytest.mark.parametrize(("node", "bid_s"), [(11, 72.001), (20, 71.601)])
+def test_bids_are_the_plants(node: int, bid_s: float) -> None:
+    """What robots of ``large`` bid for the first car of the shipped day: plans allow for more than is taken."""
+    site = park("large")
+    fleet, front = FleetModel(site), site.compartments[1].segment
+    fleet.traffic.now_us = START_US
+    robots = [one for one in fleet.robots if one.node == node]
+    offers = Offers(site, fleet.traffic, robots, Retreats(site, fleet.traffic, fleet.robots))
+    ready_us, door_us = ENTERED_US + site.timing.door_us, site.timing.door_us + REACH_US
+    best = offers.best(lambda: iter([Work(front, front, ready_us, 0, door_us, 0)]), START_US)
+    assert best is not None and best[0].bid_us / S == pytest.approx(bid_s, abs=0.06)
+
+
+def test_a_way_back_yields_to_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first robot would ride back just when the second one needs the lift: it comes behind it, as in the plant."""
+
+    def second_done_us() -> int:
+        site = park("inline")
+        fleet, (first_bay, second_bay) = FleetModel(site), site.compartments.values()
+        near, far = (next(one for one in site.places if one.segment == Segment(track, 2)) for track in (3, 5))
+        fleet.retrieve(near, first_bay.segment, 0, 0)
+        served = fleet.retrieve(far, second_bay.segment, 40 * S, 40 * S)
+        rests = {one.rests_at.track for one in fleet.robots}
+        assert len(rests) == len(fleet.robots), "both rest where nobody is in the way"
+        return served.done_us
+
+    soon_us = second_done_us()
+    monkeypatch.setattr(Retreats, "may_yield", lambda *_: [])
+    assert soon_us < second_done_us() - 30 * S
+
+
+def test_a_robot_on_its_way_to_a_platform_rides_before_it_turns_back() -> None:
+    site = park("small")
+    fleet = FleetModel(site)
+    place = next(one for one in site.places if one.track == 1)
+    front = next(iter(site.compartments.values())).segment
+    fleet.retrieve(place, front, 0, 0)
+    robot = next(one for one in fleet.robots if one.retreat)
+    to_platform = robot.retreat[0]
+    assert fleet.traffic.roads.lift_at(to_platform.there) is not None
+    here, ready_us, kept = robot.branch(to_platform.begin_us + S, fleet.traffic.roads)
+    assert (here.track, kept) == (2, 3) and ready_us > to_platform.end_us + fleet.traffic.lifts[128].ride_us(1, 2)
+
+
+def test_a_place_is_free_once_its_car_is_taken() -> None:
+    site = park("small")
+    fleet = FleetModel(site)
+    front = next(iter(site.compartments.values())).segment
+    parked = fleet.park(front, 0, 0)
+    assert parked is not None and parked.place is not None
+    call_us = parked.done_us + 100 * S
+    taken = fleet.retrieve(parked.place, front, call_us, call_us)
+    meanwhile = fleet.park(front, call_us + S, taken.at_bay_us)
+    assert meanwhile is not None and meanwhile.place != parked.place
+    later = fleet.park(front, meanwhile.done_us, meanwhile.done_us)
+    assert later is not None and later.place == parked.place
+
+
+@pytest.mark.parametrize("name", ["small", "standard"])
+def test_one_car_waits_as_in_the_plant_to_a_tenth_of_a_second(name: str) -> None:
+    """What machines take between motions (``times``) is what the plant takes: a day of such trifles is a queue."""
+    alone = trial(name, Demand.by_mean(400, 10, 1, count=1))
+    model, plant = modelled(alone), played(alone)
+    assert model.wait_in.mean_s == pytest.approx(plant.wait_in.mean_s, abs=0.15)
+    assert model.wait_out.mean_s == pytest.approx(plant.wait_out.mean_s, abs=0.15)
+
+
+def test_one_way_round_all_wait_as_in_the_plant() -> None:
+    """Three cars close one behind the other: a robot that goes round, and one that has too far to go for most tasks."""
+    close = trial("ring", Demand.by_mean(40, 15, 3, count=3))
+    model, plant = modelled(close), played(close)
+    assert model.wait_in.count == plant.wait_out.count == 3
+    assert model.wait_in.mean_s == pytest.approx(plant.wait_in.mean_s, rel=0.02)
+    assert model.wait_out.mean_s == pytest.approx(plant.wait_out.mean_s, rel=0.02)
+    assert model.p95_s == pytest.approx(plant.p95_s, rel=0.02)
+
+
+def test_places_from_which_no_itinerary_leads_are_not_used() -> None:
+    site = park("ring")
+    fleet, front = FleetModel(site), next(iter(site.compartments.values())).segment
+    assert [*fleet.free] == to_fetch_from(site, site.places) and len(fleet.free) < len(site.places)
+    fleet.free.clear()
+    assert fleet.park(front, 0, 0) is None
+
+
+def test_whose_itinerary_would_be_too_long_does_not_bid() -> None:
+    """One way round: the robot of the other floor would be there sooner, and home again in more legs than are told."""
+    site = park("ring")
+    fleet, front = FleetModel(site), next(iter(site.compartments.values())).segment
+    near, far = fleet.robots
+    fleet.free = {place: 0 for place in fleet.free if place.segment == Segment(3, 1)}
+    assert fleet.park(front, 0, 0) is not None and near.busy_us > 0
+    alone = FleetModel(site)
+    alone.robots = alone.robots[1:]
+    for one in (fleet, alone):
+        one.free = {place: 0 for place in site.places if place.segment == Segment(5, 8)}
+    served, sooner = (one.park(front, 60 * S, 100 * S) for one in (fleet, alone))
+    assert served is not None and sooner is not None and served.done_us > sooner.done_us
+    assert far.busy_us == 0
+
+
+def test_a_second_robot_that_waits_for_the_first_one_gains_nothing() -> None:
+    """One lift, close cars: the other robot would come behind the first one's way back (as in the plant)."""
+    demand = Demand.by_mean(90, 30, 3, count=8)
+    one, two = (option_of(site_text("small"), "small.toml", Size(robots, 1, 1)).site for robots in (1, 2))
+    assert DayModel(two, demand, 3).play().out_us == DayModel(one, demand, 3).play().out_us
 
 
 def test_a_mean_has_students_interval() -> None:

@@ -79,12 +79,13 @@ def test_the_fewest_machines_that_keep_the_target_win(design: Design) -> None:
 
 
 def test_a_tighter_target_takes_more_machines(design: Design) -> None:
-    tight = search(SlowPlant(), DesignTarget(170.0)).run(has_plant=False)
+    tight = search(SlowPlant(), DesignTarget(165.0)).run(has_plant=False)
     assert sum(winner(tight)) > sum(winner(design))
 
 
 def test_a_machine_that_costs_little_is_taken_first() -> None:
-    asked = search(SlowPlant(), DesignTarget(170.0))
+    asked = search(SlowPlant(), DesignTarget(170.0, fill_h=1.35))
+    asked.prices = (1.0, 1.0, 10.0)
     assert winner(asked.run(has_plant=False)) == Size(2, 1, 2)
     asked.prices = (10.0, 1.0, 1.0)
     assert winner(asked.run(has_plant=False)) == Size(1, 1, 3)
@@ -115,8 +116,8 @@ def test_neighbours_and_days_that_were_kept_back_are_played(design: Design) -> N
 
 
 def test_filling_and_emptying_is_part_of_the_target(design: Design) -> None:
-    quick = search(SlowPlant(), DesignTarget(240.0, fill_h=0.8)).run()
-    assert quick.winner is not None and quick.winner.filled.fill_h <= 0.8
+    quick = search(SlowPlant(), DesignTarget(240.0, fill_h=1.0)).run()
+    assert quick.winner is not None and quick.winner.filled.fill_h <= 1.0
     assert sum(winner(quick)) > sum(winner(design))
     assert quick.plant_fill is not None
     assert any(line.startswith("plant: filled in") for line in lines(quick))

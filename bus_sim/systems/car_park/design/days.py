@@ -13,6 +13,7 @@ from bus_sim.systems.car_park.mapping import table_form
 from bus_sim.systems.car_park.plant.bodies import random_car
 from bus_sim.systems.car_park.sizes import broken_limits
 from bus_sim.systems.car_park.window import DAY_US, HOUR_US
+from onboard.systems.car_park.fetching import to_fetch_from
 from onboard.systems.car_park.site import CarPark
 
 #: Who stays so long after midnight is not fetched in a run of the day before, us: a run would last days for one car.
@@ -110,9 +111,10 @@ def overload(site: CarPark, seed: int) -> DayPlan:
 
 
 def fill_and_empty(site: CarPark, leave_us: int | None, seed: int = 1) -> DayPlan:
-    """A car for each place, one after the other, and all are fetched at ``leave_us``, or none where it is None."""
-    cars = (random_car(f"car {number}", seed) for number in range(1, 4 * len(site.places)))
-    fitting = [car for car in cars if not broken_limits(car, site)][: len(site.places)]
+    """A car for each place that is used, one by one; all are fetched at ``leave_us``, none where it is None."""
+    used = len(to_fetch_from(site, site.places))
+    cars = (random_car(f"car {number}", seed) for number in range(1, 4 * used))
+    fitting = [car for car in cars if not broken_limits(car, site)][:used]
     # Nobody keeps the order of those who ask in one moment.
     stays = tuple(
         Stay(number * FILL_US, None if leave_us is None else leave_us + number * FILL_US, car)

@@ -1,16 +1,22 @@
-"""The robots of the model: each call goes to whoever is done first, as by the bids; then they go to a refuge."""
+"""The robots of the model: each call goes to whoever is done first, as by the bids; then they go to a refuge.
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+As in the plant no car is left where no robot could fetch it by one itinerary (``to_fetch_from``): on sites that are
+driven one way round that matters.
+"""
+
+from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
-from bus_sim.systems.car_park.design.ways import ModelLeg, ModelTraffic, arrival_us
+from bus_sim.systems.car_park.design.offers import Offers
+from bus_sim.systems.car_park.design.retreats import Retreats
+from bus_sim.systems.car_park.design.robots import RobotModel, Trip, Work, Works
+from bus_sim.systems.car_park.design.times import AWARD_US, REACH_US
+from bus_sim.systems.car_park.design.ways import ModelTraffic
 from onboard.contract.codes import KindCode
 from onboard.core.site import Segment, Station
-from onboard.systems.car_park.generation import AWARD_LATENCY_US, HANDLING_OVERHEAD_US
+from onboard.systems.car_park.fetching import to_fetch_from
+from onboard.systems.car_park.pipeline import ENTERED_US
 from onboard.systems.car_park.site import CarPark
-from onboard.ways.kinematics import run_duration_us
-from onboard.ways.refuges import open_refuges, refuges
 
 #: Calls after which turns that are long over are dropped.
 TIDY_EVERY = 4
@@ -24,54 +30,6 @@ class ServedCall(NamedTuple):
     place: Station | None = None
 
 
-class _Trip(NamedTuple):
-    """A robot's offer: its way to the car, and with it; times of the work at both ends."""
-
-    done_us: int
-    take_us: tuple[int, int]
-    leave_us: tuple[int, int]
-    first: list[ModelLeg]
-    second: list[ModelLeg]
-    kept: int
-
-
-class _Work(NamedTuple):
-    """A task: where the car is taken and left, and when the bay's side of it is ready, us."""
-
-    take: Segment
-    leave: Segment
-    take_ready_us: int
-    leave_ready_us: int
-    take_door_us: int
-    leave_door_us: int
-
-
-@dataclass
-class RobotModel:
-    """One robot: where and when its work ends, and how it goes to a refuge from there."""
-
-    node: int
-    at: Segment
-    free_us: int = 0
-    retreat: list[ModelLeg] = field(default_factory=list)
-    busy_us: int = 0
-    distance_mm: int = 0
-
-    @property
-    def rests_at(self) -> Segment:
-        """Where it will stand until somebody calls."""
-        return self.retreat[-1].there if self.retreat else self.at
-
-    def branch(self, time_us: int) -> tuple[Segment, int, int]:
-        """From where and when it can take something up, and how many legs of its retreat it drives before."""
-        here, ready_us, kept = self.at, self.free_us, 0
-        for leg in self.retreat:
-            if leg.begin_us >= time_us:
-                break
-            here, ready_us, kept = leg.there, leg.end_us, kept + 1
-        return here, max(ready_us, time_us), kept
-
-
 class FleetModel:
     """All robots of a site in its traffic."""
 
@@ -80,30 +38,45 @@ class FleetModel:
         self.traffic = ModelTraffic(site)
         robots = [one for one in site.machines.values() if one.kind is KindCode.ROBOT]
         self.robots = [RobotModel(one.node_id, one.home) for one in robots]
-        self.free = dict.fromkeys(site.places)
+        for one in self.robots:
+            self.traffic.stands(*one.resting)
+        #: Places without a car, or with one that is about to be taken: since when, or from when on.
+        self.free = dict.fromkeys(to_fetch_from(site, site.places), 0)
         self._by_front: dict[Segment, list[Station]] = {}
         self._calls = 0
-        stroke_us = run_duration_us(site.shuttle_reach_mm, site.shuttle)
-        self.handle_us = 2 * stroke_us + site.timing.grip_us + HANDLING_OVERHEAD_US
-        self._start_us = site.timing.call_window_us + AWARD_LATENCY_US
+        self._retreats = Retreats(site, self.traffic, self.robots)
+        self._offers = Offers(site, self.traffic, self.robots, self._retreats)
+        self._door_us = site.timing.door_us + REACH_US
+        self._start_us = site.timing.call_window_us + AWARD_US
 
     # --- tasks -------------------------------------------------------------------------------------------------
 
     def park(self, front: Segment, call_us: int, ready_us: int) -> ServedCall | None:
         """A car is taken from a bay that is locked at ``ready_us`` to the nearest free place; None: all are taken."""
-        place = next((one for one in self._nearest(front) if one in self.free), None)
-        if place is None:
+        if not self.free:
             return None
+        # Whoever bids does not know how long the driver takes.
+        bid_us = call_us + ENTERED_US + self.site.timing.door_us
+        free = {place for place, since_us in self.free.items() if since_us <= call_us} or {*self.free}
+        trip = self._give(lambda: self._parkings(front, bid_us, free), call_us, ready_us)
+        place = trip.work.place
+        assert place is not None, "a parking ends at a place"
         del self.free[place]
-        work = _Work(front, place.segment, ready_us, 0, self.site.timing.door_us, 0)
-        trip = self._give(work, call_us)
         return ServedCall(trip.take_us[1], trip.done_us, place)
+
+    def _parkings(self, front: Segment, ready_us: int, free: Collection[Station]) -> Iterator[Work]:
+        seen: set[Segment] = set()
+        for place in self._nearest(front):
+            # Both sides of a segment are reached alike.
+            if place in free and place.segment not in seen:
+                seen.add(place.segment)
+                yield Work(front, place.segment, ready_us, 0, self._door_us, 0, place)
 
     def retrieve(self, place: Station, front: Segment, call_us: int, ready_us: int) -> ServedCall:
         """A car is brought from its place to a bay that is empty and locked at ``ready_us``."""
-        work = _Work(place.segment, front, 0, ready_us, 0, self.site.timing.door_us)
-        trip = self._give(work, call_us)
-        self.free[place] = None
+        work = Work(place.segment, front, 0, ready_us, 0, self._door_us)
+        trip = self._give(lambda: iter([work]), call_us)
+        self.free[place] = trip.take_us[1]
         return ServedCall(trip.leave_us[1], trip.done_us)
 
     def _nearest(self, front: Segment) -> list[Station]:
@@ -115,74 +88,46 @@ class FleetModel:
             self._by_front[front] = found
         return found
 
-    def _give(self, work: _Work, call_us: int) -> _Trip:
+    def _give(self, works: Works, call_us: int, ready_us: int | None = None) -> Trip:
+        """Each robot offers the soonest of these that it can tell; whose bid is the best has it.
+
+        Where nobody can, they are called again once somebody has less in hand. ``ready_us`` is when the car can be
+        taken, where that is another time than is bid for.
+        """
         self._calls += 1
         if self._calls % TIDY_EVERY == 0:
             self.traffic.forget(call_us)
-        start_us = call_us + self._start_us
-        roads, best = self.traffic.roads, None
-        bounds = []
-        for number, robot in enumerate(self.robots):
-            here, ready_us, _ = robot.branch(start_us)
-            bounds.append((ready_us + roads.shortest_us(here, work.take), number, robot))
-        rest_us = roads.shortest_us(work.take, work.leave) + 2 * self.handle_us
-        for bound_us, _, robot in sorted(bounds, key=lambda one: one[:2]):
-            if best is not None and bound_us + rest_us >= best[0].done_us:
-                break
-            trip = self._trip(robot, work, start_us)
-            if best is None or trip.done_us < best[0].done_us:
-                best = trip, robot
-        assert best is not None, "a site has a robot"
-        self._carry_out(*best, work, start_us)
-        return best[0]
+        start_us = self.traffic.now_us = call_us + self._start_us
+        best = self._offers.best(works, start_us)
+        while best is None:
+            ends_us = [end_us for one in self.robots for end_us in one.in_hand_us(start_us, self.traffic.roads)]
+            # Where one itinerary tells it of nobody, whatever is in hand, it is done all the same.
+            start_us = self.traffic.now_us = min(ends_us, default=start_us)
+            best = self._offers.best(works, start_us, any_way=not ends_us)
+        trip, robot = best
+        if not trip.yielding:
+            trip = self._offers.past_retreats(robot, works, start_us, trip) or trip
+        yielding = trip.yielding
+        self._retreats.hold_back(yielding)
+        if ready_us is not None:
+            trip = self._offers.renewed(robot, trip.work._replace(take_ready_us=ready_us), start_us)
+        self._carry_out(trip, robot, start_us)
+        self._retreats.go_back(yielding, start_us)
+        return trip
 
-    def _trip(self, robot: RobotModel, work: _Work, start_us: int) -> _Trip:
-        here, ready_us, kept = robot.branch(start_us)
-        given_up = robot.retreat[kept:]
-        self.traffic.give_back(given_up)
-        first = self.traffic.plan(here, ready_us, frozenset((work.take,)), robot.node)
-        assert first is not None, "every place is reached"
-        there_us = arrival_us(first, ready_us)
-        taken_us = max(there_us, work.take_ready_us) + work.take_door_us + self.handle_us
-        second = self.traffic.plan(work.take, taken_us, frozenset((work.leave,)), robot.node)
-        assert second is not None, "every bay is reached"
-        self.traffic.take(given_up)
-        back_us = arrival_us(second, taken_us)
-        left_us = max(back_us, work.leave_ready_us) + work.leave_door_us + self.handle_us
-        return _Trip(left_us, (there_us, taken_us), (back_us, left_us), first, second, kept)
-
-    def _carry_out(self, trip: _Trip, robot: RobotModel, work: _Work, start_us: int) -> None:
-        traffic, node = self.traffic, robot.node
+    def _carry_out(self, trip: Trip, robot: RobotModel, start_us: int) -> None:
+        traffic, node, work = self.traffic, robot.node, trip.work
+        robot.steps_us = [*robot.in_hand_us(start_us, self.traffic.roads), *trip.steps_us]
+        traffic.stands_no_more(*robot.resting)
         traffic.give_back(robot.retreat[trip.kept :])
         traffic.take(trip.first)
         traffic.take(trip.second)
         traffic.stands(work.take, *trip.take_us, node)
         traffic.stands(work.leave, *trip.leave_us, node)
+        robot.given_us = start_us
         robot.busy_us += trip.done_us - max(start_us, robot.free_us)
         robot.distance_mm += sum(leg.distance_mm for leg in (*trip.first, *trip.second))
         robot.at, robot.free_us = work.leave, trip.done_us
-        robot.retreat = self._retreat(robot)
+        robot.retreat = self._retreats.way_back(robot, robot.at, robot.free_us)
         traffic.take(robot.retreat)
-
-    # --- refuges -----------------------------------------------------------------------------------------------
-
-    def _retreat(self, robot: RobotModel) -> list[ModelLeg]:
-        """The way to the nearest place where it may stand while the others rest where they will."""
-        others = [one.rests_at for one in self.robots if one is not robot]
-        goals = open_refuges(self.site, others) or refuges(self.site)
-        if robot.at in goals:
-            return []
-        return self.traffic.plan(robot.at, robot.free_us, _nearest_of(goals, robot.at), robot.node) or []
-
-
-def _nearest_of(goals: Iterable[Segment], here: Segment) -> frozenset[Segment]:
-    """Of each track the ends of its stretch of goals, or the goal beside where one stands: nobody goes further in."""
-    by_track: dict[int, list[Segment]] = {}
-    for goal in goals:
-        by_track.setdefault(goal.track, []).append(goal)
-    found: set[Segment] = set()
-    for track, on_track in by_track.items():
-        found |= {min(on_track), max(on_track)}
-        if track == here.track:
-            found.add(min(on_track, key=lambda one: (abs(one.index - here.index), one)))
-    return frozenset(found)
+        traffic.stands(*robot.resting)

@@ -13,6 +13,7 @@ from heapq import heappop, heappush
 from bus_sim.systems.car_park.bounds.free_flow import Acts, FreeFlow
 from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.design.fleet import FleetModel, ServedCall
+from bus_sim.systems.car_park.design.times import DESK_US, STEP_US
 from bus_sim.systems.car_park.plant.customer import REACTION_US
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.bay_generation import BEFORE_US, MOST_TAKEN
@@ -23,8 +24,6 @@ from onboard.ways.site import BayUse
 
 #: From a call until its winner's plan is known, us: the call's window, and what is said after it.
 KNOWN_AFTER_US = 400_000
-#: From the last sensor's word to the next thing that a compartment does, us.
-STEP_US = 200_000
 
 
 @dataclass
@@ -92,6 +91,8 @@ class DayModel:
             _BayModel(node, station.segment, uses.get(node, BayUse.BOTH)) for node, station in site.compartments.items()
         ]
         self._bays.sort(key=lambda one: one.node)
+        #: How long a desk's call for bids of the bays takes, where a car comes to the bay that suits it.
+        self._desk_call_us = 0 if site.desk is DeskPolicy.ANY else site.timing.call_window_us + DESK_US
         #: Who has asked while no bay had room for one more car, where cars come to the bay that suits them.
         self._waiting: deque[_Person] = deque()
         self._calls_on_arrival = site.call_at is CallAt.ARRIVAL and not site.classes and not site.measures_width
@@ -170,9 +171,15 @@ class DayModel:
             self._take(bay, person, now_us)
 
     def _take(self, bay: _BayModel, person: _Person, now_us: int) -> None:
-        """A bay is to hand out a car."""
+        """A bay is to hand out a car; where bays bid for it, once the desk's call is over."""
         bay.people += 1
         bay.taken += 1
+        if self._desk_call_us:
+            self._at(now_us + self._desk_call_us, lambda then_us: self._queue(bay, person, then_us))
+        else:
+            self._queue(bay, person, now_us)
+
+    def _queue(self, bay: _BayModel, person: _Person, now_us: int) -> None:
         bay.askers.append(person)
         if person.stored_us > now_us:
             self._at(person.stored_us, lambda then_us: self._look(bay, then_us))

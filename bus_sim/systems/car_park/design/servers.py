@@ -1,16 +1,17 @@
 """Alleys and lifts as servers: who has which stretch, or which platform, from when to when.
 
-A stretch is held for the whole of a run, so that two robots follow each other no closer than one run; the plant's
-slots are freed one by one. A platform is held from when somebody drives onto it until he has left it, and goes
-empty from stop to stop in between (``onboard.ways.lift_uses``).
+A run's track is held in parts (``ways.MOST_PARTS``), each until it is left, so that one follows another; the plant's
+slots are freed one by one. Who works or rests holds where it stands. A platform is held from when somebody drives onto
+it until he has left it, and goes empty from stop to stop in between (``onboard.ways.lift_uses``).
 """
 
-from bisect import insort
+from bisect import bisect_right, insort
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from bus_sim.systems.car_park.design.times import RIDE_US
 from onboard.ways.kinematics import RestToRest, time_at_us
-from onboard.ways.lift_uses import ride_us, run_up_us
+from onboard.ways.lift_uses import run_up_us
 from onboard.ways.site import WaySite
 
 #: Of what was over so long ago nobody asks any more, us: a call is made half a minute ahead at most.
@@ -55,6 +56,13 @@ class AlleyServer:
                     begin_us, waits = turn.end_us, True
         return begin_us
 
+    def next_turn(self, time_us: int, index: int, owner: int) -> Stretch | None:
+        """The next turn of another from ``time_us`` on over an index, or the one that is under way."""
+        for turn in self.turns:
+            if turn.end_us > time_us and turn.low <= index <= turn.high and turn.owner != owner:
+                return turn
+        return None
+
     def take(self, turn: Stretch) -> None:
         """Take a turn that is free."""
         insort(self.turns, turn)
@@ -91,7 +99,7 @@ class LiftServer:
         """How long a ride takes."""
         found = self._ride_us.get((board, leave))
         if found is None:
-            found = self._ride_us[board, leave] = ride_us(self.site, self.track, board, leave)
+            found = self._ride_us[board, leave] = run_up_us(self.site, self.track, board, leave) + RIDE_US
         return found
 
     def _empty(self, here: int, there: int) -> int:
@@ -100,20 +108,32 @@ class LiftServer:
             found = self._empty_us[here, there] = run_up_us(self.site, self.track, here, there)
         return found
 
-    def boards_at(self, ready_us: int, board: int, leave: int) -> int:
-        """When a robot that could be aboard at ``ready_us`` is: the platform has come, and nobody else misses it."""
+    def boards_at(self, ready_us: int, board: int, leave: int, called_us: int = 0) -> int:
+        """When a robot that could be aboard at ``ready_us`` is: the platform has come, and nobody else misses it.
+
+        It sets off for nobody before he has said that he comes, at ``called_us``.
+        """
         lasts_us, free_us, here = self.ride_us(board, leave) + self.edge_us, 0, self._stands_at
-        for use in self.uses:
-            begin_us = max(ready_us, free_us + self._empty(here, board) + self.edge_us)
+        # Before who boards sooner than that there is no gap for it.
+        first = bisect_right(self.uses, ready_us, key=lambda use: use.begin_us)
+        if first:
+            free_us, here = self.uses[first - 1].end_us, self.uses[first - 1].leave
+        for use in self.uses[first:]:
+            begin_us = max(ready_us, max(free_us, called_us) + self._empty(here, board) + self.edge_us)
             if begin_us + lasts_us + self._empty(leave, use.board) <= use.begin_us:
                 return begin_us
             free_us, here = use.end_us, use.leave
-        return max(ready_us, free_us + self._empty(here, board) + self.edge_us)
+        return max(ready_us, max(free_us, called_us) + self._empty(here, board) + self.edge_us)
 
     def use(self, aboard_us: int, board: int, leave: int) -> PlatformUse:
         """What a ride that begins at ``aboard_us`` takes of the platform's time."""
         end_us = aboard_us + self.ride_us(board, leave) + self.edge_us
         return PlatformUse(aboard_us - self.edge_us, end_us, board, leave)
+
+    def meet(self, one: PlatformUse, other: PlatformUse) -> bool:
+        """Whether the platform cannot serve both, going empty from one to the other."""
+        first, second = sorted((one, other))
+        return first.end_us + self._empty(first.leave, second.board) > second.begin_us
 
     def take(self, use: PlatformUse) -> None:
         """Take a use that is free."""
