@@ -1,8 +1,8 @@
 """From which places a car can be fetched again: an itinerary tells ``MAX_STEPS`` legs, and no plan that is longer.
 
 Where carriers go round one way only, the way to a car, on to the exit and back to a refuge may lead round every floor
-twice, with two legs at each corner; a car that was left there would stay for ever. On other sites no way is so long
-(docs/reliability.md has the legs of the shipped ones).
+twice, with two legs at each corner; a car that was left there would stay for ever. On other sites a way is so long only
+for who rests far away (``out_of_reach``); docs/reliability.md has the legs of the shipped ones.
 """
 
 from collections.abc import Iterable
@@ -31,15 +31,18 @@ def to_fetch_from(site: CarPark, places: Iterable[Station]) -> list[Station]:
     return [place for place in places if place.segment in told]
 
 
+def can_fetch(site: CarPark, start: Segment, place: Segment, out: Segment) -> bool:
+    """Whether a robot that rests at ``start`` can fetch a car from ``place`` to ``out`` by one itinerary."""
+    return _legs(site, start, place, out) + SPARE_STEPS < MAX_STEPS
+
+
 def _find_told(site: CarPark) -> frozenset[Segment]:
     return frozenset(one for one in {place.segment for place in site.places} if _is_told(site, one))
 
 
 def _is_told(site: CarPark, place: Segment) -> bool:
     exits = site.fronts(BayUse.EXIT, BayUse.BOTH)
-    return all(
-        any(_legs(site, start, place, out) + SPARE_STEPS < MAX_STEPS for start in _starts(site)) for out in exits
-    )
+    return all(any(can_fetch(site, start, place, out) for start in _starts(site)) for out in exits)
 
 
 def _starts(site: CarPark) -> list[Segment]:

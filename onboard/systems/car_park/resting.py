@@ -1,6 +1,7 @@
 """Where a robot with nothing to do waits: near the next call, by the calls that were heard, given where others stand.
 
-Where robots run on batteries, it goes to charge first, as it needs (``charging.py``).
+Where robots run on batteries, it goes to charge first, as it needs (``charging.py``); then, on any site, to where it
+can bid for a car that nobody could bid for (``out_of_reach.py``).
 
 It minds its own plan alone and says nothing new: its move is an itinerary without work, which yields to whoever carries
 or fetches (``onboard.ways.retreats``), and from which it bids as from a way back. What it knows of the demand it has
@@ -25,6 +26,7 @@ from onboard.systems.car_park.clearance import MAX_EXPANSIONS
 from onboard.systems.car_park.fetch_costs import met_us, moved_from
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.going_around import GoingAround
+from onboard.systems.car_park.out_of_reach import OutOfReach
 from onboard.systems.car_park.program import MAX_STEPS, Program, steps_of
 from onboard.systems.car_park.site import CarPark, RestAt, class_of_end
 from onboard.ways.mirror import WayFleet
@@ -68,11 +70,13 @@ class Resting:
         self._heard.extend(station.segment for _, station in bays)
         robots = [n for n, machine in sorted(self.park.machines.items()) if machine.kind is KindCode.ROBOT]
         self._rest_us = REST_US + STAGGER_US * robots.index(node)
+        self.out_of_reach = OutOfReach(self.park)
 
     @property
     def is_on(self) -> bool:
-        """Whether robots of this site go where calls are likely, or to chargers."""
-        return self.park.rest_at is RestAt.DEMAND or self.park.battery is not None
+        """Whether robots of this site go where calls are likely, or to chargers, or to where a car is within reach."""
+        goes = self.park.rest_at is RestAt.DEMAND or self.park.battery is not None
+        return goes or bool(self.out_of_reach.refused)
 
     @property
     def program(self) -> Program:
@@ -82,6 +86,8 @@ class Resting:
     def hear(self, message: Message, now_us: int) -> None:
         """A call tells where robots are needed, a plan where one will stand, a level whether others bid."""
         self.generation.costs.hear(message, now_us)
+        if self.out_of_reach.hear(message):
+            self._due_us = now_us + self._rest_us
         if not self.is_on:
             return
         if isinstance(message, BatteryLevel):
@@ -136,11 +142,16 @@ class Resting:
         charging = self.generation.charging
         if charging.wants(here):
             return charging.chargers(here, now_us)
+        if self.out_of_reach.refused:
+            refuges = open_refuges(self.park, self.fleet.mirror.others_standing())
+            there = self.out_of_reach.refuge(here, self._others(), refuges)
+            if there is not None:
+                return frozenset((there,))
         best = None if self.park.rest_at is RestAt.NEAREST or charging.stays(here) else self._best(here)
         return frozenset() if best is None else frozenset([best])
 
     def _plan(self, here: Segment, there: frozenset[Segment], now_us: int) -> bool:
-        """Whether there is a way around all plans, at once or, to a charger, behind whoever is before; then it goes."""
+        """Whether a way leads around all plans, at once or, where it has to go, behind who is before; then it goes."""
         mirror = self.fleet.mirror
         floors = mirror.lift_floors(now_us, now_us)
         taken, node = mirror.reservations, self.fleet.node_id
@@ -148,7 +159,8 @@ class Resting:
         route = self.generation.effort.whole(search)
         if isinstance(route, NoRoute) or len(route.legs) >= MAX_STEPS:
             return False
-        if route.legs[0].action is LegAction.STAND and not self.generation.charging.wants(here):
+        is_wanted = self.generation.charging.wants(here) or bool(self.out_of_reach.refused)
+        if route.legs[0].action is LegAction.STAND and not is_wanted:
             return False
         self.program.replace(list(steps_of(route, ())), Stamp(to_bus_ms(now_us), node, 0))
         return True
