@@ -16,9 +16,11 @@ from onboard.trace.check.rule import Handlers, Rule
 CLOSED_WITHIN_US = 12_000_000
 #: Closed calls are remembered so long, since awards are said again until the winner is heard, us.
 REMEMBERED_US = 600_000_000
-#: Two bids may cross on their way: the second was queued before the first was heard, us. A sealed one counts once its
-#: seal has come: at 125 kbit/s, with three robots' offers behind it, 27 ms later (measured).
-CROSSING_US = 50_000
+#: Two bids may cross on their way: the second was queued before the first was heard, us.
+CROSSING_US = 20_000
+#: Where seals are required one counts once its seal has come: at 125 kbit/s, with offers behind it, 27 ms later
+#: (measured).
+SEALED_CROSSING_US = 50_000
 #: Bus time in the log is told by frames that take up to a few of these to come through, us.
 CLOCK_TOLERANCE_US = 5_000
 #: Who has won something and has not moved for so long may be an obstacle for all: its bids do not count then, us.
@@ -263,7 +265,7 @@ class BidsGoDown(_CallRule):
                 return
             if not self._counts(node, seen, event.time_us):
                 continue
-            heard = event.time_us - time_us > CROSSING_US
+            heard = event.time_us - time_us > (SEALED_CROSSING_US if self.picture.is_sealed else CROSSING_US)
             if heard and not _is_better(bid.cost, bid.sender, cost, node, seen.call.criterion):
                 what = f"bids {bid.cost} for call {bid.call} of {bid.initiator} after {node} bid {cost}"
                 self.find(event, (bid.sender, node), what)

@@ -115,7 +115,12 @@ class BusPicture:
 
         Only what is proved is judged where seals are required; 0 where all that is said counts.
         """
-        return self.excused_us if self._site is not None and self._site.seals == "required" else 0
+        return self.excused_us if self.is_sealed else 0
+
+    @property
+    def is_sealed(self) -> bool:
+        """Whether only what is sealed counts on this site."""
+        return self._site is not None and self._site.seals == "required"
 
     def waited_us(self, since_us: int, now_us: int) -> int:
         """How long something has been due, for rules of liveness: from ``since_us``, or from the end of all faults.
