@@ -17,6 +17,8 @@ from bus_sim.systems.car_park.design.robots import Work
 from bus_sim.systems.car_park.design.servers import AlleyServer, LiftServer, Stretch
 from bus_sim.systems.car_park.design.times import AWARD_US, REACH_US
 from bus_sim.systems.car_park.design.ways import ModelTraffic, arrival_us
+from onboard.config.site import parse_site
+from onboard.contract.messages import Reference
 from onboard.core.site import Segment
 from onboard.systems.car_park.fetching import to_fetch_from
 from onboard.systems.car_park.pipeline import ENTERED_US
@@ -25,6 +27,7 @@ from onboard.ways.reservations import FOREVER
 
 #: When who wins a call that is made at 0 sets off.
 START_US = 1_000_000 + AWARD_US
+CAR = Reference(1, 1)
 #: The model is to be within this of the plant (issue of the tool).
 WITHIN = 0.15
 S = 1_000_000
@@ -77,6 +80,19 @@ def test_a_call_with_the_key_waits_longer() -> None:
     by_key = DayModel(replace(site, call_at=CallAt.KEY), demand, 1).play()
     on_arrival = DayModel(site, demand, 1).play()
     assert sum(by_key.in_us) + sum(by_key.out_us) > sum(on_arrival.in_us) + sum(on_arrival.out_us)
+
+
+@pytest.mark.parametrize("line", ['call_at = "key"', 'place = "random"', 'place = "balanced"', 'place = "cost"'])
+def test_whatever_the_file_says_of_turns_and_places_all_wait_as_in_the_plant(line: str) -> None:
+    """By the key cars go in and out by turns (P50); a place that is not the nearest has a longer way."""
+    text = site_text("small")
+    assert "[negotiation]" not in text
+    text += f"\n[negotiation]\n{line}\n"
+    site = car_park(parse_site(text, "small.toml"))
+    close = Trial(size_of(site), text, DayPlan("day", Demand.by_mean(40, 15, 1, count=12), 1))
+    model, plant = modelled(close), played(close)
+    assert model.wait_in.mean_s == pytest.approx(plant.wait_in.mean_s, rel=WITHIN)
+    assert model.wait_out.mean_s == pytest.approx(plant.wait_out.mean_s, rel=WITHIN)
 
 
 def test_a_car_comes_to_the_bay_beside_it_where_the_site_says_so() -> None:
@@ -205,7 +221,7 @@ def test_a_robot_rests_beside_the_lift_by_which_it_came() -> None:
     """Lifts beside the alley part a floor into stretches of refuges: nobody drives to the end of the floor."""
     site = park("changi")
     fleet, front = FleetModel(site), site.compartments[1].segment
-    assert fleet.park(front, 0, 30 * S) is not None
+    assert fleet.park(front, 0, 30 * S, CAR) is not None
     (robot,) = [one for one in fleet.robots if one.busy_us]
     assert (robot.node, robot.rests_at) == (11, Segment(2, 8)), "the lower one of two that are as near, as in the plant"
 
@@ -258,13 +274,13 @@ def test_a_place_is_free_once_its_car_is_taken() -> None:
     site = park("small")
     fleet = FleetModel(site)
     front = next(iter(site.compartments.values())).segment
-    parked = fleet.park(front, 0, 0)
+    parked = fleet.park(front, 0, 0, CAR)
     assert parked is not None and parked.place is not None
     call_us = parked.done_us + 100 * S
     taken = fleet.retrieve(parked.place, front, call_us, call_us)
-    meanwhile = fleet.park(front, call_us + S, taken.at_bay_us)
+    meanwhile = fleet.park(front, call_us + S, taken.at_bay_us, CAR)
     assert meanwhile is not None and meanwhile.place != parked.place
-    later = fleet.park(front, meanwhile.done_us, meanwhile.done_us)
+    later = fleet.park(front, meanwhile.done_us, meanwhile.done_us, CAR)
     assert later is not None and later.place == parked.place
 
 
@@ -292,7 +308,7 @@ def test_places_from_which_no_itinerary_leads_are_not_used() -> None:
     fleet, front = FleetModel(site), next(iter(site.compartments.values())).segment
     assert [*fleet.free] == to_fetch_from(site, site.places) and len(fleet.free) < len(site.places)
     fleet.free.clear()
-    assert fleet.park(front, 0, 0) is None
+    assert fleet.park(front, 0, 0, CAR) is None
 
 
 def test_whose_itinerary_would_be_too_long_does_not_bid() -> None:
@@ -301,12 +317,12 @@ def test_whose_itinerary_would_be_too_long_does_not_bid() -> None:
     fleet, front = FleetModel(site), next(iter(site.compartments.values())).segment
     near, far = fleet.robots
     fleet.free = {place: 0 for place in fleet.free if place.segment == Segment(3, 1)}
-    assert fleet.park(front, 0, 0) is not None and near.busy_us > 0
+    assert fleet.park(front, 0, 0, CAR) is not None and near.busy_us > 0
     alone = FleetModel(site)
     alone.robots = alone.robots[1:]
     for one in (fleet, alone):
         one.free = {place: 0 for place in site.places if place.segment == Segment(5, 8)}
-    served, sooner = (one.park(front, 60 * S, 100 * S) for one in (fleet, alone))
+    served, sooner = (one.park(front, 60 * S, 100 * S, CAR) for one in (fleet, alone))
     assert served is not None and sooner is not None and served.done_us > sooner.done_us
     assert far.busy_us == 0
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from zlib import crc32
 
-from onboard.contract.messages import CallForProposals, Message
+from onboard.contract.messages import CallForProposals, Message, Reference
 from onboard.core.site import Station
 from onboard.systems.car_park.fetch_costs import fetch_us, moved_from
 from onboard.systems.car_park.site import CarPark, PlacePolicy, class_of_end
@@ -52,45 +52,50 @@ class PlaceCosts:
 
     def of(self, call: CallForProposals, places: Sequence[Station], now_us: int) -> Mapping[int, int]:
         """Costs in us by the place's number, of ``places`` that are free; who is not named costs nothing."""
-        if class_of_end(call.to_station) is None:
+        car_class = class_of_end(call.to_station)
+        if car_class is None:
             return {}
         is_moved = moved_from(self.park, call) is not None
-        match PlacePolicy.COST if is_moved else self.park.place:
+        return self.by(PlacePolicy.COST if is_moved else self.park.place, call.car, car_class, places, now_us)
+
+    def by(
+        self, policy: PlacePolicy, car: Reference, car_class: int, places: Sequence[Station], now_us: int
+    ) -> Mapping[int, int]:
+        """The same by a given policy, for a car by its name and class."""
+        match policy:
             case PlacePolicy.NEAREST:
                 return {}
             case PlacePolicy.COST:
-                return self._by_cost(call, places)
+                return self._by_cost(car, places)
             case PlacePolicy.STAY:
-                return self._by_stay(call, places, now_us)
+                return self._by_stay(car, places, now_us)
             case PlacePolicy.BALANCED:
-                return self._by_balance(call, places)
+                return self._by_balance(car_class, places)
             case PlacePolicy.RANDOM:
-                return self._by_chance(call, places)
+                return self._by_chance(car, places)
 
-    def _by_cost(self, call: CallForProposals, places: Sequence[Station]) -> dict[int, int]:
-        origin = call.car.origin
-        return {one.number: FETCH_WEIGHT * fetch_us(self.park, one.segment, origin) for one in places}
+    def _by_cost(self, car: Reference, places: Sequence[Station]) -> dict[int, int]:
+        return {one.number: FETCH_WEIGHT * fetch_us(self.park, one.segment, car.origin) for one in places}
 
-    def _by_chance(self, call: CallForProposals, places: Sequence[Station]) -> dict[int, int]:
+    def _by_chance(self, car: Reference, places: Sequence[Station]) -> dict[int, int]:
         """Drawn by the car's name, so that whoever bids draws the same."""
-        name = call.car.origin << 16 | call.car.number
+        name = car.origin << 16 | car.number
         drawn = sorted((crc32(f"{name} {one.number}".encode()), one.number) for one in places)
         return {number: rank * RANK_US for rank, (_, number) in enumerate(drawn)}
 
-    def _by_balance(self, call: CallForProposals, places: Sequence[Station]) -> dict[int, int]:
+    def _by_balance(self, car_class: int, places: Sequence[Station]) -> dict[int, int]:
         """By how full each alley is, of the places that such a car may have, in thousandths."""
-        car_class = class_of_end(call.to_station) or 0
         free = Counter(one.track for one in places)
         all_of = Counter(one.track for one in self.park.places if self.park.takes(one, car_class))
         full = {track: _ALL * (all_of[track] - count) // all_of[track] for track, count in free.items()}
         return {one.number: full[one.track] * RANK_US for one in places}
 
-    def _by_stay(self, call: CallForProposals, places: Sequence[Station], now_us: int) -> dict[int, int]:
+    def _by_stay(self, car: Reference, places: Sequence[Station], now_us: int) -> dict[int, int]:
         """Of the places that are ever needed the nearest for the shortest stays, the farthest for the longest."""
         stay_us = self.stays.expected_us(now_us)
         share = 0 if stay_us is None else self.stays.shorter_permille(stay_us)
         wanted = self.stays.most * share // _ALL
-        order = self._in_order(call.car.origin)
+        order = self._in_order(car.origin)
         return {one.number: abs(order[one.number] - wanted) * OFF_US for one in places}
 
     def _in_order(self, origin: int) -> Mapping[int, int]:

@@ -4,7 +4,7 @@ As in the plant no car is left where no robot could fetch it by one itinerary (`
 driven one way round that matters.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from typing import NamedTuple
 
 from bus_sim.systems.car_park.design.offers import Offers
@@ -13,10 +13,12 @@ from bus_sim.systems.car_park.design.robots import RobotModel, Trip, Work, Works
 from bus_sim.systems.car_park.design.times import AWARD_US, REACH_US
 from bus_sim.systems.car_park.design.ways import ModelTraffic
 from onboard.contract.codes import KindCode
+from onboard.contract.messages import Reference
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.fetching import to_fetch_from
 from onboard.systems.car_park.pipeline import ENTERED_US
-from onboard.systems.car_park.site import CarPark
+from onboard.systems.car_park.place_costs import PlaceCosts
+from onboard.systems.car_park.site import ANY_CLASS, CarPark
 
 #: Calls after which turns that are long over are dropped.
 TIDY_EVERY = 4
@@ -46,31 +48,43 @@ class FleetModel:
         self._calls = 0
         self._retreats = Retreats(site, self.traffic, self.robots)
         self._offers = Offers(site, self.traffic, self.robots, self._retreats)
+        self._costs = PlaceCosts(site)
         self._door_us = site.timing.door_us + REACH_US
         self._start_us = site.timing.call_window_us + AWARD_US
 
     # --- tasks -------------------------------------------------------------------------------------------------
 
-    def park(self, front: Segment, call_us: int, ready_us: int) -> ServedCall | None:
-        """A car is taken from a bay that is locked at ``ready_us`` to the nearest free place; None: all are taken."""
+    def park(self, front: Segment, call_us: int, ready_us: int, car: Reference) -> ServedCall | None:
+        """A car is taken from a bay that is locked at ``ready_us`` to the place that suits; None: none is free."""
         if not self.free:
             return None
         # Whoever bids does not know how long the driver takes.
         bid_us = call_us + ENTERED_US + self.site.timing.door_us
         free = {place for place, since_us in self.free.items() if since_us <= call_us} or {*self.free}
-        trip = self._give(lambda: self._parkings(front, bid_us, free), call_us, ready_us)
+        costs_us = self._costs.by(self.site.place, car, ANY_CLASS, [*free], call_us)
+        trip = self._give(lambda: self._parkings(front, bid_us, free, costs_us), call_us, ready_us)
         place = trip.work.place
         assert place is not None, "a parking ends at a place"
         del self.free[place]
         return ServedCall(trip.take_us[1], trip.done_us, place)
 
-    def _parkings(self, front: Segment, ready_us: int, free: Collection[Station]) -> Iterator[Work]:
+    def _parkings(
+        self, front: Segment, ready_us: int, free: Collection[Station], costs_us: Mapping[int, int]
+    ) -> Iterator[Work]:
+        """Works by place, the soonest and cheapest first."""
         seen: set[Segment] = set()
-        for place in self._nearest(front):
+        for place in self._suited(front, costs_us):
             # Both sides of a segment are reached alike.
             if place in free and place.segment not in seen:
                 seen.add(place.segment)
-                yield Work(front, place.segment, ready_us, 0, self._door_us, 0, place)
+                cost_us = costs_us.get(place.number, 0)
+                yield Work(front, place.segment, ready_us, 0, self._door_us, 0, place, cost_us)
+
+    def _suited(self, front: Segment, costs_us: Mapping[int, int]) -> list[Station]:
+        nearest, roads = self._nearest(front), self.traffic.roads
+        if not costs_us:
+            return nearest
+        return sorted(nearest, key=lambda one: roads.shortest_us(front, one.segment) + costs_us.get(one.number, 0))
 
     def retrieve(self, place: Station, front: Segment, call_us: int, ready_us: int) -> ServedCall:
         """A car is brought from its place to a bay that is empty and locked at ``ready_us``."""

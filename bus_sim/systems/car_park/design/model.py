@@ -15,9 +15,10 @@ from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.design.fleet import FleetModel, ServedCall
 from bus_sim.systems.car_park.design.times import DESK_US, STEP_US
 from bus_sim.systems.car_park.plant.customer import REACTION_US
+from onboard.contract.messages import Reference
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.bay_generation import BEFORE_US, MOST_TAKEN
-from onboard.systems.car_park.pipeline import MOST_OUT, QUEUED_US
+from onboard.systems.car_park.pipeline import MOST_OUT, MOST_OUT_BY_KEY, QUEUED_US
 from onboard.systems.car_park.site import CallAt, CarPark, DeskPolicy
 from onboard.ways.roads import roads_of
 from onboard.ways.site import BayUse
@@ -72,11 +73,18 @@ class _BayModel:
     enters_at_us: int | None = None
     #: Next car to go out, called for already, and when it is set down.
     ahead: "tuple[_Person, ServedCall] | None" = None
+    #: Names that its compartment has given, to cars that came in and to tasks.
+    named: int = 0
     #: From when on, and for when, the next car may be called for; None while it may not.
     ahead_ready_us: int | None = None
     busy_us: int = 0
     #: Counts up whenever an arriving car is shown here.
     shown: int = 0
+
+    def next_name(self) -> Reference:
+        """The next name that its compartment gives."""
+        self.named += 1
+        return Reference(self.node, self.named)
 
 
 class DayModel:
@@ -193,6 +201,8 @@ class DayModel:
     def _is_drivers_turn(self, bay: _BayModel) -> bool:
         if bay.use is BayUse.EXIT:
             return False
+        if self._site.call_at is CallAt.KEY:
+            return bay.outs >= MOST_OUT_BY_KEY
         return bay.is_queued or bay.outs >= MOST_OUT
 
     def _look(self, bay: _BayModel, now_us: int) -> None:
@@ -231,7 +241,7 @@ class DayModel:
         keyed_us = now_us + person.acts.drive_in_us
         parked_us = keyed_us + STEP_US + person.acts.walk_us
         call_us = now_us if self._calls_on_arrival else keyed_us
-        served = self._fleet.park(bay.front, call_us, parked_us + self._close_us)
+        served = self._fleet.park(bay.front, call_us, parked_us + self._close_us, bay.next_name())
         if served is None:
             self._found.refused += 1
             bay.people -= 1
@@ -277,6 +287,7 @@ class DayModel:
 
     def _fetch(self, bay: _BayModel, now_us: int, ready_us: int) -> "tuple[_Person, ServedCall]":
         person = bay.askers.popleft()
+        bay.next_name()
         assert person.place is not None, "who asks has parked"
         return person, self._fleet.retrieve(person.place, bay.front, now_us, ready_us)
 

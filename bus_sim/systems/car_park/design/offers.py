@@ -124,10 +124,11 @@ class Offers:
         """
         given_up = robot.retreat[robot.branch(start_us, self.traffic.roads)[2] :]
         self.traffic.give_back(given_up)
-        found, is_late, least_us = None, False, worst_us
+        # Which place is the best of all is the same for whoever bids: no bid of another bounds what it costs.
+        found, is_late, least_us = None, False, FOREVER if next(works()).cost_us else worst_us
         tries = MOST_PLACES
-        for least_done_us, trip_to in self._trips(robot, works, start_us, through=any_way):
-            if least_done_us > least_us or not tries:
+        for least_cost_us, trip_to in self._trips(robot, works, start_us, through=any_way):
+            if least_cost_us > least_us or not tries:
                 # From here on no place is sooner.
                 is_late = True
                 break
@@ -136,9 +137,9 @@ class Offers:
             if trip is not None and trip.done_us > worst_us:
                 is_late = True
                 continue
-            is_sooner = trip is not None and (found is None or trip.done_us < found.done_us)
-            if trip is not None and is_sooner and (any_way or self._is_told(robot, trip, start_us)):
-                found, least_us = trip, trip.done_us - 1
+            is_better = trip is not None and (found is None or trip.cost_us < found.cost_us)
+            if trip is not None and is_better and (any_way or self._is_told(robot, trip, start_us)):
+                found, least_us = trip, trip.cost_us - 1
                 tries = min(tries, MOST_SOONER)
         self.traffic.take(given_up)
         return found, is_late
@@ -146,7 +147,7 @@ class Offers:
     def _trips(
         self, robot: RobotModel, works: Works, start_us: int, *, through: bool
     ) -> Iterator[tuple[int, Callable[[], Trip | None]]]:
-        """For each of these when it is done at the soonest, and the trip, None: nothing leads on.
+        """For each of these when it is done at the soonest, with its cost, and the trip, None: nothing leads on.
 
         ``through`` others that stand, or work, or come by while this robot does; else there may be none at all.
         """
@@ -174,7 +175,8 @@ class Offers:
         taken_us = self._done_us(first.take_ready_us, first.take_door_us, there_us)
         for work in works():
             soonest_us = taken_us + traffic.roads.shortest_us(work.take, work.leave)
-            yield self._done_us(work.leave_ready_us, work.leave_door_us, soonest_us), partial(trip_to, work)
+            done_us = self._done_us(work.leave_ready_us, work.leave_door_us, soonest_us)
+            yield done_us + work.cost_us, partial(trip_to, work)
 
     def _trip(
         self, robot: RobotModel, work: Work, first: list[ModelLeg], start_us: int, *, through: bool

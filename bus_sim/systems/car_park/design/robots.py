@@ -12,7 +12,10 @@ from onboard.ways.roads import Roads
 
 
 class Work(NamedTuple):
-    """A task: where the car is taken and left, and when the bay's side of it is ready, us; the place of a parking."""
+    """A task: where the car is taken and left, and when the bay's side of it is ready, us; the place of a parking.
+
+    ``cost_us`` is what this place costs beside the time at which the car stands there (``PlaceCosts``).
+    """
 
     take: Segment
     leave: Segment
@@ -21,6 +24,7 @@ class Work(NamedTuple):
     take_door_us: int
     leave_door_us: int
     place: Station | None = None
+    cost_us: int = 0
 
 
 #: All that a task may come to, the most promising first: each takes the same car, at the same time.
@@ -42,6 +46,11 @@ class Trip(NamedTuple):
     bid_us: int
     #: Whose ways back it counts on to yield.
     yielding: "tuple[HeldBack, ...]" = ()
+
+    @property
+    def cost_us(self) -> int:
+        """When it is over, and what its place costs beside: the least is the best place."""
+        return self.done_us + self.work.cost_us
 
     def stands(self, node: int, back: list[ModelLeg]) -> list[Stand]:
         """Where the robot stands: at both works, and after its way back for ever."""
