@@ -38,8 +38,8 @@ from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.program import standing_itinerary, to_itinerary
 from onboard.systems.car_park.robot import ParkingRobot
 from onboard.ways.occupancy import itinerary_windows, lift_uses
-from onboard.ways.passing import BegunItinerary
 from onboard.ways.reservations import Reservations
+from onboard.ways.told_way import BegunItinerary
 
 #: Customers come this long after power-up, us; a run that takes longer has got stuck.
 ORIGIN_US, LIMIT_US = 10_000_000, 4 * 3_600_000_000

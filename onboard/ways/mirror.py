@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any, ClassVar
 
 from onboard.contract.codes import Reason, TokenKind
@@ -19,13 +20,13 @@ from onboard.ways.cars import CarFleet, CarMirror
 from onboard.ways.lift_uses import standing_after
 from onboard.ways.lifts import lift_tracks
 from onboard.ways.obstacles import Obstacles
-from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses, standing_segments, turned_in
-from onboard.ways.passing import BegunItinerary, next_plan, reread_us
+from onboard.ways.occupancy import LegWindows, final_position, leg_windows, lift_uses, standing_segments, turned_in
 from onboard.ways.passing_order import PassingOrder
 from onboard.ways.reservations import FOREVER, Reservations, SlotWindow
 from onboard.ways.site import WaySite
 from onboard.ways.standing import Standing
 from onboard.ways.tokens import tokens_of
+from onboard.ways.told_way import BegunItinerary, next_plan, reread_us
 
 
 @dataclass
@@ -90,17 +91,17 @@ class WayMirror(CarMirror):
 
     def _count_on(self, plan: BegunItinerary, now_us: int) -> None:
         """Plan around a machine's plan, and keep its place in the order of passing."""
-        self.order.on_plan(plan, now_us)
-        self._occupy(plan, now_us)
+        windows = self._occupy(plan, now_us)
+        self.order.on_plan(plan.itinerary, windows, now_us)
 
-    def _occupy(self, plan: BegunItinerary, now_us: int) -> None:
-        itinerary = plan.itinerary
+    def _occupy(self, plan: BegunItinerary, now_us: int) -> LegWindows:
+        """Plan around a machine's plan; the windows of its legs."""
+        itinerary, begin_us = plan
+        windows = leg_windows(self.site, itinerary, now_us, begin_us)
+        uses = lift_uses(self.site, itinerary, now_us, begin_us)
         self.reservations.release(itinerary.sender)
-        self.reservations.reserve(
-            itinerary.sender,
-            itinerary_windows(self.site, itinerary, now_us, plan.first_begin_us),
-            lift_uses(self.site, itinerary, now_us, plan.first_begin_us),
-        )
+        self.reservations.reserve(itinerary.sender, chain.from_iterable(windows), uses)
+        return windows
 
     def _forget_plan(self, node: int) -> None:
         # Its body is still somewhere: the reservation stays until its first new itinerary replaces it.

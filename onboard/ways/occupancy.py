@@ -155,6 +155,10 @@ class _Part(NamedTuple):
     end_us: int
 
 
+#: What each leg holds, that of the standing behind the last one at the end.
+LegWindows = list[tuple[SlotWindow, ...]]
+
+
 def itinerary_windows(
     site: WaySite, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None
 ) -> list[SlotWindow]:
@@ -167,9 +171,7 @@ def itinerary_windows(
     return [window for part in parts for window in _part_windows(site, part)]
 
 
-def leg_windows(
-    site: WaySite, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None
-) -> list[tuple[SlotWindow, ...]]:
+def leg_windows(site: WaySite, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None) -> LegWindows:
     """The same windows leg by leg, those of the standing behind the last leg at the end."""
     return [tuple(_part_windows(site, part)) for part in _parts(site, itinerary, now_us, first_begin_us)]
 

@@ -12,7 +12,6 @@ All times are bus time in us. Pure: plans, progress and grants in, an order out.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise, takewhile
 from typing import NamedTuple
 
 from onboard.contract.codes import LegAction, Reason
@@ -20,22 +19,25 @@ from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Itinerary, Leg, Progress, Stamp
 from onboard.core.serial import is_newer, ranks_before
 from onboard.core.site import Segment
-from onboard.ways.occupancy import body_mm, leg_windows, reach_segments
-from onboard.ways.passing import TOLERANCE_US, BegunItinerary
+from onboard.ways.occupancy import LegWindows, body_mm, leg_windows, reach_segments
 from onboard.ways.reservations import FOREVER
-from onboard.ways.retreats import has_work, is_aged, moves, retreat_moves
+from onboard.ways.retreats import is_aged
 from onboard.ways.site import WaySite
+from onboard.ways.told_way import (
+    TOLERANCE_US,
+    BegunItinerary,
+    ToldWay,
+    Turn,
+    Turns,
+    conflict,
+    has_work,
+    meet,
+    moves,
+    overlap_us,
+)
 
-
-class Turn(NamedTuple):
-    """Occupation of a segment during one leg, ``to_come`` moving legs before the plan's end."""
-
-    to_come: int
-    from_us: int
-    to_us: int
-
-
-Turns = dict[Segment, list[Turn]]
+#: A plan that was told so long ago, us, was heard by whoever tells one now: one takes a second at most on a slow bus.
+CROSSED_US = 2_000_000
 
 
 class Meeting(NamedTuple):
@@ -48,81 +50,11 @@ class Meeting(NamedTuple):
 
 
 @dataclass
-class _Way:
-    """One machine's plan: its turns, and how far it has come.
-
-    ``in_hand`` is how many moving legs come behind leg number ``leg``, the one in hand; in that leg its body is at
-    index ``body`` and has left the segments ``left``. ``retreat`` moving legs come behind its last work.
-    """
-
-    itinerary: Itinerary
-    turns: Turns
-    moves: tuple[Leg, ...]
-    in_hand: int
-    retreat: int
-    leg: int = 0
-    body: int | None = None
-    left: set[Segment] = field(default_factory=set)
-
-    @property
-    def place(self) -> Segment:
-        """Where its body is, by its own word."""
-        leg = self.itinerary.legs[self.leg]
-        return Segment(leg.track, leg.from_index if self.body is None else self.body)
-
-    def open_turns(self, segment: Segment, turns: Turns | None = None) -> Iterator[Turn]:
-        """Turns on a segment that are not over, in order; with other times where ``turns`` are given."""
-        for turn in (self.turns if turns is None else turns).get(segment, ()):
-            if turn.to_come < self.in_hand or (turn.to_come == self.in_hand and segment not in self.left):
-                yield turn
-
-    def ends_as(self, told: "_Way") -> bool:
-        """Whether a plan ``told`` anew has what is left of this one: who makes the same trip once more begins again."""
-        count = len(told.moves)
-        return count <= self.in_hand + 1 and self.moves[len(self.moves) - count :] == told.moves
-
-    def go_on(self, known: "_Way", more: int) -> None:
-        """With the leg that was in hand in the plan told before, of which this one has ``more`` moving legs behind it.
-
-        A wait before it only tells when it began.
-        """
-        legs = range(len(self.itinerary.legs))
-        in_hand = known.in_hand + more
-        leg = next((leg for leg in legs if self.to_come(leg) == in_hand), None)
-        if leg is not None:
-            self.in_hand, self.leg, self.body, self.left = in_hand, leg, known.body, known.left
-
-    def line(self, segment: Segment, step: int) -> Iterator[int]:
-        """``to_come`` of the legs by which it passes a segment, as far as it goes on in one direction from here."""
-        for number in range(self.leg, len(self.itinerary.legs)):
-            leg = self.itinerary.legs[number]
-            if leg.action is LegAction.TRAVEL and leg.track == segment.track:
-                if (leg.to_index - leg.from_index) * step <= 0:
-                    return
-                if segment.index in range(leg.from_index, leg.to_index + step, step):
-                    yield self.to_come(number)
-            elif leg.action not in (LegAction.STAND, LegAction.WORK):
-                return
-            elif leg.from_index == segment.index:
-                yield self.to_come(number)
-
-    def stays(self, segment: Segment, first: int, last: int) -> bool:
-        """Whether it is in a segment without a break from its turn ``first`` moving legs before the end to ``last``."""
-        stay = [turn for turn in self.turns.get(segment, ()) if last <= turn.to_come <= first]
-        ends = [stay[0].to_come, stay[-1].to_come] if stay else []
-        return ends == [first, last] and all(one.to_us >= two.from_us for one, two in pairwise(stay))
-
-    def to_come(self, leg: int) -> int:
-        """How many moving legs come behind leg number ``leg``."""
-        return sum(moves(one) for one in self.itinerary.legs[leg + 1 :])
-
-
-@dataclass
 class PassingOrder:
     """The order of passing on all segments, as far as one machine has heard."""
 
     site: WaySite
-    _ways: dict[int, _Way] = field(default_factory=dict)
+    _ways: dict[int, ToldWay] = field(default_factory=dict)
     #: Turns of both under which two machines last agreed, lower node-ID first.
     _agreed: dict[tuple[int, int], tuple[Turns, Turns]] = field(default_factory=dict)
     #: How many segments beyond its own a body touches, by track.
@@ -137,21 +69,22 @@ class PassingOrder:
 
     # --- what is heard -----------------------------------------------------------------------------------------
 
-    def on_plan(self, plan: BegunItinerary, now_us: int) -> None:
-        """A firm plan under a new version, or a released one, which has no turns."""
-        node = plan.itinerary.sender
+    def on_plan(self, plan: Itinerary, windows: LegWindows, now_us: int) -> None:
+        """A firm plan under a new version, or a released one, which has no turns, with the windows of its legs."""
+        node = plan.sender
         known = self._ways.get(node)
-        way = self._way(plan, now_us)
+        way = ToldWay.of(self.site, plan, windows, now_us)
         continued = known is not None and known.ends_as(way)
-        before, same = (0, 0) if known is None or continued else _shared(known, way)
+        before, same = (0, 0) if known is None or continued else known.shared(way)
         if known is not None and (continued or same):
             way.go_on(known, 0 if continued else len(way.moves) - before)
+            way.before = known.turns if continued else {}
         self._ways[node] = way
         if same:
             self._lead_on(node, before, same, len(way.moves))
         for other in self._ways:
             if other != node:
-                self._agree(node, other, keep=continued or same > 0)
+                self._agree(node, other, now_us, keep=continued or same > 0)
 
     def _lead_on(self, node: int, before: int, same: int, now: int) -> None:
         """A plan of ``before`` moving legs leads elsewhere behind the first ``same``: of these the order stays."""
@@ -238,7 +171,7 @@ class PassingOrder:
             return []
         return [
             Meeting(segment, one, two, self._agreed_first(node, other, segment, one, two))
-            for segment, one, two in sorted(_meet(mine, theirs), key=lambda met: met[0])
+            for segment, one, two in sorted(meet(mine, theirs), key=lambda met: met[0])
         ]
 
     def leg_in_hand(self, plan: BegunItinerary) -> int:
@@ -282,8 +215,9 @@ class PassingOrder:
 
     def makes_way(self, plan: BegunItinerary, other: int, now_us: int) -> bool | None:
         """Whether ``other`` would yield to a ``plan`` that is not told yet; None where they do not meet."""
-        theirs, new = self._ways.get(other), self._way(plan, now_us)
-        pairs = [] if theirs is None else [(one, two) for _, one, two in _meet(new, theirs)]
+        windows = leg_windows(self.site, plan.itinerary, now_us, plan.first_begin_us)
+        theirs, new = self._ways.get(other), ToldWay.of(self.site, plan.itinerary, windows, now_us)
+        pairs = [] if theirs is None else [(one, two) for _, one, two in meet(new, theirs)]
         if theirs is None or not pairs:
             return None
         return self._first_yields(new, theirs, pairs) is False
@@ -305,7 +239,7 @@ class PassingOrder:
         way = self._ways.get(node)
         return way is not None and not self._clears(way) and not is_aged(way.itinerary.stamp, stamp)
 
-    def _first_yields(self, one: _Way, two: _Way, pairs: Sequence[tuple[Turn, Turn]]) -> bool | None:
+    def _first_yields(self, one: ToldWay, two: ToldWay, pairs: Sequence[tuple[Turn, Turn]]) -> bool | None:
         """Whether the first of two machines yields, the second (False), or neither by this rule (None)."""
         first = all(self._is_voluntary(one, turn, two) for turn, _ in pairs)
         second = all(self._is_voluntary(two, turn, one) for _, turn in pairs)
@@ -315,13 +249,13 @@ class PassingOrder:
             return False
         return None if first == second else first
 
-    def _is_voluntary(self, way: _Way, turn: Turn, other: _Way) -> bool:
+    def _is_voluntary(self, way: ToldWay, turn: Turn, other: ToldWay) -> bool:
         """Whether a turn is of a way back that is not begun and yields to the ``other``."""
         if turn.to_come >= min(way.retreat, way.in_hand) or self._clears(way):
             return False
         return not is_aged(way.itinerary.stamp, other.itinerary.stamp)
 
-    def _clears(self, way: _Way) -> bool:
+    def _clears(self, way: ToldWay) -> bool:
         """Whether a move without work has the stamp of work: it clears the way for that."""
         if has_work(way.itinerary):
             return False
@@ -329,12 +263,6 @@ class PassingOrder:
         return any(one.itinerary.stamp == stamp and has_work(one.itinerary) for one in self._ways.values())
 
     # --- inner works -------------------------------------------------------------------------------------------
-
-    def _way(self, plan: BegunItinerary, now_us: int) -> _Way:
-        itinerary = plan.itinerary
-        way = _Way(itinerary, _turns(self.site, plan, now_us), _moves(itinerary), 0, retreat_moves(itinerary))
-        way.in_hand = way.to_come(0) if itinerary.legs else 0
-        return way
 
     def _run_through(self, node: int, there: Segment | None) -> int | None:
         """Number of the leg of the next run of ``node``, where that leads through ``there``; else None."""
@@ -372,12 +300,16 @@ class PassingOrder:
     def _agreed_first(self, node: int, other: int, segment: Segment, one: Turn, two: Turn) -> int | None:
         """Who of two machines comes first in these turns by the times under which they last agreed."""
         agreed = self._agreed.get((min(node, other), max(node, other)))
-        if agreed is None:
-            return None
+        return None if agreed is None else self._first_by(agreed, node, other, segment, one, two)
+
+    def _first_by(
+        self, agreed: tuple[Turns, Turns], node: int, other: int, segment: Segment, one: Turn, two: Turn
+    ) -> int | None:
+        """The same by given times, of the lower node-ID first."""
         first, second = agreed if node < other else (agreed[1], agreed[0])
         mine = next((turn for turn in first.get(segment, ()) if turn.to_come == one.to_come), None)
         theirs = next((turn for turn in second.get(segment, ()) if turn.to_come == two.to_come), None)
-        if mine is None or theirs is None or _overlap_us(mine, theirs) > TOLERANCE_US:
+        if mine is None or theirs is None or overlap_us(mine, theirs) > TOLERANCE_US:
             return None
         return node if self._is_first(node, other, segment, mine, theirs) else other
 
@@ -415,14 +347,33 @@ class PassingOrder:
         one, two = self._first(node, segment), self._first(other, segment)
         return (one, two) if one is not None and two is not None else None
 
-    def _agree(self, node: int, other: int, *, keep: bool) -> None:
+    def _agree(self, node: int, other: int, now_us: int, *, keep: bool) -> None:
         """Take the present times as agreed where the two plans have no conflict; else keep the last ones, if any."""
         low, high = min(node, other), max(node, other)
         one, two = self._ways[low], self._ways[high]
-        if not _conflict(one, two):
+        if not conflict(one, two):
             self._agreed[low, high] = (one.turns, two.turns)
-        elif not keep:
+        elif not keep or self._have_crossed(node, other, now_us):
             self._agreed.pop((low, high), None)
+
+    def _have_crossed(self, teller: int, other: int, now_us: int) -> bool:
+        """Whether two plans were told at one time, each around the other's last one, and each has the other first.
+
+        Then each of the two knows another pair of plans as the last without conflict, and they would come behind each
+        other for ever: what they want at one time has no order, for whoever listens too.
+        """
+        new, known = self._ways[teller], self._ways[other]
+        agreed = self._agreed.get((min(teller, other), max(teller, other)))
+        if agreed is None or not known.before or now_us > known.told_us + CROSSED_US:
+            return False
+        if next(meet(new, known, known.before), None) is not None:
+            return False
+        around = (new.turns, known.before) if teller < other else (known.before, new.turns)
+        for segment, mine, theirs in meet(new, known):
+            firsts = {self._first_by(pair, teller, other, segment, mine, theirs) for pair in (agreed, around)}
+            if len(firsts - {None}) > 1:
+                return True
+        return False
 
     def _has_passed(self, node: int, segment: Segment) -> bool:
         """Whether a machine's plan, or a token that it gave back, tells that it was here; it may come again later."""
@@ -445,52 +396,5 @@ class PassingOrder:
         }
 
 
-def _shared(known: _Way, way: _Way) -> tuple[int, int]:
-    """How many moving legs of ``known``, from that with which ``way`` begins, and how many of these ``way`` has too."""
-    for start in range(max(0, len(known.moves) - known.in_hand - 1), len(known.moves)):
-        if known.moves[start : start + 1] == way.moves[:1]:
-            pairs = zip(known.moves[start:], way.moves, strict=False)
-            return len(known.moves) - start, sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
-    return 0, 0
-
-
-def _moves(itinerary: Itinerary) -> tuple[Leg, ...]:
-    return tuple(leg._replace(end_ms=0) for leg in itinerary.legs if moves(leg))
-
-
-def _turns(site: WaySite, plan: BegunItinerary, now_us: int) -> Turns:
-    legs = [leg for leg in plan.itinerary.legs if leg.track in site.tracks]
-    to_come = sum(moves(leg) for leg in legs)
-    found: Turns = {}
-    for number, windows in enumerate(leg_windows(site, plan.itinerary, now_us, plan.first_begin_us)):
-        if number < len(legs):
-            to_come -= moves(legs[number])
-        for window in windows:
-            turns = found.setdefault(window.segment, [])
-            if turns and turns[-1].to_come == to_come:
-                turns[-1] = turns[-1]._replace(to_us=max(turns[-1].to_us, window.to_us))
-            else:
-                turns.append(Turn(to_come, window.from_us, window.to_us))
-    return found
-
-
-def _conflict(one: _Way, two: _Way) -> bool:
-    """Whether two plans want one segment at one time, in what is not over."""
-    return next(_meet(one, two), None) is not None
-
-
-def _meet(one: _Way, two: _Way) -> Iterator[tuple[Segment, Turn, Turn]]:
-    """Where two plans want one segment at one time, in what is not over: the turns of both, in no order of segments."""
-    for segment in one.turns.keys() & two.turns.keys():
-        for mine in one.open_turns(segment):
-            for theirs in two.open_turns(segment):
-                if _overlap_us(mine, theirs) > TOLERANCE_US:
-                    yield segment, mine, theirs
-
-
 def _step(leg: Leg) -> int:
     return 1 if leg.to_index > leg.from_index else -1
-
-
-def _overlap_us(one: Turn, two: Turn) -> int:
-    return min(one.to_us, two.to_us) - max(one.from_us, two.from_us)

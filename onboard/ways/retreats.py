@@ -15,8 +15,8 @@ from onboard.core.site import Segment
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lifts import lift_at
 from onboard.ways.occupancy import final_position, leg_begins_us
-from onboard.ways.passing import BegunItinerary
 from onboard.ways.site import WaySite
+from onboard.ways.told_way import BegunItinerary, moves, worked
 
 #: A way back yields to no stamp that is younger than its own by more than this, ms: longer than a task of the shipped
 #: sites takes from award to refuge, and half of what a machine that waits may stand before it counts as an obstacle.
@@ -29,21 +29,6 @@ class HeldBack(NamedTuple):
     plan: BegunItinerary
     place: Segment
     since_us: int
-
-
-def moves(leg: Leg) -> bool:
-    """Whether a leg is more than standing: waits come and go as a plan is delayed."""
-    return leg.action is not LegAction.STAND
-
-
-def retreat_moves(itinerary: Itinerary) -> int:
-    """How many moving legs a plan has behind its last work; all, where it has none."""
-    return sum(moves(leg) for leg in itinerary.legs[_worked(itinerary) :])
-
-
-def has_work(itinerary: Itinerary) -> bool:
-    """Whether a plan still carries or fetches."""
-    return _worked(itinerary) > 0
 
 
 def is_aged(stamp: Stamp, other: Stamp) -> bool:
@@ -61,7 +46,7 @@ def held_back(site: WaySite, plan: BegunItinerary, leg_in_hand: int, from_us: in
         return None
     begins_us = leg_begins_us(plan.itinerary, now_us, plan.first_begin_us)
     ends_us = [*begins_us[1:], from_us]
-    kept = _worked(plan.itinerary)
+    kept = worked(plan.itinerary)
     while kept < len(legs) and (kept <= leg_in_hand or begins_us[kept] < from_us or _is_aboard(site, legs[:kept])):
         kept += 1
     stays = replace(plan.itinerary, legs=legs[:kept])
@@ -104,11 +89,6 @@ def _is_through(leg: Leg, place: Segment) -> bool:
     if leg.action is LegAction.TRAVEL and leg.from_index == leg.to_index:
         return False
     return min(leg.from_index, leg.to_index) <= place.index <= max(leg.from_index, leg.to_index)
-
-
-def _worked(itinerary: Itinerary) -> int:
-    """How many legs there are up to the last work."""
-    return max((number for number, leg in enumerate(itinerary.legs, 1) if leg.action is LegAction.WORK), default=0)
 
 
 def _is_aboard(site: WaySite, legs: tuple[Leg, ...]) -> bool:

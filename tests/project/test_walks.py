@@ -12,7 +12,7 @@ import pytest
 from tests.project.walks import ROOT, Walks, walks
 
 #: Files that a received bid visits at the median, over all machines of the scene.
-BID_FILES = 29
+BID_FILES = 27
 #: Files through which a robot's step hands on the time, and how often the walk comes back to one of them.
 STEP_FILES, STEP_RETURNS = 24, 41
 

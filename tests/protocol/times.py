@@ -7,7 +7,7 @@ from onboard.core import authority, backoff, bus_time, mirror, site
 from onboard.core.negotiation import bidding, initiator, negotiation, participant, sub_calls, trust, winners
 from onboard.holon import fixed_times, holding, presence, regeneration, rights, witness
 from onboard.systems.car_park import bay_calls, bay_task, promises, sill, stall, starting, stewardship, travel
-from onboard.ways import all_or_none, left_behind, passing, retreats, standing
+from onboard.ways import all_or_none, left_behind, passing_order, retreats, standing, told_way
 from onboard.wire import decoder
 
 SITE = find_site("small")
@@ -79,7 +79,7 @@ TIMES: dict[str, tuple[Time, ...]] = {
         Time("T_late", trust.LATE_MS * 1000, _FIXED, "mean lateness beyond twice the others' that counts as a fail"),
     ),
     "plans": (
-        Time("T_round", passing.TOLERANCE_US, _FIXED, "windows that overlap by no more do not meet"),
+        Time("T_round", told_way.TOLERANCE_US, _FIXED, "windows that overlap by no more do not meet"),
         Time("T_aged", retreats.AGES_AFTER_MS * 1000, _FIXED, "a way back yields to no stamp younger by more"),
         Time("T_place", stall.PLACE_US, _FIXED, "a place is told at the next border where the last word is older"),
     ),
@@ -95,6 +95,7 @@ TIMES: dict[str, tuple[Time, ...]] = {
         Time("T_view", rights.ASK_AGAIN_US, _FIXED, "whoever sees another order is asked at most so often"),
         Time("T_order", travel.ORDER_PATIENCE_US, _FIXED, "no agreed order for so long: all or none"),
         Time("T_whole", all_or_none.PATIENCE_REPEATS * _REPEAT_US, "10 T_token", "an incomplete set is kept so long"),
+        Time("T_cross", passing_order.CROSSED_US, _FIXED, "of two plans told within this neither heard the other"),
         Time("T_left", left_behind.LEFT_US, _FIXED, "what was left behind goes back at the latest"),
     ),
     "lifts": (Time("T_sill", sill.ASK_AGAIN_US, _FIXED, "a lift's word that does not come is asked for"),),

@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 
+import pytest
+
 from onboard.contract.codes import Grade, LegAction, Reason, Side
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Itinerary, Leg, Progress, Stamp
 from onboard.core.site import Segment
-from onboard.ways.passing import BegunItinerary, next_plan
+from onboard.ways.occupancy import leg_windows
 from onboard.ways.passing_order import PassingOrder
+from onboard.ways.told_way import next_plan
 from tests.sites import one_floor
 
 SITE = one_floor(robots=2)
@@ -21,8 +24,8 @@ def order_of(*plans: Itinerary) -> PassingOrder:
     return order
 
 
-def tell(order: PassingOrder, itinerary: Itinerary) -> None:
-    order.on_plan(BegunItinerary(itinerary, itinerary.stamp.award_ms * 1000), 0)
+def tell(order: PassingOrder, itinerary: Itinerary, now_us: int = 0) -> None:
+    order.on_plan(itinerary, leg_windows(SITE, itinerary, now_us), now_us)
 
 
 def plan(node: int, way: Sequence[tuple[int, int, int]], version: int = 1, begin_s: int = 0) -> Itinerary:
@@ -110,7 +113,7 @@ def test_who_makes_the_same_trip_once_more_is_at_its_begin_again() -> None:
 def test_the_same_trip_once_more_did_not_begin_with_the_first_one() -> None:
     order = PassingOrder(SITE)
     first = next_plan(None, 0, plan(ALICE, [(2, 8, 20), (8, 2, 40)]), 0)
-    order.on_plan(first, 0)
+    tell(order, first.itinerary)
     again = plan(ALICE, [(2, 8, 120), (8, 2, 140)], version=2, begin_s=100)
     assert next_plan(first, order.leg_in_hand(first), again, 0).first_begin_us == 0, "nobody has heard that it set off"
     order.on_progress(progress(ALICE, 1, 2))
@@ -119,7 +122,7 @@ def test_the_same_trip_once_more_did_not_begin_with_the_first_one() -> None:
 
 def test_a_released_plan_is_nobodys_predecessor() -> None:
     order = passing()
-    order.on_plan(BegunItinerary(Itinerary(ALICE, 2, Grade.RELEASED, Stamp(0, ALICE, 0), ()), 0), 0)
+    tell(order, Itinerary(ALICE, 2, Grade.RELEASED, Stamp(0, ALICE, 0), ()))
     assert order.predecessor(BOB, Segment(1, 7)) == NOBODY
 
 
@@ -131,6 +134,26 @@ def test_a_delay_into_anothers_time_keeps_the_order_and_a_new_way_does_not() -> 
     assert order.predecessor(BOB, Segment(1, 7)) == ALICE
     tell(order, plan(ALICE, [(2, 2, 70), (2, 9, 91), (9, 2, 112)], version=3))
     assert order.predecessor(BOB, Segment(1, 7)) == NOBODY, "it planned anew and has come behind"
+
+
+@pytest.mark.parametrize(("apart_us", "first"), [(900_000, {None}), (5_000_000, {ALICE, BOB})])
+def test_of_two_plans_told_at_one_time_nobody_has_the_other_first(apart_us: int, first: set[int | None]) -> None:
+    """Each is made around the other's last one, and is behind it; both stood for minutes (drawn lines, 145)."""
+    before = (
+        plan(ALICE, [(2, 2, 10), (2, 8, 30), (8, 2, 50)]),
+        plan(BOB, [(12, 12, 60), (12, 6, 80), (6, 12, 99)]),
+    )
+    anew = (
+        plan(ALICE, [(2, 2, 100), (2, 8, 120), (8, 2, 140)], version=2),
+        plan(BOB, [(12, 12, 90), (12, 6, 110), (6, 12, 130)], version=2),
+    )
+    found = set()
+    for one, two in (anew, anew[::-1]):
+        order = order_of(*before)
+        tell(order, one)
+        tell(order, two, apart_us)
+        found |= {meeting.first for meeting in order.meetings(ALICE, BOB)}
+    assert found == first
 
 
 def test_a_request_of_a_plan_not_heard_yet_is_refused_as_behind() -> None:

@@ -30,8 +30,8 @@ from onboard.systems.car_park.site import open_end
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.systems.car_park.unsaid import UnsaidParkings
 from onboard.ways.mirror import WayFleet
-from onboard.ways.retreats import has_work
 from onboard.ways.tokens import car_token
+from onboard.ways.told_way import has_work
 
 #: A winner of whose task nothing shows is told after this that it has it, and again, us: a plan is told within a second
 #: of its award, and who finds no way for longer than this is asked once, or gives the task back.

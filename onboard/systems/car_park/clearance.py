@@ -12,11 +12,11 @@ from onboard.systems.car_park.site import CarPark
 from onboard.ways.effort import Effort
 from onboard.ways.mirror import WayMirror
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
-from onboard.ways.passing import BegunItinerary
 from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import Reservations
 from onboard.ways.retreats import HeldBack, held_back
 from onboard.ways.sipp import NoRoute, planning
+from onboard.ways.told_way import BegunItinerary
 
 #: Bound of one route search, in expansions (a wall-time bound would not replay).
 MAX_EXPANSIONS = 4_000

@@ -35,10 +35,10 @@ from onboard.systems.car_park.site import CarPark, class_of_end, end_at, one_a_s
 from onboard.ways.effort import Effort, Search
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayMirror
-from onboard.ways.passing import BegunItinerary
 from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import FOREVER, Reservations
 from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, planning
+from onboard.ways.told_way import BegunItinerary
 
 #: From the deadline to the first motion: award frame, journal writes and the first tokens (measured in tests).
 AWARD_LATENCY_US = 150_000

@@ -22,11 +22,10 @@ from onboard.systems.car_park.program import CarStep, Program
 from onboard.systems.car_park.standoff import Standoff
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayFleet
-from onboard.ways.passing import TOLERANCE_US
-from onboard.ways.passing_order import Meeting, Turn
+from onboard.ways.passing_order import Meeting
 from onboard.ways.reservations import FOREVER
-from onboard.ways.retreats import has_work
 from onboard.ways.site import WaySite
+from onboard.ways.told_way import TOLERANCE_US, Turn, has_work
 
 
 class YieldDecision(Enum):

@@ -27,10 +27,10 @@ from onboard.systems.car_park.travel import Carriage
 from onboard.ways.lifts import gate, lift_at
 from onboard.ways.mirror import WayFleet
 from onboard.ways.occupancy import itinerary_windows
-from onboard.ways.passing import BegunItinerary
 from onboard.ways.reservations import FOREVER, SlotWindow
 from onboard.ways.retreats import put_off
 from onboard.ways.tokens import car_token
+from onboard.ways.told_way import BegunItinerary
 
 #: A plan that finds no way is tried again after this, us: others' plans change within seconds.
 RETRY_US = 3_000_000

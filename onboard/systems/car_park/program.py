@@ -15,9 +15,9 @@ from onboard.core.serial import from_bus_ms, successor, to_bus_ms
 from onboard.core.site import Segment, Station
 from onboard.ways.lifts import lift_at, platform_on, sill
 from onboard.ways.occupancy import hop_origins
-from onboard.ways.passing import TOLERANCE_US
 from onboard.ways.sipp import Route
 from onboard.ways.site import WaySite
+from onboard.ways.told_way import TOLERANCE_US
 
 #: Most steps that fit in an itinerary: the leg number has 5 bits.
 MAX_STEPS = 31
