@@ -116,6 +116,15 @@ def test_own_the_car_comes_out_where_it_came_in() -> None:
     assert ready_at(scene) == [1]
 
 
+def test_own_it_comes_out_there_whoever_asks_before_it_stands_at_a_place() -> None:
+    """Two cars come in, one at each; the driver of the second asks at the first desk while a robot has the other."""
+    scene = play(two("own"), stays((0, 3_000), (2, 30)))
+    asked_us, asked = scene.first(DeskEvent, lambda one: one.event is DeskInput.TICKET)
+    parked_us, _ = scene.first(TaskReport, lambda one: one.phase is TaskPhase.DONE and one.task == asked.car)
+    assert (asked.sender, asked.car.origin) == (1, 2) and asked_us < parked_us
+    assert ready_at(scene)[0] == 2
+
+
 def test_two_customers_at_one_desk_are_sent_to_both_when_the_suited_one_has_two() -> None:
     scene = play(two("nearest"), stays((0, 400), (60, 401), (120, 402)))
     assert_served(scene, 3)

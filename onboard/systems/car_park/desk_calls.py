@@ -139,7 +139,9 @@ class DeskCalls:
         place = custody.place_of(self.fleet, car)
         obstacles = self.fleet.mirror.obstacles.machines
         others = [node for node in self.generation.exits() if node != self.fleet.node_id and node not in obstacles]
-        if place is None or not others:
+        # Of a car without a place no way tells which suits: whose it is by the site's word is known all the same.
+        is_known = place is not None or (self.park.desk is DeskPolicy.OWN and car.origin != self.fleet.node_id)
+        if not is_known or not others:
             return None
         task, number = self.memory.next_reference(self.fleet)
         self.asked[car] = AskedTicket(task, since_us=now_us)
