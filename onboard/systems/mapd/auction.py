@@ -7,6 +7,7 @@ lowest bid of all wins first: it is the one that speaks soonest (design, section
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from onboard.systems.mapd.floor import Floor
 from onboard.systems.mapd.nearby import Nearby
@@ -117,13 +118,19 @@ def bids(
     floor: Floor, rule: BidWeights, offer: Availability, tasks: Iterable[TransportTask], backlog: Backlog
 ) -> list[tuple[int, int]]:
     """The bid and the number of each task to which a way leads, in the order of ``tasks``; as ``cost`` one by one."""
-    return offered(floor, rule, offer, backlog, shares(floor, rule, tasks, backlog))
+    return offered(rule, offer, backlog, shares(floor, rule, tasks, backlog))
 
 
-def shares(
-    floor: Floor, rule: BidWeights, tasks: Iterable[TransportTask], backlog: Backlog
-) -> list[tuple[int, int, int]]:
-    """Pick-up and number of each task, and what of a bid for it is the same for all robots; none that has no way."""
+class Share(NamedTuple):
+    """What of a bid for one task is the same for all robots, and the steps to its pick-up from each cell."""
+
+    steps: Sequence[int]
+    number: int
+    part: int
+
+
+def shares(floor: Floor, rule: BidWeights, tasks: Iterable[TransportTask], backlog: Backlog) -> list[Share]:
+    """That of each task which can be delivered, in the order of ``tasks``."""
     steps_to = floor.steps_to
     younger = (rule.younger_at_last if backlog.is_all else rule.younger) * backlog.robots
     count, robots, crowd, nearby = backlog.tasks, backlog.robots, backlog.crowd, backlog.nearby
@@ -141,22 +148,16 @@ def shares(
             later += shorter * (longest - loaded)
             if crowd and nearby is not None:
                 later += beside * nearby.dearer(task) // 100
-            found.append((pickup, task.number, weight_loaded * loaded + later))
+            found.append(Share(steps_to(pickup), task.number, weight_loaded * loaded + later))
     return found
 
 
-def offered(
-    floor: Floor, rule: BidWeights, offer: Availability, backlog: Backlog, parts: Iterable[tuple[int, int, int]]
-) -> list[tuple[int, int]]:
-    """One robot's bid for each task that it can reach, with its number, from the ``shares`` of all robots."""
-    steps_to, cell, weight, robots = floor.steps_to, offer.cell, rule.empty, backlog.robots
+def offered(rule: BidWeights, offer: Availability, backlog: Backlog, known: Iterable[Share]) -> list[tuple[int, int]]:
+    """One robot's bid for each task that it can reach, with its number, from the ``shares``."""
+    cell, weight, robots = offer.cell, rule.empty, backlog.robots
     lighter = backlog.crowd * min(4 * robots, backlog.tasks) // (4 * robots)
     wait = (100 * rule.wait - (rule.wait - rule.crowded_wait) * lighter) * offer.steps // 100
-    return [
-        (wait + weight * empty + part, number)
-        for pickup, number, part in parts
-        if (empty := steps_to(pickup)[cell]) < FAR
-    ]
+    return [(wait + weight * empty + part, number) for steps, number, part in known if (empty := steps[cell]) < FAR]
 
 
 def winners(

@@ -8,7 +8,7 @@ the answer goes by what is asked alone.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from onboard.systems.mapd.auction import Availability, Backlog, BidWeights, offered, shares
+from onboard.systems.mapd.auction import Availability, Backlog, BidWeights, Share, offered, shares
 from onboard.systems.mapd.floor import Floor
 from onboard.systems.mapd.nearby import Nearby
 from onboard.systems.mapd.tasks import TransportTask
@@ -24,7 +24,7 @@ class Prospects:
     #: What was asked last, and what came of it.
     _asked: tuple[int, BidWeights, Sequence[TransportTask]] | None = None
     _backlog: Backlog = field(init=False)
-    _shares: Sequence[tuple[int, int, int]] = ()
+    _shares: Sequence[Share] = ()
 
     def __post_init__(self) -> None:
         self._nearby = Nearby(self.floor)
@@ -42,4 +42,4 @@ class Prospects:
             self._backlog = Backlog.of(self._nearby, tasks, self.robots, step)
             self._shares = shares(self.floor, rule, tasks, self._backlog)
             self._asked = asked
-        return offered(self.floor, rule, offer, self._backlog, self._shares)
+        return offered(rule, offer, self._backlog, self._shares)
