@@ -65,6 +65,7 @@ class Controller:
         self._codecs = (fleet, device)
         holon.listen(fleet.speakers)
         self._decoders = (Decoder(fleet), Decoder(device))
+        self._feed = self._decoders[0].feed
         holon.wire_drops = (*(one.drops for one in self._decoders), self._queue_drops)
         self._inbox: deque[tuple[Callable[[Frame, int], list[Effect]], Frame, int]] = deque()
         self._outbox: deque[Effect] = deque()
@@ -83,7 +84,7 @@ class Controller:
         """Join both buses and let the holon begin. To be called on the running loop."""
         self._loop = asyncio.get_running_loop()
         self.stopped = self._loop.create_future()
-        self.ports.fleet_bus.subscribe(partial(self._post, self._fleet_frame))
+        self.ports.fleet_bus.subscribe(self._on_fleet_frame)
         self.ports.device_bus.subscribe(partial(self._post, self._device_frame))
         self._outbox.extend(in_runs(self.holon.start(self._now_us())))
         self.ports.watchdog.ready()
@@ -150,6 +151,20 @@ class Controller:
             self._inbox.append((handle, frame, time_us))
         else:
             self._queue_drops[Reason.QUEUE_FULL] += 1
+
+    def _on_fleet_frame(self, frame: Frame, time_us: int) -> None:
+        """The same as ``_post`` for the fleet bus, without its calls: this is for every frame."""
+        if self._writing is not None or self._inbox:
+            self._post(self._fleet_frame, frame, time_us)
+            return
+        try:
+            message = self._feed(frame, time_us)
+            if message is not None and (effects := self.holon.receive(message, time_us)):
+                self._outbox.extend(in_runs(effects))
+        except Exception as error:  # noqa: BLE001  # as in ``_guarded``
+            self._give_up(error)
+        if self._outbox or not self.holon.schedule.is_asked:
+            self._carry_out()
 
     def _fleet_frame(self, frame: Frame, time_us: int) -> list[Effect]:
         message = self._decoders[0].feed(frame, time_us)

@@ -142,11 +142,13 @@ class TokenBook:
 
     def holds(self, key: TokenKey) -> bool:
         """Whether this node is the holder now; a token never seen to move is with its genesis holder."""
-        return self.is_synced and (key in self.held or self._is_own_at_first(key))
+        return self.is_synced and (
+            key in self.held if key in self.seen else genesis_holder(self.site, key) == self.node_id
+        )
 
     def is_mine_by_journal(self, key: TokenKey) -> bool:
         """Whether this node holds a token if its journal is all that ever was."""
-        return key in self.held or self._is_own_at_first(key)
+        return key in self.held if key in self.seen else genesis_holder(self.site, key) == self.node_id
 
     def mine(self) -> list[TokenKey]:
         """Tokens that came to this node and that it may use or give away now."""
@@ -256,20 +258,20 @@ class TokenBook:
         version = self.own_version(key) % (1 << SEEN_VERSION_BITS)
         return [Send(TokenRefusal(self.node_id, key.kind, key.number, version, request.sender, verdict))]
 
-    def on_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
+    def on_grant(self, grant: TokenGrant, now_us: int, known: TokenKey | None = None) -> list[Effect]:
         """Accept a token if addressed to me, newer than all that I did with it, and from whom I believe to hold it.
 
         One that needs another word first is as if it had not been heard: its giver says both again. Else learn where it
         went.
         """
-        key = TokenKey(grant.token_kind, grant.token)
+        key = TokenKey(grant.token_kind, grant.token) if known is None else known
         if grant.holder != self.node_id:
             return self._overheard(key, grant.sender, grant.version, grant.holder, now_us)
         return self._offered(key, grant, now_us)
 
-    def on_held(self, statement: TokenHeld, now_us: int = 0) -> list[Effect]:
+    def on_held(self, statement: TokenHeld, now_us: int = 0, known: TokenKey | None = None) -> list[Effect]:
         """The new holder speaks: its grant need not be repeated. Who is not believed to hold it is a claimant."""
-        key = TokenKey(statement.token_kind, statement.token)
+        key = TokenKey(statement.token_kind, statement.token) if known is None else known
         sender, version = statement.sender, statement.version
         if self.holds(key):
             is_old = version < self.own_version(key)
@@ -370,9 +372,6 @@ class TokenBook:
         return version > max(self.seen.get(key, 0), self.beliefs.latest(key).version)
 
     # --- inner works -----------------------------------------------------------------------------------------------
-
-    def _is_own_at_first(self, key: TokenKey) -> bool:
-        return key not in self.seen and genesis_holder(self.site, key) == self.node_id
 
     def _hold(self, key: TokenKey, version: int) -> None:
         self.held[key] = self.seen[key] = version

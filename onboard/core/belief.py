@@ -49,7 +49,7 @@ class Beliefs:
     def take_up(self, key: Key, version: int, holder: int, *, confirmed: bool = False, giver: int = NOBODY) -> None:
         """What counts from now on; hints that are no newer end."""
         self.changes += 1
-        self.verified[key] = Belief(version, holder, confirmed, giver)
+        self.verified[key] = tuple.__new__(Belief, (version, holder, confirmed, giver))
         hint = self.hints.get(key)
         if hint is not None and hint.version <= version:
             del self.hints[key]

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from onboard.contract.codes import Grade, KindCode, MachineState, Reason
 from onboard.contract.constants import NOBODY
-from onboard.contract.messages import Heartbeat, Itinerary, Message, Progress
+from onboard.contract.messages import Heartbeat, Itinerary, Message, Progress, TokenGrant, TokenHeld
 from onboard.core.authority import TokenBook
 from onboard.core.effects import Effect
 from onboard.core.serial import is_newer
@@ -25,7 +25,7 @@ from onboard.core.token_keys import TokenKey
 MISSED_HEARTBEATS = 3
 
 
-@dataclass
+@dataclass(slots=True)
 class Peer:
     """Last word of one other machine; times in bus us."""
 
@@ -159,8 +159,8 @@ class Mirror:
     def hear(self, message: Message, now_us: int) -> None:
         """Any message, before whoever it is for takes it up."""
 
-    def settle(self, key: TokenKey) -> Message | None:
-        """A word that waited, and is proven by what was just heard of its token."""
+    def settle(self, word: TokenGrant | TokenHeld) -> Message | None:
+        """Another that waited, and is proven by what was just heard of its token."""
         return None
 
     def statements(self) -> list[Effect]:

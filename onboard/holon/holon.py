@@ -169,7 +169,7 @@ class Holon:
             return []
         before = self.schedule.passes_by(message, now_us)
         is_usual = before is not None
-        if not is_usual:
+        if before is None:
             before = self.schedule.before(message, now_us)
             if message.sender == self.node_id:
                 self.schedule.changed()
@@ -179,9 +179,9 @@ class Holon:
                 self.drops[why] += 1
                 self.schedule.changed()
                 return self.admission.passed_over(message, why) if self.halted is None else []
-        self.holding.heard(now_us)
-        if isinstance(message, BusTime):
-            return self._on_bus_time(message, local_us)
+            self.holding.heard(now_us)
+            if isinstance(message, BusTime):
+                return self._on_bus_time(message, local_us)
         if is_usual:
             effects = self._take_up(message, now_us, is_usual=True)
         elif self.part.is_deaf_to(message, self.drops):
@@ -194,10 +194,7 @@ class Holon:
         return self._settle(effects, now_us)
 
     def _take_up(self, message: Message, now_us: int, *, is_usual: bool = False) -> list[Effect]:
-        """Tell every part of a message: first what all believe, then what this machine does with it.
-
-        Where all ``is_usual`` nobody was silent, and that its sender lives is noted.
-        """
+        """Tell every part of a message: what all believe first. Where all ``is_usual`` its sender's life is noted."""
         effects: list[Effect] = []
         if not is_usual:
             effects = self._awake(now_us)
@@ -209,11 +206,11 @@ class Holon:
         handler = self._handlers.get(type(message))
         if handler is not None:
             effects += handler(message, now_us)
-        if isinstance(message, (Itinerary, Heartbeat)):
+        if not is_usual and isinstance(message, (Itinerary, Heartbeat)):
             self.presence.heard(message.sender, now_us)
         effects += self.behaviour.hear(message, now_us)
         if isinstance(message, (TokenGrant, TokenHeld)):
-            proven = self.mirror.settle(TokenKey(message.token_kind, message.token))
+            proven = self.mirror.settle(message)
             if proven is not None:
                 self.schedule.changed()
                 effects += self.behaviour.hear(proven, now_us)
@@ -352,7 +349,8 @@ class Holon:
             if why is not Reason.NONE:
                 self.drops[why] += 1
                 return []
-        return self._carry_out(self.negotiation.receive(message, now_us), now_us)
+        outcome = self.negotiation.receive(message, now_us)
+        return self._carry_out(outcome, now_us) if outcome else []
 
     def _on_itinerary(self, itinerary: Itinerary, now_us: int) -> list[Effect]:
         self.mirror.on_itinerary(itinerary, now_us)

@@ -22,7 +22,7 @@ from onboard.contract.messages import (
     TokenRequest,
     TokenSeen,
 )
-from onboard.core.authority import Claim, TokenBook, TokenKey, may_exist
+from onboard.core.authority import Claim, TokenBook, TokenKey, genesis_holder
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect, Send
 from onboard.holon.witness import Witness
@@ -62,7 +62,7 @@ class RightsTalk:
             TokenGrant: self._on_grant,
             TokenHeld: self._on_held,
             TokenRefusal: self._on_refusal,
-            TokenDispute: self._on_dispute,
+            TokenDispute: self.tokens.on_dispute,
             TokenGiven: self._on_given,
             TokenSeen: self._on_seen,
             SyncDone: self.witness.on_done,
@@ -142,7 +142,8 @@ class RightsTalk:
         if self.tokens.is_news(key, grant.version) and not self.tokens.holds(key):
             self.mirror.on_return(grant.sender, key)
             self.petitions.close(key, grant.holder)
-        return self._after(key, self.tokens.on_grant(grant, now_us), now_us)
+        effects = self.tokens.on_grant(grant, now_us, key)
+        return self._after(key, effects, now_us) if effects else effects
 
     def _on_held(self, statement: TokenHeld, now_us: int) -> list[Effect]:
         key = TokenKey(statement.token_kind, statement.token)
@@ -150,7 +151,8 @@ class RightsTalk:
             return []
         self.witness.hear(statement)
         self.petitions.close(key, statement.sender)
-        return self._after(key, self.tokens.on_held(statement, now_us), now_us)
+        effects = self.tokens.on_held(statement, now_us, key)
+        return self._after(key, effects, now_us) if effects else effects
 
     def _on_given(self, word: TokenGiven, now_us: int) -> list[Effect]:
         key = TokenKey(word.token_kind, word.token)
@@ -165,12 +167,10 @@ class RightsTalk:
             self.tokens.on_seen(word)
         return []
 
-    def _on_dispute(self, dispute: TokenDispute, now_us: int) -> list[Effect]:
-        return self.tokens.on_dispute(dispute, now_us)
-
     def _may_move(self, key: TokenKey, holder: int) -> bool:
         """Whether the site has such a token and such a holder, so that nobody fills the book with what cannot be."""
-        if may_exist(self.site, key) and holder in self.site.machines:
+        machines = self.site.machines
+        if holder in machines and genesis_holder(self.site, key) in machines:
             return True
         self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
         return False

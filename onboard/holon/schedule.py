@@ -4,8 +4,9 @@ Every event either changes nothing here or lets all of this go (``changed``); it
 next. ``sweeps`` keeps nothing: every event is followed by every part, so that a test can see that both do the same.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol, get_args, runtime_checkable
+from typing import Any, ClassVar, Protocol, get_args, runtime_checkable
 
 from onboard.contract.codes import TokenKind
 from onboard.contract.constants import NOBODY
@@ -19,8 +20,10 @@ from onboard.holon.rights import RightsTalk
 from onboard.holon.taking_part import TakingPart
 
 _OVERHEARD = frozenset(get_args(OverheardWord))
+#: What a machine may say that may be none of my business, each with whether it names a token.
+_Passed = dict[type[Message], bool]
 #: Of a node whose last word may change something.
-_NOBODY: tuple[Peer | None, frozenset[type[Message]]] = None, frozenset()
+_NOBODY: tuple[Peer | None, _Passed] = None, {}
 
 
 @runtime_checkable
@@ -61,26 +64,31 @@ class Schedule:
     _rest_of: int | None = None
     #: From when on the behaviour is to see every event.
     _looks_from_us: int = 0
-    #: Who said last what changes nothing, by node, and what it may say.
-    _unchanged: dict[int, tuple[Peer, frozenset[type[Message]]]] = field(default_factory=dict)
+    #: Who said last what changes nothing, by node, and what of it may be passed by; that by all that it may say.
+    _unchanged: dict[int, tuple[Peer, _Passed]] = field(default_factory=dict)
+    _passed: dict[frozenset[type[Message]], _Passed] = field(default_factory=dict)
     #: The mirror, the epoch of the rights, whether I send bus time, and which other site counts, as they were then.
     _ground: tuple[int, int, bool, int] | None = None
     _attentive: Attentive | None = field(init=False)
-    _selective: Selective | None = field(init=False)
+    #: What it says of words that are in ``_overheard``.
+    _heeds: Callable[[Any], bool] | None = field(init=False)
     #: Classes of words that may be none of my business.
     _overheard: frozenset[type[Message]] = _OVERHEARD
 
     def __post_init__(self) -> None:
         self.begins_anew(self.behaviour)
         self._sleeps_after_us = SLEPT_BEATS * self.fleet.site.timing.heartbeat_us
+        self._presence, self._holding, self._tokens = self.part.presence, self.part.holding, self.fleet.tokens
 
     def begins_anew(self, behaviour: Behaviour) -> None:
         """Another behaviour from now on."""
         self.behaviour = behaviour
         self._attentive = behaviour if isinstance(behaviour, Attentive) and not self.sweeps else None
-        self._selective = behaviour if isinstance(behaviour, Selective) and not self.sweeps else None
-        self._overheard = _OVERHEARD if self._selective is None else _OVERHEARD | self._selective.overhears
+        self._heeds = None if self._attentive is None else self._attentive.heeds
+        own = behaviour.overhears if isinstance(behaviour, Selective) and not self.sweeps else frozenset()
+        self._overheard = _OVERHEARD | own
         self._unchanged.clear()
+        self._passed.clear()
         self.changed()
 
     def changed(self) -> None:
@@ -108,15 +116,12 @@ class Schedule:
         if not self.is_known:
             self._work_due_us, self.is_known = self._first_work_us(), True
             self._looks_from_us = self._attentive.looks_from() if self._attentive is not None else 0
-            self._is_due_from()
+            self.has_spoken()
             self._keep_unchanged()
         return self._due_us
 
     def has_spoken(self) -> None:
         """What is said at fixed times was said, and nothing else was done."""
-        self._is_due_from()
-
-    def _is_due_from(self) -> None:
         self._due_us = due_us = self.fixed.due_us(self._work_due_us)
         if due_us is not None:
             self.waits_until_us = min(due_us, self._looks_from_us)
@@ -182,7 +187,10 @@ class Schedule:
             return False
         peer = self.fleet.mirror.peers[beat.sender]
         peer.beat, peer.mirror_digest = beat, beat.mirror_digest
-        self._unchanged[beat.sender] = peer, self.admission.says(beat.sender)
+        says = self.admission.says(beat.sender)
+        if says not in self._passed:
+            self._passed[says] = {kind: "token_kind" in kind.__match_args__ for kind in says & self._overheard}
+        self._unchanged[beat.sender] = peer, self._passed[says]
         return True
 
     def passes_by(self, message: Message, now_us: int) -> int | None:
@@ -191,15 +199,15 @@ class Schedule:
         Nothing is due here, neither its sender nor I was silent, and it counts and may say this: that was looked at
         when its last sign of life changed nothing. This one is noted.
         """
-        if now_us >= self.waits_until_us or type(message) not in self._overheard:
-            return None
         peer, said = self._unchanged.get(message.sender, _NOBODY)
-        if peer is None or type(message) not in said or now_us - peer.heard_at_us > self._sleeps_after_us:
+        names_token = said.get(type(message))
+        if peer is None or names_token is None or now_us - peer.heard_at_us > self._sleeps_after_us:
             return None
-        if getattr(message, "token_kind", None) is TokenKind.RUN:
+        if now_us >= self.waits_until_us or (names_token and getattr(message, "token_kind", None) is TokenKind.RUN):
             return None
-        peer.heard_at_us = self.part.presence.active_us = now_us
-        return self.fleet.tokens.changes
+        peer.heard_at_us = self._presence.active_us = now_us
+        self._holding.heard(now_us)
+        return self._tokens.changes
 
     def _keep_unchanged(self) -> None:
         """Let go of whose word said nothing new, unless all that this was judged by is as it was."""
@@ -224,15 +232,12 @@ class Schedule:
 
     def is_overheard(self, message: Message, before: int | None) -> bool:
         """Whether a message changed no right of mine, as they were ``before``, and nothing that anybody here reads."""
-        if before != self.fleet.tokens.changes or not self.is_known:
+        heeds = self._heeds
+        if heeds is None or before != self._tokens.changes or not self.is_known:
             return False
-        attentive = self._attentive
-        if attentive is None or self._asks_another(message):
-            return attentive is not None
-        if isinstance(message, OverheardWord):
-            return not attentive.heeds(message)
-        selective = self._selective
-        return selective is not None and type(message) in selective.overhears and not selective.heeds(message)
+        if type(message) in self._overheard:
+            return not heeds(message)
+        return self._asks_another(message)
 
     def _asks_another(self, message: Message) -> bool:
         """Whether somebody else is asked what it knows."""

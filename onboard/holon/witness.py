@@ -422,8 +422,11 @@ class Witness:
         if word.sender == self.node_id or word.sender not in self.site.machines:
             return
         self._words += 1
-        if self.doubted and isinstance(word, (TokenHeld, TokenGrant, TokenGiven)):
-            self._said_again(word.sender, TokenKey(word.token_kind, word.token), word.version)
+        lost = self.doubted.get(word.sender)
+        if lost and isinstance(word, (TokenHeld, TokenGrant, TokenGiven)):
+            key = TokenKey(word.token_kind, word.token)
+            if word.version >= lost.get(key, word.version + 1):
+                del lost[key]
         if self.doubt is not None or self._since_us is None or word.sender in self.answered:
             return
         key = TokenKey(word.token_kind, word.token)
@@ -446,11 +449,6 @@ class Witness:
     def _doubt(self, reason: Reason, cause: int, what: str) -> None:
         self.doubt = Doubt(reason, cause, what)
         self.tokens.is_synced = False
-
-    def _said_again(self, node: int, key: TokenKey, version: int) -> None:
-        lost = self.doubted.get(node)
-        if lost is not None and version >= lost.get(key, version + 1):
-            del lost[key]
 
 
 def _later(time_us: int | None, by_us: int) -> int | None:

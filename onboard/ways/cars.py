@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from onboard.contract.codes import Reason, TokenKind
 from onboard.contract.constants import ANY_STATION, OUTSIDE
-from onboard.contract.messages import CarAt, Message, Reference
+from onboard.contract.messages import CarAt, Message, Reference, TokenGrant, TokenHeld
 from onboard.core.authority import TokenBook
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect, Record
@@ -96,9 +96,11 @@ class CarMirror(Mirror):
             self.words.hear(statement)
         return []
 
-    def settle(self, key: TokenKey) -> Message | None:
+    def settle(self, word: TokenGrant | TokenHeld) -> Message | None:
         """A word about a car that what was just heard of its token has proven."""
-        return None if self.words is None else self.words.settle(key)
+        if self.words is None or word.token_kind is not TokenKind.CAR:
+            return None
+        return self.words.settle(TokenKey(word.token_kind, word.token))
 
     def on_car(self, statement: CarAt) -> bool:
         """Take up a custodian's statement; True where it changed anything."""

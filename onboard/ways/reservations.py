@@ -89,12 +89,17 @@ class Reservations(Planned):
     def reserve(self, owner: int, windows: Iterable[SlotWindow], uses: Iterable[Use] = ()) -> None:
         """Add windows and lift uses of ``owner`` (a node-ID). Raises ``ValueError`` where one has no length."""
         self._forget(owner)
-        touched = self._segments.setdefault(owner, set())
+        touched, by_segment = self._segments.setdefault(owner, set()), self._windows
         for window in windows:
-            if window.from_us >= window.to_us:
+            segment, from_us, to_us = window
+            if from_us >= to_us:
                 raise ValueError(f"window {window} of node {owner} has no length")
-            insort(self._windows.setdefault(window.segment, []), (window.from_us, window.to_us, owner))
-            touched.add(window.segment)
+            known = by_segment.get(segment)
+            if known is None:
+                by_segment[segment] = [(from_us, to_us, owner)]
+            else:
+                insort(known, (from_us, to_us, owner))
+            touched.add(segment)
         for use in uses:
             if use.from_us >= use.to_us or use.owner != owner:
                 raise ValueError(f"use {use} has no length, or is not of node {owner}")
@@ -106,15 +111,20 @@ class Reservations(Planned):
         self._fixed.discard(owner)
         for lift_track, uses in self._uses.items():
             self._uses[lift_track] = [use for use in uses if use.owner != owner]
+        by_segment = self._windows
         for segment in self._segments.pop(owner, ()):
-            kept = [window for window in self._windows[segment] if window[2] != owner]
-            if kept:
-                self._windows[segment] = kept
+            known = by_segment[segment]
+            if len(known) == 1 and known[0][2] == owner:
+                # As most are, and no list is to be made for that.
+                del by_segment[segment]
+            elif kept := [window for window in known if window[2] != owner]:
+                by_segment[segment] = kept
             else:
-                del self._windows[segment]
+                del by_segment[segment]
 
     def _forget(self, owner: int) -> None:
-        self.kept = {key: found for key, found in self.kept.items() if key[0] == owner}
+        if self.kept:
+            self.kept = {key: found for key, found in self.kept.items() if key[0] == owner}
 
     def planned(self) -> Planned:
         """The same windows and uses, whenever one looks, without what is ``kept``.
@@ -162,11 +172,12 @@ class Reservations(Planned):
 
     def conflicts(self, owner: int, windows: Iterable[SlotWindow]) -> list[tuple[SlotWindow, int]]:
         """Each of ``windows`` that overlaps one of another node, with that node."""
+        by_segment = self._windows
         return [
             (window, holder)
             for window in windows
-            for start_us, end_us, holder in self._windows.get(window.segment, ())
-            if holder != owner and start_us < window.to_us and window.from_us < end_us
+            for start_us, end_us, holder in by_segment.get(window[0], ())
+            if holder != owner and start_us < window[2] and window[1] < end_us
         ]
 
     def hinders(self, owner: int, windows: Iterable[SlotWindow], now_us: int) -> bool:

@@ -7,6 +7,7 @@ to begin, as each enters once the one before has begun to leave. With one other 
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 
 from onboard.core.site import Segment
 from onboard.ways.network import Network
@@ -21,8 +22,9 @@ FAR = 1 << 20
 FLOOR = 1
 
 
+@cache
 def cell_segment(cell: int) -> Segment:
-    """The segment that stands for a place, or for what standing there takes."""
+    """The segment that stands for a place, or for what standing there takes: made once for each place of a site."""
     return Segment(FLOOR, cell)
 
 
@@ -123,12 +125,12 @@ class StepMoves:
         return state.edges
 
     def _is_in_ring(self, here: int, to: int, depart_us: int) -> bool:
-        taken = cell_segment(self._network.takes.get(to, to))
-        now = SlotWindow(taken, depart_us, depart_us + STEP_US)
-        return any(
-            self._goes_round(holder, here, depart_us // STEP_US)
-            for _, holder in self._reservations.conflicts(self._owner, [now])
-        )
+        taken, arrive_us = cell_segment(self._network.takes.get(to, to)), depart_us + STEP_US
+        for start_us, end_us, holder in self._reservations.on(taken):
+            is_there = holder != self._owner and start_us < arrive_us and depart_us < end_us
+            if is_there and self._goes_round(holder, here, depart_us // STEP_US):
+                return True
+        return False
 
     def to_goals(self, state: State, goals: frozenset[Segment]) -> list[Edge]:
         """None: a goal is a cell like others."""

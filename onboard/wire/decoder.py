@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 from onboard.contract.base import SetFrame
 from onboard.contract.codes import Grade, Reason
@@ -56,7 +56,7 @@ class Decoder:
         ``is_only_one``: nobody else decodes the same frames, so nothing is remembered for others.
         """
         self.drops: Counter[Reason] = Counter()
-        self._codec = codec
+        self._codec, self._wholes = codec, codec.wholes
         self._decode = codec.decode_once if is_only_one else codec.decode_part
         self._machines = machines
         self._sets: dict[_Key, _Set] = {}
@@ -66,11 +66,8 @@ class Decoder:
     def feed(self, frame: Frame, now_us: int) -> Message | None:
         """The message that this frame completes, if any. Never raises, whatever the frame."""
         part = self._decode(frame)
-        if type(part) in self._codec.wholes:
-            assert isinstance(part, Message), "a reason is no message"
-            message: Message | None = part
-        else:
-            message = self._put_together(part, now_us)
+        is_whole = type(part) in self._wholes
+        message = cast(Message, part) if is_whole else self._put_together(part, now_us)
         if message is None or self._machines is None:
             return message
         why = why_unheard(message, self._machines, self._codec.speakers)
@@ -196,7 +193,7 @@ def _is_old(sets: dict[_Key, _Set], now_us: int) -> bool:
 
 def _call(parts: dict[type[SetFrame] | int, SetFrame]) -> CallForProposals | None:
     """The call, where all its frames are there: a sub-call, and no other, has the fourth."""
-    call, terms, load, parent = (parts.get(one) for one in (Call, CallTerms, CallLoad, CallParent))
+    call, terms, load, parent = parts.get(Call), parts.get(CallTerms), parts.get(CallLoad), parts.get(CallParent)
     if not (isinstance(call, Call) and isinstance(terms, CallTerms) and isinstance(load, CallLoad)):
         return None
     if not isinstance(parent, CallParent):

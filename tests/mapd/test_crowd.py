@@ -71,7 +71,8 @@ def test_no_bid_is_below_the_least_that_others_take_for_possible() -> None:
             for task, (bid, number) in zip(tasks, bids(FLOOR, rule, offer, tasks, backlog), strict=True):
                 empty, loaded = FLOOR.steps_to(task.pickup)[here], FLOOR.steps_to(task.delivery)[task.pickup]
                 assert number == task.number and empty < FAR
-                assert bid >= rule.least(empty, loaded)
+                least = rule.least_weights()
+                assert bid >= least[0] * empty + least[1] * loaded
 
 
 def test_once_no_more_come_age_counts_less() -> None:

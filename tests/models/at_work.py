@@ -22,7 +22,7 @@ from onboard.contract.messages import (
     TokenGrant,
     TokenHeld,
 )
-from onboard.core.authority import TokenBook, TokenKey
+from onboard.core.authority import TokenBook
 from onboard.core.behaviour import Behaviour, BehaviourFactory
 from onboard.core.effects import Actuate, Effect, Halt, Record, Send
 from onboard.core.negotiation import EVENT_TYPES, negotiation_of
@@ -208,7 +208,7 @@ class AtWork:
             effects += [] if is_early else self._negotiated(self.fleet.negotiation.receive(word, NOW_US))
         effects = effects + self.behaviour.hear(word, NOW_US)
         if isinstance(word, TokenGrant | TokenHeld):
-            proven = mirror.settle(TokenKey(word.token_kind, word.token))
+            proven = mirror.settle(word)
             if proven is not None:
                 effects += self.behaviour.hear(proven, NOW_US)
         return effects

@@ -49,7 +49,7 @@ class Walks:
             self._enters(frame, code)
 
     def _enters(self, frame: FrameType, code: CodeType) -> None:
-        if code.co_qualname == "Controller._post" and frame.f_locals["handle"].__name__ == "_fleet_frame":
+        if code.co_qualname == "Controller._on_fleet_frame":
             self._shell, self._is_bid = frame, False
             self._files.clear()
         if self._shell is not None:

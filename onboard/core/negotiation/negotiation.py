@@ -119,8 +119,7 @@ class Negotiation:
 
     def silent_winner(self, task: Reference, now_us: int) -> int:
         """Who was awarded a ``task`` of mine long ago and is not heard acting on it; 0 for nobody."""
-        found = [one.silent_winner(now_us) for one in self.initiators if one.terms.task == task]
-        return max(found, default=NOBODY)
+        return max([one.silent_winner(now_us) for one in self.initiators if one.terms.task == task], default=NOBODY)
 
     def standing_bid(self, key: CallKey) -> tuple[int, int] | None:
         """Cost and node-ID of the best bid heard for another machine's call; after the deadline, the winner (P11).
@@ -139,6 +138,8 @@ class Negotiation:
             case CallForProposals():
                 outcome = self._on_call(message, now_us)
             case Bid():
+                if message.initiator != self.node_id and not self.knows(message.initiator, message.call):
+                    return []
                 outcome = self._on_bid(message, now_us)
             case LeftOut():
                 self._on_left_out(message)
@@ -169,14 +170,13 @@ class Negotiation:
 
     def knows(self, initiator: int, call: int) -> bool:
         """Whether this node takes part in a call, or did a moment ago."""
-        return CallKey(initiator, call) in self.participants
+        return (initiator, call) in self.participants
 
     def next_wake(self) -> int | None:
         """The earliest due time of all calls, bus time in us."""
         times = [participant.next_wake() for participant in self.participants.values()]
         times += [initiator.next_wake() for initiator in self.initiators]
-        due = [time for time in times if time is not None]
-        return min(due) if due else None
+        return min([time for time in times if time is not None], default=None)
 
     # --- calls that stand, round by round ------------------------------------------------------------------------
 

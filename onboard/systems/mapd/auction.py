@@ -7,6 +7,7 @@ lowest bid of all wins first: it is the one that speaks soonest (design, section
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from onboard.systems.mapd.floor import Floor
 from onboard.systems.mapd.nearby import Nearby
@@ -50,10 +51,9 @@ class BidWeights:
     #: Where all are shared out, for each step that a task is shorter than the longest: what takes longest begins first.
     shorter: int = 300
 
-    def least(self, empty: int, loaded: int) -> int:
-        """No bid is lower: ``empty`` steps to the pick-up from where its robot is now, ``loaded`` with the load."""
-        wait = min(self.wait, self.crowded_wait, self.empty)
-        return wait * empty + min(self.loaded, self.crowded_loaded) * loaded
+    def least_weights(self) -> tuple[int, int]:
+        """What each step to the pick-up from where its robot is now, and each with the load, adds to a bid at least."""
+        return min(self.wait, self.crowded_wait, self.empty), min(self.loaded, self.crowded_loaded)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,26 +118,46 @@ def bids(
     floor: Floor, rule: BidWeights, offer: Availability, tasks: Iterable[TransportTask], backlog: Backlog
 ) -> list[tuple[int, int]]:
     """The bid and the number of each task to which a way leads, in the order of ``tasks``; as ``cost`` one by one."""
-    steps_to, cell = floor.steps_to, offer.cell
+    return offered(rule, offer, backlog, shares(floor, rule, tasks, backlog))
+
+
+class Share(NamedTuple):
+    """What of a bid for one task is the same for all robots, and the steps to its pick-up from each cell."""
+
+    steps: Sequence[int]
+    number: int
+    part: int
+
+
+def shares(floor: Floor, rule: BidWeights, tasks: Iterable[TransportTask], backlog: Backlog) -> list[Share]:
+    """That of each task which can be delivered, in the order of ``tasks``."""
+    steps_to = floor.steps_to
     younger = (rule.younger_at_last if backlog.is_all else rule.younger) * backlog.robots
     count, robots, crowd, nearby = backlog.tasks, backlog.robots, backlog.crowd, backlog.nearby
-    share, weight, oldest = max(robots, count), rule.empty, backlog.oldest
-    lighter = crowd * min(4 * robots, count) // (4 * robots)
-    wait = (100 * rule.wait - (rule.wait - rule.crowded_wait) * lighter) * offer.steps // 100
+    share, oldest, longest = max(robots, count), backlog.oldest, backlog.longest
     weight_loaded = (100 * rule.loaded - (rule.loaded - rule.crowded_loaded) * crowd) // 100
     # Of the steps that a task is shorter than the longest, where not every robot gets one.
-    shorter = rule.shorter * (robots - count) // robots if backlog.longest else 0
+    shorter = rule.shorter * (robots - count) // robots if longest else 0
+    beside = rule.nearby * crowd
     found = []
     for task in tasks:
         pickup = task.pickup
-        empty, loaded = steps_to(pickup)[cell], steps_to(task.delivery)[pickup]
-        if empty < FAR and loaded < FAR:
+        loaded = steps_to(task.delivery)[pickup]
+        if loaded < FAR:
             later = younger * (task.release - oldest) // share
-            later += shorter * (backlog.longest - loaded)
+            later += shorter * (longest - loaded)
             if crowd and nearby is not None:
-                later += rule.nearby * crowd * nearby.dearer(task) // 100
-            found.append((wait + weight * empty + weight_loaded * loaded + later, task.number))
+                later += beside * nearby.dearer(task) // 100
+            found.append(Share(steps_to(pickup), task.number, weight_loaded * loaded + later))
     return found
+
+
+def offered(rule: BidWeights, offer: Availability, backlog: Backlog, known: Iterable[Share]) -> list[tuple[int, int]]:
+    """One robot's bid for each task that it can reach, with its number, from the ``shares``."""
+    cell, weight, robots = offer.cell, rule.empty, backlog.robots
+    lighter = backlog.crowd * min(4 * robots, backlog.tasks) // (4 * robots)
+    wait = (100 * rule.wait - (rule.wait - rule.crowded_wait) * lighter) * offer.steps // 100
+    return [(wait + weight * empty + part, number) for steps, number, part in known if (empty := steps[cell]) < FAR]
 
 
 def winners(

@@ -64,7 +64,9 @@ class Round:
         """Another robot's bid, of this round."""
         task, offered = task_of(bid), (bid.cost, bid.sender)
         self.bids.setdefault(task, []).append(bid)
-        self._best[task] = min(offered, self._best.get(task, offered))
+        best = self._best.get(task)
+        if best is None or offered < best:
+            self._best[task] = offered
 
     @property
     def preferred(self) -> int | None:
@@ -72,7 +74,8 @@ class Round:
         while True:
             while self._next < len(self._near):
                 cost, task = self._near[self._next]
-                if (cost, self.node_id) <= self._best.get(task, (cost, self.node_id)):
+                best = self._best.get(task)
+                if best is None or (cost, self.node_id) <= best:
                     return task
                 self._next += 1
             if not self.preferences:

@@ -4,23 +4,23 @@ Made of frames alone, so that all have the same once all have heard all frames o
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from onboard.contract.mapd import PathHead, PathMoves, StepState
 from onboard.contract.messages import Bid, CallForProposals
 from onboard.core.serial import is_newer, ms_after
-from onboard.systems.mapd.auction import Backlog, BidWeights
+from onboard.systems.mapd.auction import BidWeights
 from onboard.systems.mapd.calls import task_of
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.floor import Floor
 from onboard.systems.mapd.moves import Assembly
-from onboard.systems.mapd.nearby import Nearby
 from onboard.systems.mapd.paths import Path, Paths
-from onboard.systems.mapd.tasks import TransportTask
+from onboard.systems.mapd.tasks import TransportTask, task_named
 from onboard.ways.steps import STEP_US, cell_segment
 
-#: The weights that all robots bid by, unless they are told others.
+#: The weights that all robots bid by, unless they are told others, and what a step adds at least by them.
 PLAIN = BidWeights()
+LEAST = PLAIN.least_weights()
 
 
 @dataclass
@@ -56,7 +56,6 @@ class Knowledge:
     def __post_init__(self) -> None:
         self.paths = Paths(self.floor.network)
         self._all = frozenset(self.robots)
-        self._nearby = Nearby(self.floor)
 
     # --- tasks and steps ---------------------------------------------------------------------------------------
 
@@ -66,7 +65,7 @@ class Knowledge:
         if max(cells) < self.floor.size:
             if number not in self.tasks:
                 self._undated.add(number)
-                self.take_up(TransportTask(number, 0, *cells))
+                self.take_up(task_named(number, 0, *cells))
             self.calls[number] = call
 
     def take_up(self, task: TransportTask) -> None:
@@ -86,14 +85,18 @@ class Knowledge:
             last = step - max(0, ms_after(deadline_ms, newest.deadline_ms)) // self.step_ms
             for call in undated:
                 number, sooner_ms = call.task.number, ms_after(newest.deadline_ms, call.deadline_ms)
-                self.take_up(replace(self.tasks[number], release=last - round(sooner_ms / self.step_ms)))
+                known, release = self.tasks[number], last - round(sooner_ms / self.step_ms)
+                self.take_up(task_named(number, release, known.pickup, known.delivery))
 
     def on_state(self, state: StepState) -> bool:
         """A robot's word; True where it is news."""
         known = self.states.get(state.sender)
-        if state.sender not in self._all or (known is not None and (state.step < known.step or state == known)):
+        if state.sender not in self._all:
             return False
-        if known is not None and state.step > known.step:
+        if known is not None and state.step <= known.step:
+            if state.step < known.step or state == known:
+                return False
+        elif known is not None:
             self.taken.pop(state.sender, None)
         self.states[state.sender] = state
         self.loads.pop(state.sender, None)
@@ -105,15 +108,18 @@ class Knowledge:
             self.loads[state.sender] = state.task
         return True
 
-    def is_possible(self, bid: Bid, rule: BidWeights = PLAIN) -> bool:
-        """Whether a bid is no lower than the way from where its robot is; of what is not known yet any is."""
+    def is_possible(self, bid: Bid, weights: tuple[int, int] = LEAST) -> bool:
+        """Whether a bid is no lower than the way from where its robot is; of what is not known yet any is.
+
+        ``weights`` are the ``least_weights`` of the rule by which all bid.
+        """
         state, task = self.states.get(bid.sender), self.tasks.get(task_of(bid))
         if state is None or task is None:
             return True
-        if state.cell >= self.floor.size:
+        steps_to, pickup, cell = self.floor.steps_to, task.pickup, state.cell
+        if cell >= len(self.floor.names):
             return False
-        empty, loaded = self.floor.steps_to(task.pickup)[state.cell], self.floor.steps_to(task.delivery)[task.pickup]
-        return bid.cost >= rule.least(empty, loaded)
+        return bid.cost >= weights[0] * steps_to(pickup)[cell] + weights[1] * steps_to(task.delivery)[pickup]
 
     def task_of(self, robot: int) -> int:
         """The task that a robot has by its last word, ``NO_TASK`` for none."""
@@ -124,11 +130,6 @@ class Knowledge:
     def open_tasks(self) -> Sequence[TransportTask]:
         """Tasks that nobody has picked up, lowest number first."""
         return self._looked_at[0]
-
-    def backlog(self, step: int) -> Backlog:
-        """What is open in this step, as it counts in a bid."""
-        self._nearby.see(self.open_tasks)
-        return Backlog.of(self._nearby, self.open_tasks, len(self.robots), step)
 
     @property
     def wanted_cells(self) -> frozenset[int]:

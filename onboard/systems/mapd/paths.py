@@ -78,8 +78,11 @@ class Paths:
 
     def holder(self, cell: int, step: int) -> int | None:
         """Who is in a cell at a step."""
-        now = SlotWindow(cell_segment(self.network.takes[cell]), step * STEP_US, (step + 1) * STEP_US)
-        return next((holder for _, holder in self.reservations.conflicts(NOBODY, [now])), None)
+        begins_us, ends_us = step * STEP_US, (step + 1) * STEP_US
+        for start_us, end_us, robot in self.reservations.on(cell_segment(self.network.takes[cell])):
+            if start_us < ends_us and begins_us < end_us:
+                return robot
+        return None
 
     def goes_round(self, robot: int, cell: int, step: int) -> bool:
         """Whether ``robot``, or one that it follows in this step, moves to what ``cell`` takes."""

@@ -28,7 +28,7 @@ from onboard.core.behaviour import NEVER_US
 from onboard.core.effects import Effect, Send
 from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import successor, to_bus_ms
-from onboard.systems.mapd.auction import Availability, BidWeights, bids
+from onboard.systems.mapd.auction import Availability, BidWeights
 from onboard.systems.mapd.bidding import Round, UnitGeneration, bid_timing
 from onboard.systems.mapd.calls import CALL_AGAIN_US, mark_of
 from onboard.systems.mapd.driving import Driving
@@ -108,6 +108,7 @@ class UnitRobot(Plain):
         self.knowledge = Knowledge(site.floor, site.robots, self.fleet.node_id, site.step_ms)
         self.driving = Driving(self.fleet, site, self.knowledge)
         self.turns = Turns(0)
+        self._me, self._least = self.fleet.node_id, self.rule.least_weights()
         self._home = site.homes[self.fleet.node_id]
         self._own_rests = site.rests - set(site.homes.values())
         self._waiting = WaitingPlaces(site.floor, site.endpoints)
@@ -140,16 +141,17 @@ class UnitRobot(Plain):
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Everything that others say of tasks, steps, bids and paths."""
         said = type(message)
-        self._is_new |= said in _OF_INTEREST
+        if said in _OF_INTEREST:
+            self._is_new = True
         hearer = self._hearers.get(said)
         return hearer(message, now_us) if hearer is not None else []
 
     def _on_bid(self, bid: Bid, now_us: int) -> list[Effect]:
-        if not self.knowledge.is_possible(bid, self.rule):
+        if not self.knowledge.is_possible(bid, self._least):
             self.fleet.drops[Reason.FALSE_STATEMENT] += 1
         elif bid.sender in self.site.homes:
             self._heard_bids.append(bid)
-            if self._bids is not None and self._is_of_round(bid):
+            if self._bids is not None and bid.itinerary_version == self.generation.mark:
                 self._bids.hear(bid)
         return []
 
@@ -189,7 +191,7 @@ class UnitRobot(Plain):
 
     def _is_sound(self, task: Reference, bid: Bid) -> bool:
         """Whether the core is to count a bid: of this round, and from somebody who may be so near."""
-        return self._is_of_round(bid) and self.knowledge.is_possible(bid, self.rule)
+        return self._is_of_round(bid) and self.knowledge.is_possible(bid, self._least)
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """A cell that it is not in goes to whoever is there first by everybody's paths."""
@@ -200,7 +202,7 @@ class UnitRobot(Plain):
         if self.driving.cart.state is None or not (self._is_new or self._is_due(now_us)):
             return []
         self._is_new = False
-        self.state = self._state_by_task
+        self.state = MachineState.IDLE if self.task == NO_TASK else MachineState.WORKING
         effects: list[Effect] = []
         goes_on = True
         while goes_on:
@@ -218,26 +220,19 @@ class UnitRobot(Plain):
 
     def heeds(self, message: Message) -> bool:
         """Whether a word may let it go on, by the phase that it is in; see ``_found`` for what each phase reads."""
-        said = type(message)
-        if self.state is not self._state_by_task:
+        said, phase = type(message), self.phase
+        if self.state is not (MachineState.IDLE if self.task == NO_TASK else MachineState.WORKING):
             return said in _OF_INTEREST
         if isinstance(message, (Bid, Award)) and self._takes_part(message):
             return True
-        match self.phase:
-            case GridStepPhase.GATHER:
-                # Before the round is told nothing else counts.
-                return self.round is not None and said in _OF_INTEREST
-            case GridStepPhase.BID if said in _OF_END:
-                return self.turns.is_complete
-            case GridStepPhase.BID:
-                return said in _OF_CHOICE and self._prefers_another()
-            case GridStepPhase.TURNS:
-                return self.turns.next_to_plan(self.knowledge.heads) in (0, self.fleet.node_id)
-        return self.fleet.node_id not in self.knowledge.paths.by_robot or said is CallForProposals
-
-    @property
-    def _state_by_task(self) -> MachineState:
-        return MachineState.IDLE if self.task == NO_TASK else MachineState.WORKING
+        if phase is GridStepPhase.GATHER:
+            # Before the round is told nothing else counts.
+            return self.round is not None and said in _OF_INTEREST
+        if phase is GridStepPhase.BID:
+            return self.turns.is_complete if said in _OF_END else said in _OF_CHOICE and self._prefers_another()
+        if phase is GridStepPhase.TURNS:
+            return self.turns.next_to_plan(self.knowledge.heads) in (0, self._me)
+        return said is CallForProposals or self._me not in self.knowledge.paths.by_robot
 
     def _takes_part(self, word: Bid | Award) -> bool:
         """Whether it takes part in the call that this is about."""
@@ -429,8 +424,7 @@ class UnitRobot(Plain):
 
     def _costs(self) -> list[tuple[int, int]]:
         """What each open task would cost, with its number: the task-generation function of this system."""
-        tasks = self.knowledge.open_tasks
-        return bids(self.site.floor, self.rule, self._offer(), tasks, self.knowledge.backlog(self.step))
+        return self.site.prospects.bids(self.rule, self._offer(), self.knowledge.open_tasks, self.step)
 
     def _offer(self) -> Availability:
         """Where and when it will be free: at once, or where it delivers what it carries."""

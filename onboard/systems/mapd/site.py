@@ -8,6 +8,7 @@ from typing import ClassVar
 from onboard.contract.codes import KindCode
 from onboard.core.site import MotionNeeds, Site
 from onboard.systems.mapd.floor import FREE, Floor, NetworkLine, grid_floor, network_floor
+from onboard.systems.mapd.prospects import Prospects
 from onboard.systems.mapd.rights import cell_station
 from onboard.systems.mapd.tasks import TransportTask
 from onboard.ways.rests import lasting_rests
@@ -55,6 +56,11 @@ class Mapd(Site):
     def rests(self) -> frozenset[int]:
         """Where robots may stand for ever: homes first, then endpoints, as many as shut nobody in."""
         return lasting_rests(self.floor.network, [*self.homes.values(), *self.endpoints], self.endpoints)
+
+    @cached_property
+    def prospects(self) -> Prospects:
+        """What is open, for the bids of all robots."""
+        return Prospects(self.floor, len(self.robots))
 
     @property
     def step_us(self) -> int:
