@@ -62,6 +62,10 @@ class Mutation(NamedTuple):
     what: str
 
 
+#: The robot as it is: what it breaks every mutant would be caught by.
+UNCHANGED = Mutation("", -1, 0, "")
+
+
 def mutations(file: str, lines: set[int]) -> Iterator[Mutation]:
     """All that could be done to these lines of a file, inside functions."""
     tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
@@ -162,7 +166,8 @@ class _Mutant(MetaPathFinder, Loader):
 
 def _play(mutation: Mutation) -> None:
     """Tell which checks fail."""
-    sys.meta_path.insert(0, _Mutant(mutation))
+    if mutation != UNCHANGED:
+        sys.meta_path.insert(0, _Mutant(mutation))
     from onboard.conform.checks import Verdict
     from tests.conform.bench import SITES, play
 
@@ -245,6 +250,10 @@ def main() -> int:
         _play(Mutation(*json.loads(options.play)))
         return 0
     drawn = draw(options.seed, options.count)
+    broken = judge(UNCHANGED)
+    if broken:
+        print(f"our robot as it is breaks {', '.join(broken)}: what a mutant breaks would tell nothing")
+        return 2
     caught = 0
     with ThreadPoolExecutor(options.jobs) as pool:
         for mutation, failed in zip(drawn, pool.map(judge, drawn), strict=True):

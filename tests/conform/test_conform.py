@@ -97,6 +97,13 @@ def test_our_robot_keeps_to_all_of_it_beside_another(scene: Scene, site: CarPark
     assert broken == [] and {one.name for one in scene.checks} <= reached
 
 
+@pytest.mark.parametrize("site", SITES[1:], ids=lambda one: one.name)
+def test_our_robot_keeps_to_the_whole_play_as_the_mutants_have_it(site: CarPark) -> None:
+    """Each scene begins where the one before has left all: a check that fails only so would catch every mutant."""
+    findings = play(site=site).findings
+    assert [line for one in findings.of(Verdict.FAILED) for line in lines_of(one, frame_words)] == []
+
+
 def test_without_a_switch_and_a_car_it_is_judged_as_far_as_it_can_be() -> None:
     findings = play(("bids", "another life", "parking"), means=Means()).findings
     assert findings.of(Verdict.FAILED) == []

@@ -150,8 +150,13 @@ class Desk:
 
     def run_us(self, begin: int, end: int) -> int:
         """A run along the alley from index to index."""
+        return self.run_from_us(begin, 0, end)
+
+    def run_from_us(self, begin: int, offset_mm: int, end: int) -> int:
+        """A run along the alley from so far behind the mark of an index to that of another."""
         axis, pitch_mm = self.site.carrier, self.site.tracks[self.bay.track].pitch_mm
-        return _run_us(abs(end - begin) * pitch_mm, axis.speed_mm_s, axis.acceleration_mm_s2)
+        way_mm = abs((end - begin) * pitch_mm - offset_mm)
+        return _run_us(way_mm, axis.speed_mm_s, axis.acceleration_mm_s2)
 
     def floor_over_ms(self) -> int:
         """Duty B3: the floor of a call to park, in ms after its deadline."""
