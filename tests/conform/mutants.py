@@ -36,13 +36,13 @@ _SHARED = frozenset(
     {
         *("onboard/core/frame.py", "onboard/core/serial.py", "onboard/core/site.py", "onboard/core/token_keys.py"),
         *("onboard/ways/site.py", "onboard/ways/kinematics.py", "onboard/systems/car_park/site.py"),
+        "onboard/ways/lifts.py",
     }
 )
 #: What is told to the telemetry alone: counters of the negotiation, events, and reports for people.
 UNHEARD = frozenset({"counters", "telemetry", "Report"})
-#: What a robot runs on a site without lifts as well, where nothing comes of it: whether the sill may be crossed, and
-#: what a compartment remembers.
-_OF_OTHERS = frozenset({"onboard/systems/car_park/sill.py", "onboard/systems/car_park/bay_memory.py"})
+#: What a robot runs as well, where nothing comes of it: what a compartment remembers.
+_OF_OTHERS = frozenset({"onboard/systems/car_park/bay_memory.py"})
 _CONTRARY: dict[type[ast.AST], Any] = {
     one: other
     for pair in (
@@ -174,7 +174,8 @@ def _play(mutation: Mutation) -> None:
     found: list[str] = []
     for site in SITES:
         # What the first bench catches needs no second one.
-        found = found or [one.check.name for one in play(site=site, stops_at_first=True).findings.of(Verdict.FAILED)]
+        failed = () if found else play(site=site, stops_at_first=True).findings.of(Verdict.FAILED)
+        found += [f"{one.check.name} ({site.name})" for one in failed]
     print(json.dumps(found))
 
 

@@ -69,7 +69,7 @@ class PlanJudge:
         if plan.grade is not Grade.FIRM or not plan.legs:
             return
         stage, pairs = self.stage, list(pairwise(plan.legs))
-        joined = all((a.track, a.to_index) == (b.track, b.from_index) or self._turns(a, b) for a, b in pairs)
+        joined = all(self._at(a, a.to_index) == self._at(b, b.from_index) or self._turns(a, b) for a, b in pairs)
         stage.judge("legs-follow-in-place", joined, "a leg begins where none ends", word)
         ordered = all((b.end_ms - a.end_ms) % 2**32 < 2**31 for a, b in pairs)
         stage.judge("legs-follow-in-time", ordered, "a leg ends before the one before it", word)
@@ -83,6 +83,13 @@ class PlanJudge:
         if len(plan.legs) > 1:
             is_refuge = (last.track, last.to_index) not in {bay.segment for bay in self.site.compartments.values()}
             stage.judge("plan-ends-in-a-refuge", is_refuge, "ends before a compartment", word)
+
+    def _at(self, leg: Leg, index: int) -> Segment:
+        """Where a leg begins or ends: a ride at the platform as its floor's alley has it."""
+        if leg.track not in self.site.lifts:
+            return Segment(leg.track, index)
+        doors = self.site.tracks[leg.track].joins
+        return self.site.beyond(doors[index - 1]) if 0 < index <= len(doors) else Segment(leg.track, index)
 
     def _turns(self, before: Leg, leg: Leg) -> bool:
         """Whether a leg goes over a linked end, from where the one before it ends."""
