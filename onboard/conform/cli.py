@@ -16,7 +16,7 @@ from onboard.config.site import load_site
 from onboard.conform.checks import Verdict
 from onboard.conform.player import Player
 from onboard.conform.report import NodeUnderTest, frame_words, junit, lines_of, protocol, status, totals
-from onboard.conform.stage import Means, Ride
+from onboard.conform.stage import Means, PlatformRun
 from onboard.conform.suite import scenes_of, watchers_of
 from onboard.contract.codes import CONTRACT_VERSION, KindCode
 from onboard.core.frame import Frame
@@ -193,7 +193,7 @@ class Bench:
     def _switch(self, on: bool) -> None:
         self._begin(self.power, "on" if on else "off")
 
-    def _move(self, ride: Ride) -> None:
+    def _move(self, ride: PlatformRun) -> None:
         self._begin(self.lift, str(ride.node), str(ride.stop))
 
     def _begin(self, program: str | None, *words: str) -> None:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from onboard.conform.cast import Cast
 from onboard.conform.checks import Check, Findings, Verdict
-from onboard.conform.stage import SECOND, Means, Play, Ride, Stage, Wait
+from onboard.conform.stage import SECOND, Means, PlatformRun, Play, Stage, Wait
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.wire.codec import Codec
@@ -80,7 +80,7 @@ class Player:
         self,
         send: Callable[[Frame], object],
         switch: Callable[[bool], object],
-        move: Callable[[Ride], object] = lambda _: None,
+        move: Callable[[PlatformRun], object] = lambda _: None,
     ) -> None:
         """Switch the node as the play wants it, move platforms, then send what it says, each in its order."""
         for on in self.stage.power:

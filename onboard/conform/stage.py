@@ -35,7 +35,7 @@ Play = Generator[Wait, None, None]
 Heard = Generator[Wait, None, "Word | None"]
 
 
-class Ride(NamedTuple):
+class PlatformRun(NamedTuple):
     """A platform is to move: of the lift with this node-ID, to this stop from 1 on, in so long from now."""
 
     node: int
@@ -87,7 +87,7 @@ class Stage:
     out: list[Frame] = field(default_factory=list)
     power: list[bool] = field(default_factory=list)
     #: Platforms that are to be moved.
-    rides: list[Ride] = field(default_factory=list)
+    rides: list[PlatformRun] = field(default_factory=list)
     #: The kit has switched the node off.
     is_off: bool = False
     words: dict[type[Message], list[Word]] = field(default_factory=lambda: defaultdict(list))

@@ -11,7 +11,7 @@ from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.config.site import load_site
 from onboard.conform.player import Player, Scene
-from onboard.conform.stage import Means, Ride
+from onboard.conform.stage import Means, PlatformRun
 from onboard.conform.suite import scenes_of, watchers_of
 from onboard.contract.codes import DoorName, DoorPosition
 from onboard.core.frame import Frame
@@ -47,7 +47,7 @@ class VirtualBench:
         player.start(self.loop.now_us())
         self.carry_out()
 
-    def move(self, ride: Ride) -> None:
+    def move(self, ride: PlatformRun) -> None:
         """The platform as it is goes where the kit's lift has it go."""
         world, now_us = self.world, self.loop.now_us()
         track, axis = world.platforms[ride.node].track, world.site.lift

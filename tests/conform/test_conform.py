@@ -16,7 +16,7 @@ from onboard.conform.checks import Check, CheckResult, Findings, Verdict
 from onboard.conform.cli import Bench
 from onboard.conform.player import Player, Scene
 from onboard.conform.report import NodeUnderTest, frame_words, junit, lines_of, protocol, status, totals
-from onboard.conform.stage import Means, Ride
+from onboard.conform.stage import Means, PlatformRun
 from onboard.conform.suite import scenes_of, watchers_of
 from onboard.contract.messages import Heartbeat
 from onboard.core.negotiation.participant import Participant
@@ -252,7 +252,7 @@ async def test_what_moves_a_platform_is_told_lift_and_stop(tmp_path: Path) -> No
     mover.write_text(f"#!/bin/sh\necho $@ >{told}\n", encoding="utf-8")
     mover.chmod(0o755)
     player = Player(SITES[3], 11, fleet_codec(), scenes_of(SITES[3])[:1], ALL)
-    player.stage.rides.append(Ride(5, 2, 1_000))
+    player.stage.rides.append(PlatformRun(5, 2, 1_000))
     bus = await open_bus(BusSettings(interface="virtual", channel="moved", bitrate=500_000))
     bench = Bench(player, bus, None, str(mover))
     assert bench.running is not None

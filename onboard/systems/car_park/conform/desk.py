@@ -12,9 +12,8 @@ from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import Award, Bid, CallForProposals, CarAt, Reference
 from onboard.core.site import Segment, Station
 from onboard.core.token_keys import TokenKey
+from onboard.systems.car_park.conform.shafts import platform, platform_at, stop_at, stop_mm
 from onboard.systems.car_park.site import CarPark, car_park
-from onboard.ways.lifts import lift_index_of, platform, platform_on, stop_mm
-from onboard.ways.reservations import FOREVER
 
 #: Duty B3: the task begins so long after the deadline; what a handling takes beside strokes and grip; the bay is ready
 #: so long after the call was opened, and its door's time, us.
@@ -190,12 +189,12 @@ class Desk:
             return self.run_us(self.bay.index, place.index)
         found = []
         for lift in self.site.lifts:
-            board, leave = (lift_index_of(self.site, lift, one.track) for one in (self.bay, place))
-            near, far = (platform_on(self.site, lift, one.track) for one in (self.bay, place))
+            board, leave = (stop_at(self.site, lift, one.track) for one in (self.bay, place))
+            near, far = (platform_at(self.site, lift, one.track) for one in (self.bay, place))
             if board is not None and leave is not None and near is not None and far is not None:
                 runs_us = self.run_us(self.bay.index, near.index) + self.run_us(far.index, place.index)
                 found.append(runs_us + ride_us(self.site, lift, board, leave))
-        return min(found, default=FOREVER)
+        return min(found, default=1 << 62)
 
     def approach_us(self) -> int:
         """To the bay from where a robot may rest at the farthest."""

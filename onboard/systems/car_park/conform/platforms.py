@@ -9,7 +9,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from onboard.conform.cast import Cast
-from onboard.conform.stage import MS, Ride, Stage, Word, after_ms
+from onboard.conform.stage import MS, PlatformRun, Stage, Word, after_ms
 from onboard.contract.codes import (
     CallResult,
     Grade,
@@ -33,8 +33,8 @@ from onboard.contract.messages import (
 from onboard.core.site import Segment
 from onboard.core.token_keys import TokenKey
 from onboard.systems.car_park.conform.desk import ride_us, rise_us
+from onboard.systems.car_park.conform.shafts import gate, platform, under_gate
 from onboard.systems.car_park.site import car_park
-from onboard.ways.lifts import gate, platform, under_gate
 
 #: Duty L1: a word this far off the mark counts as standing there, mm.
 MARK_MM = 5
@@ -51,7 +51,7 @@ class Phase(Enum):
     LEAVING = "at the ride's end"
 
 
-class Planned(NamedTuple):
+class RideAhead(NamedTuple):
     """A RIDE leg of the node's plan; when it begins, bus time in ms as frames tell it."""
 
     board: int
@@ -60,12 +60,12 @@ class Planned(NamedTuple):
 
 
 def as_said(word: Progress) -> Progress | None:
-    """A good lift's word."""
+    """Its word as it is, as a good lift says it."""
     return word
 
 
 def unsaid(_: Progress) -> Progress | None:
-    """Nothing is said."""
+    """No word at all, so that who waits must ask."""
     return None
 
 
@@ -86,7 +86,7 @@ class Platform:
         self.stage, self.cast, self.node = stage, cast, node
         self.site = car_park(stage.site)
         self.track, self.index = stage.site.machines[node].home.track, 1
-        self.phase, self.ride = Phase.FREE, Planned(0, 0, 0)
+        self.phase, self.ride = Phase.FREE, RideAhead(0, 0, 0)
         self.platform_key = TokenKey(TokenKind.SEGMENT, platform(self.track).number)
         self.gate_key = TokenKey(TokenKind.SEGMENT, gate(self.track).number)
         #: When the platform is where it goes, by the kit's clock.
@@ -106,7 +106,7 @@ class Platform:
         stage.hearers.append(self.hear)
 
     def reset(self) -> None:
-        """A good lift again."""
+        """Refuse nothing, say where it stands and bid in time, from now on."""
         #: Tokens that it refuses though it could give them.
         self.keeps: set[TokenKey] = set()
         #: What it says instead of where it stands, while its gate is out.
@@ -134,7 +134,7 @@ class Platform:
         version = self.cast.holder(self.gate_key)[1]
         return Progress(self.node, *under_gate(version), self.track, self.index, 0, 0)
 
-    def planned(self) -> Planned | None:
+    def planned(self) -> RideAhead | None:
         """The node's next ride that is not made yet (duty L2)."""
         plan, place = self.cast.plans.get(self.stage.node), self.stage.last(Progress)
         if plan is None:
@@ -144,13 +144,13 @@ class Platform:
             done = place.message.leg
         begins = (plan.stamp.award_ms, *(leg.end_ms for leg in plan.legs))
         rides = [
-            Planned(leg.from_index, leg.to_index, begin_ms)
+            RideAhead(leg.from_index, leg.to_index, begin_ms)
             for leg, begin_ms in list(zip(plan.legs, begins, strict=False))[done:]
             if leg.action is LegAction.RIDE and leg.track == self.track
         ]
         return next((one for one in rides if self._is_ahead(one)), None)
 
-    def _is_ahead(self, ride: Planned) -> bool:
+    def _is_ahead(self, ride: RideAhead) -> bool:
         return self.made_ms is None or after_ms(ride.begin_ms, self.made_ms) > 0
 
     def _stands_at(self, stop: int) -> bool:
@@ -256,7 +256,7 @@ class Platform:
     def _drive(self, stop: int) -> None:
         lasts_us = rise_us(self.site, self.track, self.index, stop) + _PLAY_US
         self.index, self.there_us = stop, self.stage.now_us + lasts_us
-        self.stage.rides.append(Ride(self.node, stop, lasts_us))
+        self.stage.rides.append(PlatformRun(self.node, stop, lasts_us))
 
     def _is_in(self, phase: Phase) -> None:
         self.phase = phase
