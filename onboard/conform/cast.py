@@ -6,6 +6,7 @@ It does what docs/protocol.md asks of a good fleet until a scene has it do somet
 from binascii import crc_hqx
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from onboard.conform.stage import MS, SECOND, Stage, Word
 from onboard.contract.codes import CONTRACT_VERSION, Grade, KindCode, LegAction, MachineState, Reason, Side, TokenKind
@@ -79,12 +80,36 @@ class Flight:
     count: int = 0
 
 
+class Double(Protocol):
+    """What a machine of the fleet does by itself, beside what every one does: a lift goes where it is wanted."""
+
+    def answer(self, key: TokenKey, request: TokenRequest) -> Reason | None:
+        """What it does about a request for what it holds, as ``Answer``."""
+
+    def gave(self, key: TokenKey) -> None:
+        """It has given a token away."""
+
+    def tell(self) -> None:
+        """Say where it is, for somebody asks."""
+
+    def next_us(self) -> int | None:
+        """When ``wake`` is wanted next by the kit's clock; None: not by time."""
+
+    def wake(self) -> None:
+        """Do what is due by now."""
+
+    def reset(self) -> None:
+        """A good machine again, behind every scene."""
+
+
 @dataclass
 class Cast:
     """All of the fleet. ``answer`` and ``confirms`` are what scenes change; ``reset`` puts all back."""
 
     stage: Stage
     parts: dict[int, Part] = field(default_factory=dict)
+    #: Those of them that do something by themselves.
+    doubles: dict[int, Double] = field(default_factory=dict)
     #: Who holds a token of those that have moved, and under which version.
     tokens: dict[TokenKey, tuple[int, int]] = field(default_factory=dict)
     cars: dict[Reference, CarAt] = field(default_factory=dict)
@@ -117,6 +142,8 @@ class Cast:
             part.state, part.is_there, part.answers, part.digest_error = MachineState.IDLE, True, True, 0
             part.contract, part.site_digest = CONTRACT_VERSION, self.stage.site.digest
             part.epoch = max(0, self.stage.epoch)
+        for double in self.doubles.values():
+            double.reset()
 
     # --- what it knows -------------------------------------------------------------------------------------------
 
@@ -184,6 +211,8 @@ class Cast:
             for at in self.cars.values():
                 if at.sender == part.node:
                     self.stage.say(at)
+            if part.node in self.doubles:
+                self.doubles[part.node].tell()
             self.stage.say(*(TokenHeld(part.node, *key, self.tokens[key][1]) for key in self.held_by(part.node)))
             self.stage.say(SyncDone(part.node, asked.sender, part.boot))
 
@@ -198,7 +227,7 @@ class Cast:
             if flight is not None and self.answer(key, request) is Reason.NONE:
                 self.stage.say(flight.grant)
             return
-        answer = self.answer(key, request)
+        answer = self.doubles[holder].answer(key, request) if holder in self.doubles else self.answer(key, request)
         if answer is Reason.NONE:
             self.grant(key, request.sender)
         elif answer is not None:
@@ -213,6 +242,8 @@ class Cast:
         repeat_us = self.stage.site.timing.token_repeat_us
         self.flights[key] = Flight(said, self.stage.now_us + repeat_us, repeat_us)
         self.stage.say(said)
+        if holder in self.doubles:
+            self.doubles[holder].gave(key)
         return said
 
     def _take(self, grant: TokenGrant) -> None:
@@ -244,6 +275,7 @@ class Cast:
     def next_us(self) -> int:
         """When something is to be said."""
         times = [part.due_us for part in self.parts.values()] + [flight.due_us for flight in self.flights.values()]
+        times += [due_us for double in self.doubles.values() if (due_us := double.next_us()) is not None]
         return min([self.time_due_us, *times])
 
     def wake(self) -> None:
@@ -262,6 +294,8 @@ class Cast:
         for key, flight in list(self.flights.items()):
             if flight.due_us <= now_us:
                 self._repeat(key, flight)
+        for double in self.doubles.values():
+            double.wake()
 
     def _repeat(self, key: TokenKey, flight: Flight) -> None:
         flight.count += 1

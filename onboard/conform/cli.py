@@ -16,7 +16,7 @@ from onboard.config.site import load_site
 from onboard.conform.checks import Verdict
 from onboard.conform.player import Player
 from onboard.conform.report import NodeUnderTest, frame_words, junit, lines_of, protocol, status, totals
-from onboard.conform.stage import Means
+from onboard.conform.stage import Means, PlatformRun
 from onboard.conform.suite import scenes_of, watchers_of
 from onboard.contract.codes import CONTRACT_VERSION, KindCode
 from onboard.core.frame import Frame
@@ -39,6 +39,8 @@ examples:
   onboard conform -i socketcan -c can0 --site bench.toml --node 11 --kind robot
   onboard conform -i socketcan -c can0 --site bench.toml --node 11 --kind robot --car --power ./relay --junit out.xml
       ./relay is run with "on" or "off" as its last word
+  onboard conform -i socketcan -c can0 --site lift.toml --node 11 --kind robot --car --lift ./platform
+      ./platform is run with the lift's node-ID and a stop, and has the platform there in the time of its own run
   onboard conform -i socketcand -c fleet --bus-kwargs host=127.0.0.1 port=29536 --site level1 --node 11 --kind robot
 """
 
@@ -67,6 +69,9 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--power", metavar="PROGRAM", help="switches the node: run with the word on or off")
     parser.add_argument(
+        "--lift", metavar="PROGRAM", help="moves a platform: run with its lift's node-ID and the stop, from 1 on"
+    )
+    parser.add_argument(
         "--late", type=int, default=15, metavar="MS", help="how late a word may come (default: %(default)s)"
     )
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the result as JUnit's XML")
@@ -87,7 +92,7 @@ def main(argv: Sequence[str]) -> int:
             return 0
         _look_before(args)
         settings = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
-        asyncio.run(_run(player, settings, args.power))
+        asyncio.run(_run(player, settings, args.power, args.lift))
         return _tell(args, site, player, f"{settings.interface} {settings.channel}")
     except OSError as error:
         print(f"onboard conform: {error.filename}: {error.strerror}; name another file", file=sys.stderr)
@@ -107,10 +112,7 @@ def _player(args: argparse.Namespace, site: Site) -> Player:
         raise ConformError(f"--kind {args.kind}: {machine.name} is a {machine.kind.name.lower()} by the site file")
     if machine.kind is not KindCode.ROBOT or part(site.system, "conform") is None:
         raise ConformError(f"--kind {args.kind}: only robots of a car park can be judged yet; name a robot's node")
-    others = [one.name for one in site.machines.values() if one.kind is KindCode.LIFT]
-    if others:
-        what = "lifts are not played yet; take a site of one floor"
-        raise ConformError(f"--site {site.name}: it has {', '.join(others)}; {what}")
+    _lifts(args, site)
     scenes = scenes_of(site)
     unknown = [name for name in args.scene if name not in {scene.name for scene in scenes}]
     if unknown:
@@ -123,12 +125,26 @@ def _player(args: argparse.Namespace, site: Site) -> Player:
     )
 
 
+def _lifts(args: argparse.Namespace, site: Site) -> None:
+    """Raises ``ConformError`` where the site's lifts cannot be played."""
+    lifts = [one.name for one in site.machines.values() if one.kind is KindCode.LIFT]
+    if len(lifts) > 1:
+        what = "one lift is played at most; take a smaller site"
+        raise ConformError(f"--site {site.name}: it has {', '.join(lifts)}; {what}")
+    if lifts and args.lift is None and not args.list:
+        what = "nobody moves its platform; name a program that does: --lift"
+        raise ConformError(f"--site {site.name}: it has {lifts[0]}; {what}")
+
+
 def _look_before(args: argparse.Namespace) -> None:
     """A quarter of an hour of play ends with these: a mistake in them is told before it. Raises ``OSError`` too."""
-    if args.power is not None and shutil.which(args.power) is None:
-        raise ConformError(
-            f"--power {args.power}: no program that can be run; name one that takes the words on and off"
-        )
+    programs = (
+        ("--power", args.power, "the words on and off"),
+        ("--lift", args.lift, "a lift's node-ID and the number of a stop"),
+    )
+    for option, program, words in programs:
+        if program is not None and shutil.which(program) is None:
+            raise ConformError(f"{option} {program}: no program that can be run; name one that takes {words}")
     for path in (args.junit, args.protocol):
         if path is not None:
             path.touch()
@@ -141,12 +157,14 @@ class Bench:
     player: Player
     bus: Bus
     power: str | None
+    lift: str | None = None
 
     def __post_init__(self) -> None:
         self.loop = asyncio.get_running_loop()
         self.over: asyncio.Event = asyncio.Event()
         self.timer: asyncio.TimerHandle | None = None
-        self.switching: asyncio.Task[None] | None = None
+        #: What is being switched or moved, each behind the one before.
+        self.running: asyncio.Task[None] | None = None
         self.bus.subscribe(self._on_frame)
         self.player.start(self._now_us())
         self._carry_out()
@@ -164,7 +182,7 @@ class Bench:
         self._carry_out()
 
     def _carry_out(self) -> None:
-        self.player.hand_out(self.bus.send, self._begin_switch)
+        self.player.hand_out(self.bus.send, self._switch, self._move)
         if self.player.is_over:
             self.over.set()
             return
@@ -172,34 +190,40 @@ class Bench:
             self.timer.cancel()
         self.timer = self.loop.call_at(self.player.next_us() / 1_000_000, self._wake)
 
-    def _begin_switch(self, on: bool) -> None:
-        self.switching = self.loop.create_task(self._switch(self.switching, on=on))
+    def _switch(self, on: bool) -> None:
+        self._begin(self.power, "on" if on else "off")
 
-    async def _switch(self, before: "asyncio.Task[None] | None", *, on: bool) -> None:
+    def _move(self, ride: PlatformRun) -> None:
+        self._begin(self.lift, str(ride.node), str(ride.stop))
+
+    def _begin(self, program: str | None, *words: str) -> None:
+        if program is not None:
+            self.running = self.loop.create_task(self._run(self.running, program, *words))
+
+    async def _run(self, before: "asyncio.Task[None] | None", program: str, *words: str) -> None:
         if before is not None:
             await before
-        if self.power is not None:
-            switched = await asyncio.create_subprocess_exec(self.power, "on" if on else "off")
-            try:
-                await switched.wait()
-            finally:
-                if switched.returncode is None:
-                    switched.terminate()
-                    await switched.wait()
+        run = await asyncio.create_subprocess_exec(program, *words)
+        try:
+            await run.wait()
+        finally:
+            if run.returncode is None:
+                run.terminate()
+                await run.wait()
 
     async def end(self) -> None:
-        """Nothing that it has begun goes on: what switches the node neither."""
+        """Nothing that it has begun goes on: what switches the node or moves a platform neither."""
         if self.timer is not None:
             self.timer.cancel()
-        if self.switching is not None:
-            self.switching.cancel()
-            await asyncio.wait({self.switching})
+        if self.running is not None:
+            self.running.cancel()
+            await asyncio.wait({self.running})
 
 
-async def _run(player: Player, settings: BusSettings, power: str | None) -> None:
+async def _run(player: Player, settings: BusSettings, power: str | None, lift: str | None) -> None:
     bus = await open_bus(settings)
     try:
-        bench = Bench(player, bus, power)
+        bench = Bench(player, bus, power, lift)
         lost = bench.loop.create_task(bus.wait_lost())
         over = bench.loop.create_task(bench.over.wait())
         try:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from onboard.conform.cast import Cast
 from onboard.conform.checks import Check, Findings, Verdict
-from onboard.conform.stage import SECOND, Means, Play, Stage, Wait
+from onboard.conform.stage import SECOND, Means, PlatformRun, Play, Stage, Wait
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.wire.codec import Codec
@@ -22,6 +22,7 @@ class Scene(NamedTuple):
     needs_car: bool = False
     needs_other: bool = False
     needs_rival: bool = False
+    needs_lift: bool = False
 
     def lacks(self, stage: Stage) -> str:
         """Why it cannot be played; empty where it can."""
@@ -33,6 +34,10 @@ class Scene(NamedTuple):
             return "the site has no further machine that the kit could speak as"
         if self.needs_rival and not stage.rival:
             return "the site has no further robot that the kit could speak as"
+        if self.needs_rival and stage.lift:
+            return "the site has lifts: who passes whom is judged on one floor"
+        if self.needs_lift and not stage.lift:
+            return "the site has no lift that the kit could speak as"
         return ""
 
 
@@ -71,11 +76,19 @@ class Player:
         self._play: Play = self._all()
         self._wait = Wait(0)
 
-    def hand_out(self, send: Callable[[Frame], object], switch: Callable[[bool], object]) -> None:
-        """Switch the node as the play wants it, then send what it says, each in its order."""
+    def hand_out(
+        self,
+        send: Callable[[Frame], object],
+        switch: Callable[[bool], object],
+        move: Callable[[PlatformRun], object] = lambda _: None,
+    ) -> None:
+        """Switch the node as the play wants it, move platforms, then send what it says, each in its order."""
         for on in self.stage.power:
             switch(on)
         self.stage.power.clear()
+        for ride in self.stage.rides:
+            move(ride)
+        self.stage.rides.clear()
         for frame in self.stage.out:
             send(frame)
         self.stage.out.clear()

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
 from onboard.conform.checks import Findings, Shown
-from onboard.contract.codes import Reason
+from onboard.contract.codes import KindCode, Reason
 from onboard.contract.messages import Award, Diagnostic, Heartbeat, Message, Reference
 from onboard.contract.runs import singles
 from onboard.core.frame import Frame
@@ -33,6 +33,14 @@ class Wait(NamedTuple):
 
 Play = Generator[Wait, None, None]
 Heard = Generator[Wait, None, "Word | None"]
+
+
+class PlatformRun(NamedTuple):
+    """A platform is to move: of the lift with this node-ID, to this stop from 1 on, in so long from now."""
+
+    node: int
+    stop: int
+    lasts_us: int
 
 
 class Word(NamedTuple):
@@ -78,6 +86,8 @@ class Stage:
     #: Frames that are to be sent, and power that is to be switched.
     out: list[Frame] = field(default_factory=list)
     power: list[bool] = field(default_factory=list)
+    #: Platforms that are to be moved.
+    rides: list[PlatformRun] = field(default_factory=list)
     #: The kit has switched the node off.
     is_off: bool = False
     words: dict[type[Message], list[Word]] = field(default_factory=lambda: defaultdict(list))
@@ -98,12 +108,15 @@ class Stage:
         self.decoder = Decoder(self.codec)
         self.machine: Machine = self.site.machines[self.node]
         fixed = sorted(node for node, one in self.site.machines.items() if one.station is not None)
+        #: The lift that the kit plays, 0 where there is none.
+        self.lift = next((node for node, one in self.site.machines.items() if one.kind is KindCode.LIFT), 0)
         #: The first compartment: it calls, is the bus time and the steward; and another, 0 where there is none.
         self.caller = min(fixed)
         self.stranger = next(node for node in range(250, 0, -1) if node not in self.site.machines)
         self.other = next((node for node in fixed if node != self.caller), 0)
         #: Another robot that the kit plays, 0 where there is none.
-        self.rival = next((node for node in self.site.machines if node not in (*fixed, self.node)), 0)
+        robots = (node for node, one in self.site.machines.items() if one.kind is self.machine.kind)
+        self.rival = next((node for node in robots if node != self.node), 0)
 
     # --- in ------------------------------------------------------------------------------------------------------
 

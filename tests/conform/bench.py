@@ -6,20 +6,24 @@ from pathlib import Path
 
 from bus_sim.options import RunOptions
 from bus_sim.systems.car_park.plant.bodies import CarBody
+from bus_sim.systems.car_park.plant.motion import driving, standing
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.config.site import load_site
 from onboard.conform.player import Player, Scene
-from onboard.conform.stage import Means
+from onboard.conform.stage import Means, PlatformRun
 from onboard.conform.suite import scenes_of, watchers_of
 from onboard.contract.codes import DoorName, DoorPosition
 from onboard.core.frame import Frame
 from onboard.ports.bus import Bus
 from onboard.systems.car_park.site import CarPark, car_park
+from onboard.ways.lifts import stop_mm
 from onboard.wire.codec import fleet_codec
 
 #: The robot alone, then with another, then the other way round.
-SITES = tuple(car_park(load_site(Path(__file__).parent / f"{name}.toml")) for name in ("bench", "pair", "mirror"))
+SITES = tuple(
+    car_park(load_site(Path(__file__).parent / f"{name}.toml")) for name in ("bench", "pair", "mirror", "lift")
+)
 SITE = SITES[0]
 WHEELBASE_MM = 2_870
 #: No play is longer, s of virtual time.
@@ -35,12 +39,22 @@ class VirtualBench:
 
     def __init__(self, player: Player, simulation: Simulation, switch: Switch) -> None:
         self.player, self.loop, self.switch = player, simulation.loop, switch
+        self.world = simulation.plant.world
         self.bus: Bus = simulation.fleet.attach("kit", None)
         self.bus.subscribe(self.on_frame)
         self.over = asyncio.Event()
         self.due_us = -1
         player.start(self.loop.now_us())
         self.carry_out()
+
+    def move(self, ride: PlatformRun) -> None:
+        """The platform as it is goes where the kit's lift has it go."""
+        world, now_us = self.world, self.loop.now_us()
+        track, axis = world.platforms[ride.node].track, world.site.lift
+        from_mm, to_mm = world.platforms[ride.node].motion.final_mm, float(stop_mm(world.site, track, ride.stop))
+        motion = driving(from_mm, 0.0, to_mm, axis.speed_mm_s, axis.acceleration_mm_s2, now_us)
+        world.move_platform(ride.node, motion)
+        self.loop.at_us(motion.end_us, lambda now: world.move_platform(ride.node, standing(to_mm, now)))
 
     def on_frame(self, frame: Frame, time_us: int) -> None:
         self.player.receive(frame, time_us)
@@ -53,7 +67,7 @@ class VirtualBench:
             self.carry_out()
 
     def carry_out(self) -> None:
-        self.player.hand_out(self.bus.send, self.switch)
+        self.player.hand_out(self.bus.send, self.switch, self.move)
         if self.player.is_over:
             self.over.set()
             return

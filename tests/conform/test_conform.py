@@ -13,13 +13,15 @@ import pytest
 
 from onboard.cli import main as onboard
 from onboard.conform.checks import Check, CheckResult, Findings, Verdict
+from onboard.conform.cli import Bench
 from onboard.conform.player import Player, Scene
 from onboard.conform.report import NodeUnderTest, frame_words, junit, lines_of, protocol, status, totals
-from onboard.conform.stage import Means
+from onboard.conform.stage import Means, PlatformRun
 from onboard.conform.suite import scenes_of, watchers_of
 from onboard.contract.messages import Heartbeat
 from onboard.core.negotiation.participant import Participant
 from onboard.holon.holding import HoldResponse, MachineHolds
+from onboard.io.open_bus import BusSettings, open_bus
 from onboard.systems.car_park.site import CarPark
 from onboard.wire.codec import fleet_codec
 from tests.conform.bench import ALL, SITE, SITES, play
@@ -35,6 +37,8 @@ CHECKS: tuple[Check, ...] = (
 )
 #: Scenes that are played only where there is a second robot.
 WITH_ANOTHER = [one for one in scenes_of(SITE) if one.needs_rival]
+#: Scenes that are played only where there is a lift (test_lift.py).
+WITH_A_LIFT = [one for one in scenes_of(SITE) if one.needs_lift]
 SUBJECT = NodeUnderTest(
     11, "MR1", "robot", "bench", 0xABCD, 254, "onboard 0", "virtual bench", "2026-01-01T00:00:00+00:00"
 )
@@ -83,18 +87,26 @@ def test_our_robot_keeps_to_all_of_it() -> None:
     findings = ours().findings
     broken = [line for one in findings.of(Verdict.FAILED) for line in lines_of(one, frame_words)]
     assert broken == [] and status(findings) == 0
-    alone = "the site has no further robot that the kit could speak as"
-    assert {one.scene for one in findings.of(Verdict.NOT_REACHED)} == {one.name for one in WITH_ANOTHER}
-    assert {one.why for one in findings.of(Verdict.NOT_REACHED)} == {alone}
+    lacks = {f"the site has no {what} that the kit could speak as" for what in ("further robot", "lift")}
+    elsewhere = {one.name for one in (*WITH_ANOTHER, *WITH_A_LIFT)}
+    assert {one.scene for one in findings.of(Verdict.NOT_REACHED)} == elsewhere
+    assert {one.why for one in findings.of(Verdict.NOT_REACHED)} == lacks
 
 
-@pytest.mark.parametrize("site", SITES[1:], ids=lambda one: one.name)
+@pytest.mark.parametrize("site", SITES[1:3], ids=lambda one: one.name)
 @pytest.mark.parametrize("scene", WITH_ANOTHER, ids=lambda one: one.name)
 def test_our_robot_keeps_to_all_of_it_beside_another(scene: Scene, site: CarPark) -> None:
     findings = play((scene.name,), site=site).findings
     broken = [line for one in findings.of(Verdict.FAILED) for line in lines_of(one, frame_words)]
     reached = {one.check.name for one in findings.of(Verdict.PASSED)}
     assert broken == [] and {one.name for one in scene.checks} <= reached
+
+
+@pytest.mark.parametrize("site", SITES[1:3], ids=lambda one: one.name)
+def test_our_robot_keeps_to_the_whole_play_as_the_mutants_have_it(site: CarPark) -> None:
+    """Each scene begins where the one before has left all: a check that fails only so would catch every mutant."""
+    findings = play(site=site).findings
+    assert [line for one in findings.of(Verdict.FAILED) for line in lines_of(one, frame_words)] == []
 
 
 def test_without_a_switch_and_a_car_it_is_judged_as_far_as_it_can_be() -> None:
@@ -123,7 +135,7 @@ def test_the_robot_of_the_page_keeps_to_all_beside_another_but_what_is_newer() -
     """Written from the page in another language (tests/foreign)."""
     with Foreign() as robot:
         findings = play(site=SITES[1], joins=robot.joins).findings
-    assert names(findings, Verdict.NOT_REACHED) == []
+    assert {one.scene for one in findings.of(Verdict.NOT_REACHED)} == {one.name for one in WITH_A_LIFT}
     assert names(findings, Verdict.FAILED) == NEWER
 
 
@@ -132,7 +144,7 @@ def test_the_robot_of_the_page_keeps_to_all_that_it_meets_alone_but_what_is_newe
         findings = play(joins=robot.joins).findings
     assert set(names(findings, Verdict.FAILED)) <= set(NEWER)
     unreached = {one.scene for one in findings.of(Verdict.NOT_REACHED)}
-    assert unreached == {one.name for one in WITH_ANOTHER}
+    assert unreached == {one.name for one in (*WITH_ANOTHER, *WITH_A_LIFT)}
 
 
 def test_who_is_not_there_does_not_conform() -> None:
@@ -212,14 +224,42 @@ MISTAKES = [
     (["--node", "1", "--kind", "compartment"], "--kind compartment: only robots of a car park can be judged yet"),
     (["--node", "11", "--kind", "robot", "--scene", "biding"], "--scene biding: not known; --list tells all"),
     (["--node", "11", "--kind", "robot", "--power", "./nowhere"], "--power ./nowhere: no program that can be run"),
+    (["--node", "11", "--kind", "robot", "--lift", "./nowhere"], "--lift ./nowhere: no program that can be run"),
     (["--node", "11", "--kind", "robot", "--junit", "/no/where.xml"], "/no/where.xml: No such file or directory; name"),
 ]
 
 
-def test_a_site_with_lifts_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["conform", "--node", "11", "--kind", "robot", "--site", "small", "-i", "virtual", "-c", "none"]
+@pytest.mark.parametrize(
+    ("site", "told"),
+    [
+        ("small", "--site small: it has ER1, ER2; one lift is played at most; take a smaller site"),
+        (
+            str(BENCH.with_name("lift.toml")),
+            "--site lift: it has ER1; nobody moves its platform; name a program that does: --lift",
+        ),
+    ],
+)
+def test_a_site_with_two_lifts_or_a_platform_that_nobody_moves_is_refused(
+    site: str, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["conform", "--node", "11", "--kind", "robot", "--site", site, "-i", "virtual", "-c", "none"]
     assert onboard(words) == 2
-    assert "--site small: it has ER1, ER2; lifts are not played yet" in capsys.readouterr().err
+    assert capsys.readouterr().err == f"onboard conform: {told}\n"
+
+
+async def test_what_moves_a_platform_is_told_lift_and_stop(tmp_path: Path) -> None:
+    told, mover = tmp_path / "told", tmp_path / "mover"
+    mover.write_text(f"#!/bin/sh\necho $@ >{told}\n", encoding="utf-8")
+    mover.chmod(0o755)
+    player = Player(SITES[3], 11, fleet_codec(), scenes_of(SITES[3])[:1], ALL)
+    player.stage.rides.append(PlatformRun(5, 2, 1_000))
+    bus = await open_bus(BusSettings(interface="virtual", channel="moved", bitrate=500_000))
+    bench = Bench(player, bus, None, str(mover))
+    assert bench.running is not None
+    await bench.running
+    await bench.end()
+    await bus.close()
+    assert told.read_text(encoding="utf-8") == "5 2\n"
 
 
 @pytest.mark.parametrize(("words", "told"), MISTAKES)

@@ -1,10 +1,12 @@
 """What ``python -m tests.conform.mutants`` does to a line, and that the play tells it."""
 
 import ast
+import sys
 
 import pytest
 
-from tests.conform.mutants import mutated, mutations
+from tests.conform import mutants
+from tests.conform.mutants import UNCHANGED, Mutation, mutated, mutations
 from tests.project.rows import ROOT
 
 PARTICIPANT = "onboard/core/negotiation/participant.py"
@@ -52,3 +54,16 @@ def test_all_lines_of_a_function_and_none_outside_are_drawn_from() -> None:
     lines = {one.line for one in mutations(PARTICIPANT, set(range(1, 1_000)))}
     outside = {one.lineno for one in ast.parse(text).body if isinstance(one, ast.Import | ast.ImportFrom)}
     assert len(lines) > 40 and not lines & outside
+
+
+def test_nothing_is_measured_by_a_kit_that_our_robot_as_it_is_does_not_keep_to(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def judge(mutation: Mutation) -> list[str]:
+        return ["a-check"] if mutation == UNCHANGED else []
+
+    monkeypatch.setattr(sys, "argv", ["mutants"])
+    monkeypatch.setattr(mutants, "draw", lambda *_: [])
+    monkeypatch.setattr(mutants, "judge", judge)
+    assert mutants.main() == 2
+    assert "our robot as it is breaks a-check" in capsys.readouterr().out

@@ -1,7 +1,9 @@
 """What the kit of conformity (onboard/conform) plays and judges of a car park's nodes."""
 
 from onboard.systems.car_park.conform import (
+    aboard,
     anew,
+    asking,
     awards,
     blocked,
     calls,
@@ -9,6 +11,8 @@ from onboard.systems.car_park.conform import (
     lives,
     meanwhile,
     plans,
+    platforms,
+    rides,
     rights,
     traffic,
     work,
@@ -27,7 +31,10 @@ SCENES = (
     *company.SCENES,
     *yielding.SCENES,
     *traffic.SCENES,
+    *asking.SCENES,
+    *rides.SCENES,
+    *aboard.SCENES,
 )
-WATCHERS = ((plans.PLANS, plans.watch),)
+WATCHERS = ((plans.PLANS, plans.watch), ((), platforms.watch))
 #: Behind all others: rights that are made anew, and a node that has lost its own.
 LAST = anew.LAST

@@ -248,7 +248,7 @@ def _given_up(stage: Stage, desk: Desk) -> Generator[Wait, None, None]:
     if bid is not None:
         over_ms = desk.over_ms(call, bid)
         least_ms = desk.floor_over_ms()
-        is_free = over_ms <= least_ms + desk.run_us(1, desk.site.tracks[desk.bay.track].length) // 1000
+        is_free = over_ms <= least_ms + desk.approach_us() // 1000
         stage.judge("gives-its-bid-up-after-T-belief", is_free, f"{over_ms - least_ms} ms above the floor", bid)
 
 

@@ -88,6 +88,9 @@ def _judge_bid(stage: Stage, desk: Desk, call: CallForProposals, bid: Word, begi
         stage.judge("bid-tells-no-plan", not bid.message.itinerary_version and not plans, "a plan with it", bid, *plans)
     above_ms = desk.over_ms(call, bid) - desk.floor_over_ms()
     stage.judge("bid-is-not-below-the-floor", above_ms >= 0, f"{-above_ms} ms below", bid)
+    if stage.lift:
+        # Its delay is that of what it asks the lift (duty B11).
+        return
     waited_us, owed_us = bid.time_us - begin_us, desk.delay_us(above_ms * MS)
     what = f"after {waited_us} us; its delay is {owed_us} us"
     stage.judge("bid-waits-its-delay", waited_us >= owed_us - 2 * MS, what, bid)
@@ -357,7 +360,8 @@ def _late_or_twice(stage: Stage, desk: Desk, after: _After, before: int) -> Play
     stage.judge("call-twice-is-one", len(mine) == 1, f"{len(mine)} bids", *mine)
     above_us = (desk.over_ms(call, mine[0]) - desk.floor_over_ms()) * 1000 if mine else 0
     limit_us = begin_us + desk.delay_us(above_us) + stage.means.late_us
-    stage.judge("call-twice-waits-once", mine and mine[0].time_us <= limit_us, "waits since the second", *mine)
+    if not stage.lift:
+        stage.judge("call-twice-waits-once", mine and mine[0].time_us <= limit_us, "waits since the second", *mine)
     desk.withdraw(call)
     yield from stage.pause(2.5)
     told = [one for one in stage.since(Diagnostic, 0) if one.message.reason is Reason.INCOMPLETE_SET]

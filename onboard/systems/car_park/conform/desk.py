@@ -12,11 +12,14 @@ from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import Award, Bid, CallForProposals, CarAt, Reference
 from onboard.core.site import Segment, Station
 from onboard.core.token_keys import TokenKey
+from onboard.systems.car_park.conform.shafts import platform, platform_at, stop_at, stop_mm
 from onboard.systems.car_park.site import CarPark, car_park
 
 #: Duty B3: the task begins so long after the deadline; what a handling takes beside strokes and grip; the bay is ready
 #: so long after the call was opened, and its door's time, us.
 _AWARDED_US, _SETTLES_US, _DRIVER_US = 150_000, 400_000, 9_500_000
+#: Duty P4: what a ride takes for gate and sill, us.
+_GATE_US = 400_000
 #: Duty B4: a slot is 480 bit times and this, us.
 _SLOT_US = 500
 
@@ -28,6 +31,17 @@ def _run_us(way_mm: int, speed: int, acceleration: int) -> int:
     else:
         seconds = 2 * sqrt(way_mm / acceleration)
     return ceil(round(seconds * 1e6) / 1000) * 1000
+
+
+def rise_us(site: CarPark, lift: int, board: int, leave: int) -> int:
+    """Duty P4: the run of a lift's platform from stop to stop, us; ``lift`` is the number of its track."""
+    height_mm = abs(stop_mm(site, lift, leave) - stop_mm(site, lift, board))
+    return _run_us(height_mm, site.lift.speed_mm_s, site.lift.acceleration_mm_s2)
+
+
+def ride_us(site: CarPark, lift: int, board: int, leave: int) -> int:
+    """Duty P4: a ride from stop to stop, with gate and sill, us."""
+    return rise_us(site, lift, board, leave) + _GATE_US
 
 
 @dataclass
@@ -56,7 +70,10 @@ class Desk:
         return TokenKey(TokenKind.CAR, self.car.origin << 16 | self.car.number)
 
     def segment_at(self, track: int, index: int) -> Segment:
-        """The segment that a position is in: beyond a linked end it is the mouth."""
+        """The segment that a position is in: beyond a linked end it is the mouth, beyond a sill a lift's platform."""
+        lift = track if track in self.site.lifts else self.site.platforms.get(Segment(track, index))
+        if lift is not None:
+            return platform(lift)
         return self.site.mouths.get(Segment(track, index), Segment(track, index))
 
     def segment_key(self, track: int, index: int) -> TokenKey:
@@ -150,17 +167,39 @@ class Desk:
 
     def run_us(self, begin: int, end: int) -> int:
         """A run along the alley from index to index."""
+        return self.run_from_us(begin, 0, end)
+
+    def run_from_us(self, begin: int, offset_mm: int, end: int) -> int:
+        """A run along the alley from so far behind the mark of an index to that of another."""
         axis, pitch_mm = self.site.carrier, self.site.tracks[self.bay.track].pitch_mm
-        return _run_us(abs(end - begin) * pitch_mm, axis.speed_mm_s, axis.acceleration_mm_s2)
+        way_mm = abs((end - begin) * pitch_mm - offset_mm)
+        return _run_us(way_mm, axis.speed_mm_s, axis.acceleration_mm_s2)
 
     def floor_over_ms(self) -> int:
         """Duty B3: the floor of a call to park, in ms after its deadline."""
         window_us = self.site.timing.call_window_us
         ready_us = max(_AWARDED_US, _DRIVER_US + self.site.timing.door_us - window_us)
         at_bay_us = ready_us + self.handling_us(self.bay)
-        places = [place for place in self.site.places if place.track == self.bay.track]
-        ends = (self.run_us(self.bay.index, place.index) + self.handling_us(place) for place in places)
+        ends = (self._way_us(place) + self.handling_us(place) for place in self.site.places)
         return -(-(at_bay_us + min(ends)) // 1000)
+
+    def _way_us(self, place: Station) -> int:
+        """From the bay to before a place with all ways free: along its alley, or onto a lift, up and off it."""
+        if place.track == self.bay.track:
+            return self.run_us(self.bay.index, place.index)
+        found = []
+        for lift in self.site.lifts:
+            board, leave = (stop_at(self.site, lift, one.track) for one in (self.bay, place))
+            near, far = (platform_at(self.site, lift, one.track) for one in (self.bay, place))
+            if board is not None and leave is not None and near is not None and far is not None:
+                runs_us = self.run_us(self.bay.index, near.index) + self.run_us(far.index, place.index)
+                found.append(runs_us + ride_us(self.site, lift, board, leave))
+        return min(found, default=1 << 62)
+
+    def approach_us(self) -> int:
+        """To the bay from where a robot may rest at the farthest."""
+        along_us = self.run_us(1, self.site.tracks[self.bay.track].length)
+        return along_us + sum(along_us + ride_us(self.site, lift, 1, 2) for lift in self.site.lifts)
 
     def over_ms(self, call: CallForProposals, bid: Word) -> int:
         """A bid's cost in ms after the deadline of its call."""

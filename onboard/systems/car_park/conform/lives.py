@@ -154,7 +154,7 @@ def _cut(
     told = {_key(one): one.message.version for one in stage.since(TokenHeld, begin_us) if one.time_us <= asks_us}
     lacks = {key: version for key, version in held.items() if told.get(key) != version}
     stage.judge(f"cut-{name}-tells-what-it-holds", not lacks, f"does not tell {sorted(lacks)}", asks)
-    more = sorted(set(told) - set(held) - set(under_way))
+    more = sorted(set(told) - set(under_way) - set(cast.held_by(stage.node)))
     stage.judge(f"cut-{name}-holds-no-more", not more, f"holds {more}", *stage.since(TokenHeld, begin_us))
     stage.judge(f"cut-{name}-tells-before-it-asks", asks and not lacks, "asks before it has told all", asks)
     if gives:

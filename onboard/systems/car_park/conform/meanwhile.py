@@ -85,7 +85,7 @@ def two(stage: Stage, cast: Cast) -> Play:
     ):
         begin_us, call = stage.now_us, desk.call()
         stage.say(call)
-        yield from stage.pause(0.35)
+        yield from stage.pause(0.8 if stage.lift else 0.35)
         first = desk.bid_of(call, begin_us)
         if first is not None and result is CallResult.WITHDRAWN:
             over_ms, bid = yield from pair.asks()

@@ -69,12 +69,13 @@ class PlanJudge:
         if plan.grade is not Grade.FIRM or not plan.legs:
             return
         stage, pairs = self.stage, list(pairwise(plan.legs))
-        joined = all((a.track, a.to_index) == (b.track, b.from_index) or self._turns(a, b) for a, b in pairs)
+        joined = all(self._at(a, a.to_index) == self._at(b, b.from_index) or self._turns(a, b) for a, b in pairs)
         stage.judge("legs-follow-in-place", joined, "a leg begins where none ends", word)
         ordered = all((b.end_ms - a.end_ms) % 2**32 < 2**31 for a, b in pairs)
         stage.judge("legs-follow-in-time", ordered, "a leg ends before the one before it", word)
         stage.judge("plan-has-few-legs", len(plan.legs) <= _MOST_LEGS, f"{len(plan.legs)} legs", word)
-        short = [b for a, b in pairs if b.action is LegAction.TRAVEL and not self._lasts(a, b)]
+        first = next((leg for leg in plan.legs if leg.action is LegAction.TRAVEL), None)
+        short = [b for a, b in pairs if b.action is LegAction.TRAVEL and not self._lasts(a, b, is_first=b is first)]
         stage.judge("runs-take-their-time", not short, f"too short: {short}", word)
         for leg in plan.legs:
             self._on_leg(word, leg)
@@ -83,6 +84,13 @@ class PlanJudge:
             is_refuge = (last.track, last.to_index) not in {bay.segment for bay in self.site.compartments.values()}
             stage.judge("plan-ends-in-a-refuge", is_refuge, "ends before a compartment", word)
 
+    def _at(self, leg: Leg, index: int) -> Segment:
+        """Where a leg begins or ends: a ride at the platform as its floor's alley has it."""
+        if leg.track not in self.site.lifts:
+            return Segment(leg.track, index)
+        doors = self.site.tracks[leg.track].joins
+        return self.site.beyond(doors[index - 1]) if 0 < index <= len(doors) else Segment(leg.track, index)
+
     def _turns(self, before: Leg, leg: Leg) -> bool:
         """Whether a leg goes over a linked end, from where the one before it ends."""
         here, there = Segment(before.track, before.to_index), Segment(leg.track, leg.from_index)
@@ -90,10 +98,14 @@ class PlanJudge:
         ends = [{mouth, track.inside(index)} for track in tracks for index, mouth in track.ends]
         return leg.action is LegAction.TRAVEL and leg.from_index == leg.to_index and {here, there} in ends
 
-    def _lasts(self, before: Leg, leg: Leg) -> bool:
+    def _lasts(self, before: Leg, leg: Leg, *, is_first: bool) -> bool:
         lasts_us = (leg.end_ms - before.end_ms) % 2**32 * 1000
         if leg.from_index == leg.to_index:
             return lasts_us >= self.desk.run_us(0, 1) + self.site.carrier_turn_us - 2_000
+        at = self.stage.last(Progress)
+        if is_first and at is not None and at.message.track == leg.track and at.message.offset_mm:
+            # It stands beside a mark, as after a cut: the run is from there.
+            return lasts_us >= self.desk.run_from_us(at.message.index, at.message.offset_mm, leg.to_index) - 2_000
         return lasts_us >= self.desk.run_us(leg.from_index, leg.to_index) - 2_000
 
     def _on_leg(self, word: Word, leg: Leg) -> None:

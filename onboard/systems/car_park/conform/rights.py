@@ -24,6 +24,7 @@ from onboard.contract.messages import (
 )
 from onboard.core.token_keys import TokenKey, genesis_holder
 from onboard.systems.car_park.conform.desk import Desk
+from onboard.systems.car_park.site import car_park
 
 _REPEAT = "It is said again as in [K3]; all that I repeat together not more often than about once in `T_pace`."
 _COUNTS = (
@@ -283,7 +284,10 @@ def _to_another(stage: Stage, cast: Cast) -> Play:
 
 
 def _is_the_fleets(cast: Cast, one: TokenRequest) -> bool:
-    return one.token_kind is TokenKind.SEGMENT and cast.holder(TokenKey(one.token_kind, one.token))[0] in cast.parts
+    """A segment of the fleet's; a lift's platform and gate are nobody else's."""
+    is_lifts = one.token >> 8 in car_park(cast.stage.site).lifts
+    is_segment = one.token_kind is TokenKind.SEGMENT and not is_lifts
+    return is_segment and cast.holder(TokenKey(one.token_kind, one.token))[0] in cast.parts
 
 
 def _as_a_run(stage: Stage, cast: Cast) -> Play:
@@ -323,7 +327,7 @@ def _is_there(stage: Stage) -> Generator[Wait, None, Word | None]:
     def is_there(one: Progress) -> bool:
         return (one.track, one.index, one.speed_mm_s) == (bay.track, bay.index, 0)
 
-    return (yield from stage.hears(Progress, is_there, 60.0))
+    return (yield from stage.hears(Progress, is_there, 90.0))
 
 
 GIVING = (
