@@ -102,11 +102,11 @@ class PlanJudge:
         lasts_us = (leg.end_ms - before.end_ms) % 2**32 * 1000
         if leg.from_index == leg.to_index:
             return lasts_us >= self.desk.run_us(0, 1) + self.site.carrier_turn_us - 2_000
-        at = self.stage.last(Progress)
-        if is_first and at is not None and at.message.track == leg.track and at.message.offset_mm:
-            # It stands beside a mark, as after a cut: the run is from there.
-            return lasts_us >= self.desk.run_from_us(at.message.index, at.message.offset_mm, leg.to_index) - 2_000
-        return lasts_us >= self.desk.run_us(leg.from_index, leg.to_index) - 2_000
+        least_us, at = self.desk.run_us(leg.from_index, leg.to_index), self.stage.last(Progress)
+        if is_first and at is not None and at.message.track == leg.track:
+            # It may stand beside a mark, as after a cut, and nearer to where it goes.
+            least_us = min(least_us, self.desk.run_from_us(at.message.index, at.message.offset_mm, leg.to_index))
+        return lasts_us >= least_us - 2_000
 
     def _on_leg(self, word: Word, leg: Leg) -> None:
         stage, site = self.stage, self.site
