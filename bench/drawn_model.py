@@ -30,7 +30,7 @@ def row(number: int, trial: Trial, model: Outcome, plant: Outcome) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print a row for each site."""
-    parser = argparse.ArgumentParser(prog="python -m bench.drawn_model", description=(__doc__ or "").split("\n\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n\n")[0])
     parser.add_argument("sites", nargs="?", default="1-8", metavar="A-B", help="their numbers (1-8)")
     parser.add_argument("--system", choices=("car-park", "lines"), default="car-park")
     parser.add_argument("--cars", type=int, default=15)
