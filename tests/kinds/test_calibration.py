@@ -58,3 +58,11 @@ def test_before_anything_is_known_it_is_what_was_said_to_be_possible() -> None:
 def test_what_is_always_the_same_leaves_no_width() -> None:
     kept, widths = drawn("one value")
     assert all(kept) and widths[-1] == 0
+
+
+def test_where_nothing_is_left_out_it_is_all_that_was_seen_and_not_what_was_said_before() -> None:
+    """Misses bring the level down to nothing; what was possible before anything was known says no more then."""
+    calibration = Calibration()
+    for number in range(40):
+        calibration.learn(10_000_000 + number, is_kept=False)
+    assert calibration.interval(BEFORE) == (10_000_000, 10_000_039)

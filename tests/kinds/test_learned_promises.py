@@ -84,3 +84,24 @@ def test_who_leaves_without_the_car_teaches_nothing() -> None:
     bay.tickets.clear()
     assert bay.promises.review(BayPhase.FREE, 201 * 600_000_000) == []
     assert served(bay, 202, lateness_us(202)).spread_ms == words[-1]
+
+
+def test_behind_four_cars_what_they_took_lately_is_in_what_is_told() -> None:
+    """Four cars' constants are more than can be told: their late end alone left out every car that came."""
+    bay, each_us, kept = compartment(), 75_000_000, 0
+    for number in range(1, 9):
+        now_us = number * 10_000_000_000
+        queue = [Reference(BAY, 10 * number + place) for place in range(4)]
+        bay.tickets.extend(queue)
+        bay.promises.review(BayPhase.FREE, now_us)
+        said = bay.promises.review(BayPhase.FREE, now_us + 4_000_000)
+        last = [one.message for one in said if isinstance(one, Send)][-1]
+        assert isinstance(last, Promise) and last.car == queue[-1]
+        there_us = now_us + 4_000_000 + 4 * each_us
+        kept += abs(to_bus_ms(there_us) - last.ready_ms) <= last.spread_ms
+        bay.tickets.clear()
+        bay.calls.job = BayTask(queue[-1], Operation.RETRIEVE, queue[-1], 2_700, winner=ROBOT)
+        bay.promises.review(BayPhase.HANDOVER, there_us)
+        bay.calls.job = None
+        bay.promises.review(BayPhase.FREE, there_us + 1_000_000)
+    assert kept >= 7

@@ -13,6 +13,8 @@ from typing import NamedTuple
 MISSES_PPM = 100_000
 #: How far a miss moves the level, of what is then asked for: by 4.5 %, which nine hits take back (docs/decisions.md).
 STEP_PPM = 50_000
+#: So many are enough for the quantiles at that level; with all of these the level may have come to leave out none.
+FEWEST_KNOWN = 2 * 1_000_000 // MISSES_PPM - 1
 #: So many of the last are looked at: a day or two of a compartment's, so that it follows a change within days.
 MOST_SEEN = 100
 _ALL_PPM = 1_000_000
@@ -36,10 +38,16 @@ class Calibration:
         """The interval now; ``before``: what may be said while too few were seen for the level."""
         ordered = sorted(self._seen_us)
         outside = self.level_ppm * (len(ordered) + 1) // (2 * _ALL_PPM)
+        if outside < 1 and len(ordered) >= FEWEST_KNOWN:
+            return WaitInterval(ordered[0], ordered[-1])
         if outside < 1:
             return WaitInterval(min(before.low_us, ordered[0]), max(before.high_us, ordered[-1])) if ordered else before
         outside = min(outside, (len(ordered) + 1) // 2)
         return WaitInterval(ordered[outside - 1], ordered[-outside])
+
+    def middle_us(self) -> int | None:
+        """The median of what was seen; None of nothing."""
+        return sorted(self._seen_us)[len(self._seen_us) // 2] if self._seen_us else None
 
     def learn(self, seen_us: int, *, is_kept: bool) -> None:
         """One more was seen, and whether it was in the interval that had been said of it."""

@@ -161,10 +161,17 @@ class Promises:
         return self._expected(PromiseCase(min(times, PromiseCase.BEHIND_MORE.value)), times, from_us, constants)
 
     def _expected(self, case: PromiseCase, times: int, from_us: int, constants: WaitInterval) -> Expected:
-        """Steps that are more than the interval are told before it: the car comes no later than learned."""
-        low_us, high_us = (from_us + times * end_us for end_us in self._learned[case].interval(constants))
+        """Steps that are more than the interval are told before it: the car comes no later than learned.
+
+        Of one that is wider than can be told, what lies about the median is told.
+        """
+        learned = self._learned[case]
+        low_us, high_us = (from_us + times * end_us for end_us in learned.interval(constants))
         steps = min(max(1, -((low_us - high_us) // (2 * STEP_US))), MOST_STEPS)
         ready_us = min(high_us - steps * STEP_US, (low_us + high_us) // 2)
+        middle_us = learned.middle_us()
+        if middle_us is not None and 2 * steps * STEP_US < high_us - low_us:
+            ready_us = max(low_us + steps * STEP_US, min(from_us + times * middle_us, ready_us))
         return Expected(case, times, from_us, ready_us // 1000 * 1000, steps * STEP_US)
 
     def _word(self, car: Reference, said: Expected) -> Promise:
