@@ -192,7 +192,10 @@ class Roads:
         return found
 
     def shortest_us(self, origin: Segment, goal: Segment) -> int:
-        """Least time between two positions with nobody in the way and every lift at hand; FOREVER without a way."""
+        """Least time between two positions with nobody in the way and every lift at hand; FOREVER without a way.
+
+        Also from where no carrier can be at rest: a machine that stopped amid a hop says that it is there.
+        """
         found = self._shortest_us.get((origin, goal))
         if found is None:
             if len(self._shortest_us) >= _MAX_SHORTEST:
@@ -202,6 +205,8 @@ class Roads:
 
     def nearest_us(self, origin: Segment, goals: frozenset[Segment]) -> int:
         """Least time to any of ``goals`` as in ``shortest_us``."""
+        if not self.knows(origin):
+            return FOREVER
         ways = self._ways_to(goals)
         durations = self._run_us[origin.track]
         least_us = FOREVER

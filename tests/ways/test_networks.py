@@ -14,7 +14,8 @@ from onboard.ways.floor_plan import Mismatch, Point, at_mm, floor_plan
 from onboard.ways.lift_uses import are_compatible
 from onboard.ways.occupancy import final_position, itinerary_windows, leg_windows, lift_uses
 from onboard.ways.refuges import open_refuges, refuges
-from onboard.ways.reservations import Reservations
+from onboard.ways.reservations import FOREVER, Reservations
+from onboard.ways.roads import roads_of
 from onboard.ways.room import reachable, resting_room
 from onboard.ways.sipp import Route, Visit, plan_route
 from onboard.ways.site import BayUse
@@ -201,3 +202,12 @@ def test_a_car_goes_where_every_car_of_its_class_fits() -> None:
     assert [site.takes(low, one) for one in (0, 1, 2)] == [False, True, False]
     assert [site.takes(high, one) for one in (0, 1, 2)] == [False, True, True]
     assert [class_of_end(open_end(one)) for one in (0, 1, 15)] == [0, 1, 15] and class_of_end(high.number) is None
+
+
+def test_from_where_no_carrier_rests_no_way_leads_and_nothing_is_raised() -> None:
+    """A robot that stopped amid its hop into a branch of one position stands at index 0 (drawn car parks, 3380)."""
+    site = branched()
+    roads, goal = roads_of(site), min(refuges(site))
+    beyond = [Segment(track.number, index) for track in site.tracks.values() for index in (0, track.length + 1, 255)]
+    outside = [one for one in beyond if not roads.knows(one)]
+    assert outside and {roads.shortest_us(one, goal) for one in outside} == {FOREVER}
