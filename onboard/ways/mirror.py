@@ -45,6 +45,8 @@ class WayMirror(CarMirror):
     obstacles: Obstacles = field(init=False)
     standing: Standing = field(init=False)
     blocked_words: BlockedWords = field(init=False)
+    #: Whose plan is thought of for a while (``as_told``): what it really told hinders no run of mine.
+    _as_told: int = NOBODY
 
     def __post_init__(self) -> None:
         self.order = PassingOrder(self.site)
@@ -166,9 +168,12 @@ class WayMirror(CarMirror):
     @contextmanager
     def as_told(self, plan: BegunItinerary, now_us: int) -> Iterator[None]:
         """Plan around this plan of a machine, as if it had told that and no other."""
+        node = plan.itinerary.sender
         self._occupy(plan, now_us)
+        self._as_told = node
         yield
-        self._occupy(self.plans[plan.itinerary.sender], now_us)
+        self._as_told = NOBODY
+        self._occupy(self.plans[node], now_us)
 
     def slots_of(self, machine: Machine, holder_of: Callable[[TokenKey], int]) -> frozenset[Segment]:
         """Slots that a machine is in by its last word, and those whose tokens it holds."""
@@ -221,7 +226,9 @@ class WayMirror(CarMirror):
         found = self.reservations
         for node in sorted(self.plans) if not may_stay else ():
             place, comes_us = self.order.place(node), self.order.comes_us(node, here)
-            if node != self.node_id and place is not None and comes_us is not None and comes_us < from_us:
+            if node in (self.node_id, self._as_told) or place is None:
+                continue
+            if comes_us is not None and comes_us < from_us:
                 found = found.copy() if found is self.reservations else found
                 found.release(node)
                 found.reserve(node, [SlotWindow(slot, 0, FOREVER) for slot in standing_segments(self.site, place)])

@@ -195,12 +195,46 @@ class PassingOrder:
             return None
         return next((turn.from_us for turn in way.open_turns(there) if turn.to_come == way.to_come(number)), None)
 
+    def comes_next(self, node: int, there: Segment) -> bool:
+        """Whether the next move of ``node`` by its plan, a hop too, takes the segment ``there``."""
+        way = self._ways.get(node)
+        if way is None:
+            return False
+        legs = way.itinerary.legs
+        number = next((number for number in range(way.leg, len(legs)) if moves(legs[number])), None)
+        return number is not None and any(turn.to_come == way.to_come(number) for turn in way.open_turns(there))
+
     def in_front(self, node: int, other: int, meeting: Meeting) -> int:
         """Who of two that meet passes first by where it is; NOBODY where that does not tell."""
         if self._is_in_front(node, other, meeting.segment, meeting.mine, meeting.theirs):
             return other
         is_mine = self._is_in_front(other, node, meeting.segment, meeting.theirs, meeting.mine)
         return node if is_mine else NOBODY
+
+    def behind_us(self, node: int, other: int, meetings: Sequence[Meeting]) -> int:
+        """How much later than told the leg of ``node`` in these meetings has to begin to come behind ``other``, us.
+
+        Of two that meet head on, who came behind in one segment and before in the next would run into the other: it
+        comes behind all that the other does there in the legs that it meets and right after them. Where ``node`` is to
+        be first by what they last agreed, the other comes later.
+        """
+        mine, theirs = self._ways[node], self._ways[other]
+        (to_come,) = {meeting.mine.to_come for meeting in meetings}
+        met = {meeting.theirs.to_come for meeting in meetings}
+        pairs = [
+            (one, two)
+            for segment in mine.turns.keys() & theirs.turns.keys()
+            for one in mine.open_turns(segment)
+            for two in theirs.open_turns(segment)
+            if one.to_come == to_come and met & {two.to_come, two.to_come + 1}
+            if two.to_us < FOREVER and self._agreed_first(node, other, segment, one, two) != node
+        ]
+        by_us = max(meeting.theirs.to_us - meeting.mine.from_us for meeting in meetings)
+        while True:
+            still = [(one, two) for one, two in pairs if overlap_us(one.later(by_us), two) > TOLERANCE_US]
+            if not still:
+                return by_us
+            by_us = max(two.to_us - one.from_us for one, two in still)
 
     # --- plans made at the same time ---------------------------------------------------------------------------
 

@@ -14,7 +14,7 @@ from onboard.core.serial import from_bus_ms, ms_after, to_bus_ms
 from onboard.core.site import Segment
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lifts import lift_at
-from onboard.ways.occupancy import final_position, leg_begins_us
+from onboard.ways.occupancy import final_position, hop_origins, leg_begins_us, turn_in_us, turned_in
 from onboard.ways.site import WaySite
 from onboard.ways.told_way import BegunItinerary, moves, worked
 
@@ -62,18 +62,22 @@ def put_off(site: WaySite, plan: BegunItinerary, leg_in_hand: int, place: Segmen
     None amid a ride or a hop, or where the plan leads through no such place.
     """
     legs, number = plan.itinerary.legs, leg_in_hand
+    if any(leg.track not in site.tracks for leg in legs):
+        return None
     while number < len(legs) and not moves(legs[number]) and not _is_through(legs[number], place):
         # A wait that was told with the run behind it, so that all know when that began.
         number += 1
-    if number >= len(legs) or any(leg.track not in site.tracks for leg in legs) or not _is_through(legs[number], place):
+    hops = number < len(legs) and _hops_from(site, legs[number], place)
+    if number >= len(legs) or not (hops or _is_through(legs[number], place)):
         return None
     begins_us = leg_begins_us(plan.itinerary, until_us, plan.first_begin_us)
     ends_us = [*begins_us[1:], max(begins_us[-1], from_bus_ms(legs[-1].end_ms, until_us))]
     run = legs[number]
-    told = [
-        run._replace(action=LegAction.STAND, from_index=place.index, end_ms=to_bus_ms(until_us), to_index=place.index)
-    ]
-    if run.action is LegAction.TRAVEL and place.index != run.to_index:
+    told = [Leg(LegAction.STAND, place.track, place.index, place.index, run.side, to_bus_ms(until_us))]
+    if hops:
+        until_us += turn_in_us(site, place.track if site.tracks[place.track].ends else run.track)
+        told.append(run._replace(end_ms=to_bus_ms(until_us)))
+    elif run.action is LegAction.TRAVEL and place.index != run.to_index:
         until_us += run_duration_us(abs(run.to_index - place.index) * site.tracks[run.track].pitch_mm, site.carrier)
         told.append(run._replace(from_index=place.index, end_ms=to_bus_ms(until_us)))
     for leg, begin_us, end_us in zip(legs[number + 1 :], begins_us[number + 1 :], ends_us[number + 1 :], strict=True):
@@ -89,6 +93,13 @@ def _is_through(leg: Leg, place: Segment) -> bool:
     if leg.action is LegAction.TRAVEL and leg.from_index == leg.to_index:
         return False
     return min(leg.from_index, leg.to_index) <= place.index <= max(leg.from_index, leg.to_index)
+
+
+def _hops_from(site: WaySite, leg: Leg, place: Segment) -> bool:
+    """Whether a leg is a hop through a mouth that begins at a place, turned there already or not."""
+    if leg.action is not LegAction.TRAVEL or leg.from_index != leg.to_index:
+        return False
+    return bool({place, turned_in(site, place)} & {*hop_origins(site, Segment(leg.track, leg.from_index))})
 
 
 def _is_aboard(site: WaySite, legs: tuple[Leg, ...]) -> bool:

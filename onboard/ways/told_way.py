@@ -72,6 +72,10 @@ class Turn(NamedTuple):
     from_us: int
     to_us: int
 
+    def later(self, by_us: int) -> "Turn":
+        """The same turn so much later."""
+        return Turn(self.to_come, self.from_us + by_us, self.to_us + by_us)
+
 
 Turns = dict[Segment, list[Turn]]
 

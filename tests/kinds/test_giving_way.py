@@ -173,6 +173,18 @@ def test_where_there_is_no_other_way_one_comes_behind_on_the_old() -> None:
     assert second.fleet.mirror.order.meetings(SECOND, FIRST) == []
 
 
+def test_who_comes_behind_one_that_it_meets_head_on_waits_until_that_is_past() -> None:
+    """On a drawn site it went by in one slot behind the other, in the next before it, and both stood face to face."""
+    site = line_site(9, 10, QUICK, 10, spur_at=3)
+    out = [stand(7, 0, 200), travel(7, 3, 200, 250), CarStep(LegAction.TRAVEL, SPUR, 1, 1, 250 * MS, 270 * MS)]
+    first = robot(site, FIRST, out, award_ms=1)
+    second = robot(site, SECOND, [stand(1, 0, 100), travel(1, 8, 100, 180)], award_ms=2)
+    assert second.hears(first.told()) is YieldDecision.ANEW
+    assert second.giving_way.fall_back(FIRST, 0) is YieldDecision.LATER
+    second.fleet.mirror.on_itinerary(second.told(), 0)
+    assert second.fleet.mirror.order.meetings(SECOND, FIRST) == []
+
+
 def test_what_is_over_means_nothing() -> None:
     one, two = pair()
     one.program.delay(1, 140 * MS)

@@ -58,7 +58,7 @@ class GivingWay:
         decisive = min(unordered, key=_begin, default=None)
         if decisive is not None and self._has_to_turn(decisive, sender, yields):
             return YieldDecision.ANEW
-        answer = self._come_behind([meeting for meeting in meetings if meeting.first == sender])
+        answer = self._come_behind(sender, [meeting for meeting in meetings if meeting.first == sender])
         if answer is YieldDecision.NOTHING and unordered and self._is_counted_on(sender):
             # It may have counted on my way back to yield; that is begun, and it hears so.
             self.program.shift(0)
@@ -83,7 +83,8 @@ class GivingWay:
 
     def fall_back(self, sender: int, now_us: int) -> YieldDecision:
         """Where no other way was found: come behind ``sender`` on the way that I have."""
-        return self._come_behind([one for one in self._meetings(sender, now_us) if one.first != self.fleet.node_id])
+        meetings = self._meetings(sender, now_us)
+        return self._come_behind(sender, [meeting for meeting in meetings if meeting.first != self.fleet.node_id])
 
     def _meetings(self, sender: int, now_us: int) -> list[Meeting]:
         found = self.fleet.mirror.order.meetings(self.fleet.node_id, sender)
@@ -104,7 +105,7 @@ class GivingWay:
             return yields == self.fleet.node_id
         return self.fleet.mirror.order.ranks_before(sender, self.fleet.node_id)
 
-    def _come_behind(self, meetings: list[Meeting]) -> YieldDecision:
+    def _come_behind(self, sender: int, meetings: list[Meeting]) -> YieldDecision:
         """Move each of my steps so far that it begins when the others' turns are over; work in hand stays as it is."""
         ends_us: dict[int, list[Meeting]] = {}
         for meeting in meetings:
@@ -120,13 +121,14 @@ class GivingWay:
                 n for n, _ in _moving(self.program.remaining) if _to_come(self.program.remaining, n) == to_come
             )
             now = self.program.remaining[number]
-            lacking_us = max(meeting.theirs.to_us - meeting.mine.from_us for meeting in ends_us[to_come])
             if number == 0 and now.action is LegAction.WORK:
                 # I am there: to stay for longer than the work takes helps nobody, and all would plan around that.
                 continue
             if number == 0:
+                lacking_us = max(meeting.theirs.to_us - meeting.mine.from_us for meeting in ends_us[to_come])
                 by_us = lacking_us - _slack_us(self.fleet.site, now)
             else:
+                lacking_us = self.fleet.mirror.order.behind_us(self.fleet.node_id, sender, ends_us[to_come])
                 by_us = lacking_us - (now.begin_us - step.begin_us)
             if by_us > TOLERANCE_US:
                 self.program.delay(number, by_us)

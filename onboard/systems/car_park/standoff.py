@@ -41,8 +41,11 @@ class Standoff:
         node, until_us = self._turned
         if node == other and now_us < until_us:
             return self.fleet.node_id
-        is_first = self._with == other and self.fleet.mirror.order.ranks_before(self.fleet.node_id, other)
-        return other if is_first else NOBODY
+        order = self.fleet.mirror.order
+        if self._with != other or not order.ranks_before(self.fleet.node_id, other):
+            return NOBODY
+        here = order.place(self.fleet.node_id)
+        return NOBODY if here is not None and order.comes_next(other, here) else other
 
     def look(self, now_us: int) -> int:
         """The robot to turn away from, once that is due; NOBODY else."""
