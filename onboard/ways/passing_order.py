@@ -32,7 +32,6 @@ from onboard.ways.told_way import (
     conflict,
     has_work,
     meet,
-    moves,
     overlap_us,
 )
 
@@ -198,11 +197,10 @@ class PassingOrder:
     def comes_next(self, node: int, there: Segment) -> bool:
         """Whether the next move of ``node`` by its plan, a hop too, takes the segment ``there``."""
         way = self._ways.get(node)
-        if way is None:
+        number = None if way is None else way.next_move()
+        if way is None or number is None:
             return False
-        legs = way.itinerary.legs
-        number = next((number for number in range(way.leg, len(legs)) if moves(legs[number])), None)
-        return number is not None and any(turn.to_come == way.to_come(number) for turn in way.open_turns(there))
+        return any(turn.to_come == way.to_come(number) for turn in way.open_turns(there))
 
     def in_front(self, node: int, other: int, meeting: Meeting) -> int:
         """Who of two that meet passes first by where it is; NOBODY where that does not tell."""
@@ -304,8 +302,7 @@ class PassingOrder:
         way = self._ways.get(node)
         if way is None or there is None:
             return None
-        legs = way.itinerary.legs
-        number = next((number for number in range(way.leg, len(legs)) if moves(legs[number])), None)
+        legs, number = way.itinerary.legs, way.next_move()
         if number is None or legs[number].action is not LegAction.TRAVEL or legs[number].track != there.track:
             return None
         run, step = legs[number], _step(legs[number])

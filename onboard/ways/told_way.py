@@ -186,6 +186,11 @@ class ToldWay:
         ends = [stay[0].to_come, stay[-1].to_come] if stay else []
         return ends == [first, last] and all(one.to_us >= two.from_us for one, two in pairwise(stay))
 
+    def next_move(self) -> int | None:
+        """Number of its next moving leg, the one in hand where that moves; None where there is none."""
+        legs = self.itinerary.legs
+        return next((number for number in range(self.leg, len(legs)) if moves(legs[number])), None)
+
     def to_come(self, leg: int) -> int:
         """How many moving legs come behind leg number ``leg``."""
         return sum(moves(one) for one in self.itinerary.legs[leg + 1 :])
