@@ -185,6 +185,14 @@ def test_who_comes_behind_one_that_it_meets_head_on_waits_until_that_is_past() -
     assert second.fleet.mirror.order.meetings(SECOND, FIRST) == []
 
 
+def test_nobody_comes_behind_what_another_puts_off_for_hours() -> None:
+    """On a drawn site three came behind each other in turn until no time on the wire was late enough, and stood."""
+    one, two = pair()
+    one.program.delay(1, 2 * 3_600_000 * MS)
+    assert two.hears(one.told()) is YieldDecision.NOTHING
+    assert begins_ms(two) == [0, 300]
+
+
 def test_what_is_over_means_nothing() -> None:
     one, two = pair()
     one.program.delay(1, 140 * MS)

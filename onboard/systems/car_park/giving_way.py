@@ -27,6 +27,10 @@ from onboard.ways.reservations import FOREVER
 from onboard.ways.site import WaySite
 from onboard.ways.told_way import TOLERANCE_US, Turn, has_work
 
+#: Nobody comes behind what another plans to do later than so long from now, us: no work that is done takes so long, and
+#: plans that are put off by each other for ever would end where no leg can be told any more (4.6 h, 24 bits of ms).
+FARTHEST_US = 3_600_000_000
+
 
 class YieldDecision(Enum):
     """What a machine does about another's plan."""
@@ -58,7 +62,7 @@ class GivingWay:
         decisive = min(unordered, key=_begin, default=None)
         if decisive is not None and self._has_to_turn(decisive, sender, yields):
             return YieldDecision.ANEW
-        answer = self._come_behind(sender, [meeting for meeting in meetings if meeting.first == sender])
+        answer = self._come_behind(sender, [meeting for meeting in meetings if meeting.first == sender], now_us)
         if answer is YieldDecision.NOTHING and unordered and self._is_counted_on(sender):
             # It may have counted on my way back to yield; that is begun, and it hears so.
             self.program.shift(0)
@@ -84,7 +88,8 @@ class GivingWay:
     def fall_back(self, sender: int, now_us: int) -> YieldDecision:
         """Where no other way was found: come behind ``sender`` on the way that I have."""
         meetings = self._meetings(sender, now_us)
-        return self._come_behind(sender, [meeting for meeting in meetings if meeting.first != self.fleet.node_id])
+        behind = [meeting for meeting in meetings if meeting.first != self.fleet.node_id]
+        return self._come_behind(sender, behind, now_us)
 
     def _meetings(self, sender: int, now_us: int) -> list[Meeting]:
         found = self.fleet.mirror.order.meetings(self.fleet.node_id, sender)
@@ -105,11 +110,11 @@ class GivingWay:
             return yields == self.fleet.node_id
         return self.fleet.mirror.order.ranks_before(sender, self.fleet.node_id)
 
-    def _come_behind(self, sender: int, meetings: list[Meeting]) -> YieldDecision:
+    def _come_behind(self, sender: int, meetings: list[Meeting], now_us: int) -> YieldDecision:
         """Move each of my steps so far that it begins when the others' turns are over; work in hand stays as it is."""
         ends_us: dict[int, list[Meeting]] = {}
         for meeting in meetings:
-            if meeting.theirs.to_us < FOREVER:
+            if meeting.theirs.to_us < now_us + FARTHEST_US:
                 ends_us.setdefault(meeting.mine.to_come, []).append(meeting)
         planned = {_to_come(self.program.remaining, number): step for number, step in _moving(self.program.remaining)}
         answer = YieldDecision.NOTHING
