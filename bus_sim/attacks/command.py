@@ -127,6 +127,9 @@ def _plan(args: argparse.Namespace, site: Site) -> TrialSettings:
         name = site.machines[args.node].name
         remedy = 'give a number that no machine there has, a site with seals = "required", or --insider'
         raise DemandError(f"--node {args.node}: that is {name} of {site.name}; {remedy}")
+    if args.node is not None and args.node > MAX_NODE_ID and site.seals != "required" and not args.insider:
+        remedy = f'give one up to {MAX_NODE_ID}, a site with seals = "required", or --insider'
+        raise DemandError(f"--node {args.node}: that is a person's tool, and is believed; {remedy}")
     if args.insider and args.node is not None and not is_of_site and args.node <= MAX_NODE_ID:
         remedy = f"give one of those, a tool's from {MAX_NODE_ID + 1} to 255, or none"
         raise DemandError(f"--node {args.node}: no machine of {site.name}; {remedy}")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bus_sim.attacks import watch
+from bus_sim.attacks import watch, words, work
 from bus_sim.attacks.catalogue import ATTACKS
 from bus_sim.attacks.trials import MISSES, AttackVerdict, TrialSettings, run_attack
 from bus_sim.cli import main
@@ -77,6 +77,15 @@ def test_what_nobody_names_or_gets_over_in_time_is_told(monkeypatch: pytest.Monk
     assert result.back_s is not None and result.back_s > 15
 
 
+def test_an_attacker_that_breaks_down_is_told_and_not_called_harmless(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An exception in a timer of the plant's, or in who hears a frame, was printed only, and the attack was over."""
+    for broken, where in ((words.HoldAll, "words"), (work.CheapestBids, "hear")):
+        monkeypatch.setattr(broken, where, lambda *_: 1 // 0)
+    for attack in ("hold-all", "bids"):
+        result = run_attack(replace(PLANS["graph"], demand=OrderArrivals(1, 1.0)), (attack, 1))
+        assert (result.verdict, result.why.split(":")[1]) == (AttackVerdict.HARMFUL, " ZeroDivisionError")
+
+
 def test_the_command_prints_a_row_for_each_attack_and_goes_on_where_its_file_ends(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -100,6 +109,7 @@ def test_the_command_prints_a_row_for_each_attack_and_goes_on_where_its_file_end
         (["--node", "11"], "--node 11: that is"),
         (["--node", "240", "--insider"], "--node 240: no machine of small"),
         (["--attacks", "own-number"], "--attacks own-number: speaks under numbers of the site's machines"),
+        (["--node", "252"], "--node 252: that is a person's tool, and is believed"),
         (["--node", "300"], "--node 300: must be from 1 to 255"),
         (["--seeds", "2-1"], "--seeds 2-1: must be a seed"),
         (["--cars", "0"], "--cars 0: must be above 0"),
