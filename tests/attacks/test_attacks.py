@@ -8,7 +8,7 @@ import pytest
 
 from bus_sim.attacks import watch, words, work
 from bus_sim.attacks.catalogue import ATTACKS
-from bus_sim.attacks.trials import MISSES, AttackVerdict, TrialSettings, run_attack
+from bus_sim.attacks.trials import MISSES, STRANGER, AttackVerdict, TrialSettings, run_attack
 from bus_sim.cli import main
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.orders import OrderArrivals
@@ -55,6 +55,16 @@ def test_a_floor_of_robots_in_step_gets_over_it(tmp_path: Path) -> None:
     site.write_text(site_text(4, drawn(6, seed=1)))
     for attack in ("grant-away", "stop"):
         assert play(attack, TrialSettings(str(site))) == []
+
+
+@pytest.mark.parametrize("seals", ["watch", "required"])
+@pytest.mark.parametrize("attack", ["seals-alone", "challenges", "false-answers"])
+def test_a_stranger_who_says_nothing_but_seals_is_named_where_there_are_seals(
+    attack: str, seals: str, tmp_path: Path
+) -> None:
+    site, text = tmp_path / "sealed.toml", site_text(2, drawn(2, seed=1))
+    site.write_text(text.replace("[site]", f'[site]\nseals = "{seals}"', 1))
+    assert play(attack, TrialSettings(str(site), STRANGER)) == []
 
 
 @pytest.mark.parametrize("site", ["graph", "terminal"])
