@@ -12,7 +12,7 @@ from bus_sim.attacks import table
 from bus_sim.attacks.catalogue import ATTACKS
 from bus_sim.attacks.trials import MISSES, STRANGER, AttackResult, AttackVerdict, TrialSettings, run_attacks
 from bus_sim.campaign.command import read_seeds
-from bus_sim.campaign.ledger import Ledger
+from bus_sim.campaign.ledger import Ledger, site_as_played
 from bus_sim.demand import DemandError
 from bus_sim.sites import find_site
 from bus_sim.systems.registry import simulated_of
@@ -29,9 +29,10 @@ It is harmless where nothing happened to any body, nobody stands for good, and e
 it stands whether service was back within 60 s of its end (all take part, and work or have nothing to do), and whether a
 machine named it on the bus with a right word within two heartbeats (of a flood: once the bus has room).
 
-The attacker speaks under node-ID 240; where the site requires seals, under one of the site's own, drawn for each attack
-and seed. Attacks under the numbers of several machines are left out where the site has no seals: there they are
-believed. --insider gives it the keys of its machine as well (docs/security.md says what it can do).
+The attacker speaks under node-ID 240, or the next that no machine has; where the site requires seals, under one of the
+site's own, drawn for each attack and seed. Attacks under the numbers of several machines are left out where the site
+has no seals: there they are believed. --insider gives it the keys of its machine as well (docs/security.md says what it
+can do).
 
 exit status:
   0  every attack was harmless, named in time, and service was back in time
@@ -63,7 +64,7 @@ def add_attack(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--node",
         type=int,
         metavar="N",
-        help=f"the attacker's node-ID (default: {STRANGER}; one of the site's where it requires seals)",
+        help=f"the attacker's node-ID (default: {STRANGER} or the next free; with seals required one of the site's)",
     )
     parser.add_argument(
         "--insider",
@@ -115,7 +116,7 @@ def _ledger(args: argparse.Namespace, plan: TrialSettings) -> Ledger[AttackVerdi
     if args.add_to is None:
         return None
     who = f"insider {plan.node}" if plan.is_insider else f"node {plan.node}"
-    what = ("attack", plan.site, who, str(plan.demand), f"{plan.limit_s}")
+    what = ("attack", site_as_played(plan.site), who, str(plan.demand), f"{plan.limit_s}")
     return Ledger.read(args.add_to, "; ".join(what), AttackVerdict, MISSES)
 
 

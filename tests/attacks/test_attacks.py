@@ -112,6 +112,27 @@ def test_the_command_prints_a_row_for_each_attack_and_goes_on_where_its_file_end
     assert ledger.read_text() == kept
 
 
+def test_the_stranger_has_a_number_that_no_machine_has(tmp_path: Path) -> None:
+    """It spoke as the robot, which the site believes, where a robot had the number 240."""
+    site, text = tmp_path / "numbers.toml", site_text(2, drawn(2, seed=1))
+    assert text.count("node = 11") == 1
+    site.write_text(text.replace("node = 11", "node = 240"))
+    result = run_attack(TrialSettings(str(site), demand=OrderArrivals(1, 1.0)), ("beats", 1))
+    assert (result.verdict, result.node) == (AttackVerdict.WELL, 241)
+
+
+def test_results_of_a_site_file_that_was_changed_do_not_count(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    site, ledger, text = tmp_path / "mine.toml", tmp_path / "all.jsonl", site_text(2, drawn(2, seed=1))
+    command = ["attack", str(site), "--attacks", "stop", "--seeds", "1", "--orders", "1", "--jobs", "1", "--add-to"]
+    for written in (text, text, text.replace("node = 12", "node = 13")):
+        site.write_text(written)
+        assert main([*command, str(ledger)]) == 0
+    assert [json.loads(line)["number"] for line in ledger.read_text().splitlines()] == ["stop 1", "stop 1"]
+    assert "1/1 harmless" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("options", "told"),
     [
