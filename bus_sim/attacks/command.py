@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import re
 from pathlib import Path
 
 from rich.console import Console
@@ -43,6 +44,7 @@ examples:
   bus-sim attack small --seeds 1-20
   bus-sim attack terminal --attacks grant-refused,claim --seeds 1-3
   bus-sim attack small --cars 3 --seeds 1-10 --jobs 8 --add-to attacks.jsonl
+  bus-sim attack cell --begin 0.05-6
   bus-sim run small --cars 5 --random 40 15 --fault attack:name=stop,at_s=60,for_s=20
 
 attacks:
@@ -74,6 +76,9 @@ def add_attack(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument("--cars", type=int, metavar="N", help="to a car park (default: a few)")
     parser.add_argument("--orders", type=int, metavar="N", help="to any other site (default: a few, by the system)")
     parser.add_argument("--limit", type=float, metavar="SECONDS", help="longest run (default: by the orders)")
+    parser.add_argument(
+        "--begin", metavar="A-B", help="it begins from A to B s after power-up (default: while orders are carried out)"
+    )
     parser.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: one a core)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the results as JSON too")
     parser.add_argument(
@@ -116,7 +121,8 @@ def _ledger(args: argparse.Namespace, plan: TrialSettings) -> Ledger[AttackVerdi
     if args.add_to is None:
         return None
     who = f"insider {plan.node}" if plan.is_insider else f"node {plan.node}"
-    what = ("attack", site_as_played(plan.site), who, str(plan.demand), f"{plan.limit_s}")
+    what = ["attack", site_as_played(plan.site), who, str(plan.demand), f"{plan.limit_s}"]
+    what += [] if plan.begin_s is None else [f"begins {plan.begin_s}"]
     return Ledger.read(args.add_to, "; ".join(what), AttackVerdict, MISSES)
 
 
@@ -143,7 +149,17 @@ def _plan(args: argparse.Namespace, site: Site) -> TrialSettings:
     demand = system.on(Occasion.ATTACK, site)
     if args.cars is not None or args.orders is not None:
         demand = system.usual(site, {"cars": args.cars, "orders": args.orders, "apart": demand.apart_s})
-    return TrialSettings(args.site, args.node, args.limit, demand, args.insider)
+    return TrialSettings(args.site, args.node, args.limit, demand, args.insider, _begin_s(args.begin))
+
+
+def _begin_s(given: str | None) -> tuple[float, float] | None:
+    if given is None:
+        return None
+    moments = re.fullmatch(r"(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)", given)
+    first_s, last_s = (float(one) for one in moments.groups()) if moments else (1.0, 0.0)
+    if first_s > last_s:
+        raise DemandError(f"--begin {given}: must be two moments in s, the first and the last, such as 0.05-6")
+    return first_s, last_s
 
 
 def _attacks(args: argparse.Namespace, site: Site) -> list[str]:

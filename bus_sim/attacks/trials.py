@@ -62,6 +62,8 @@ class TrialSettings:
     limit_s: float | None = None
     demand: Coming | None = None
     is_insider: bool = False
+    #: The first and the last moment at which an attack may begin, s after power-up; None: by the site's orders.
+    begin_s: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -120,7 +122,8 @@ def scenario_of(plan: TrialSettings, site: Site, attack: str, seed: int) -> Faul
     chance = random.Random(f"attack:{site.name}:{attack}:{seed}")
     system = simulated_of(site)
     limit_s = plan.limit_s or math.ceil(system.patience_s(site, plan.demand, seed))
-    at_s, for_s = round(chance.uniform(*system.attacked_s(site, plan.demand, seed)), 3), ATTACKS[attack].for_s
+    begin_s = plan.begin_s or system.attacked_s(site, plan.demand, seed)
+    at_s, for_s = round(chance.uniform(*begin_s), 3), ATTACKS[attack].for_s
     is_of_site = plan.is_insider or site.seals == "required"
     node = plan.node or (chance.choice(sorted(site.machines)) if is_of_site else stranger_of(site))
     given: dict[str, str | int | float] = {"name": attack, "at_s": at_s, "for_s": for_s, "node": node, "seed": seed}

@@ -8,8 +8,10 @@ import pytest
 
 from bus_sim.attacks import watch, words, work
 from bus_sim.attacks.catalogue import ATTACKS
-from bus_sim.attacks.trials import MISSES, STRANGER, AttackVerdict, TrialSettings, run_attack
+from bus_sim.attacks.trials import MISSES, STRANGER, AttackVerdict, TrialSettings, run_attack, scenario_of
 from bus_sim.cli import main
+from bus_sim.faults.injection import Injection
+from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.orders import OrderArrivals
 from onboard.contract.codes import Reason
@@ -121,6 +123,16 @@ def test_the_stranger_has_a_number_that_no_machine_has(tmp_path: Path) -> None:
     assert (result.verdict, result.node) == (AttackVerdict.WELL, 241)
 
 
+def test_an_attack_may_begin_while_machines_start() -> None:
+    """Without a word it begins once orders come, when everybody has been admitted long ago."""
+    plan = replace(PLANS["cell"], demand=OrderArrivals(1, 1.0), begin_s=(0.05, 6.0))
+    site = find_site("cell")
+    faults = [fault for seed in range(1, 20) for fault in scenario_of(plan, site, "newer-boot", seed).faults]
+    begun_s = [fault.number("at_s") for fault in faults if isinstance(fault, Injection)]
+    assert min(begun_s) > 0.05 and 5 < max(begun_s) < 6
+    assert play("newer-boot", plan) == []
+
+
 def test_results_of_a_site_file_that_was_changed_do_not_count(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -142,6 +154,8 @@ def test_results_of_a_site_file_that_was_changed_do_not_count(
         (["--attacks", "own-number"], "--attacks own-number: speaks under numbers of the site's machines"),
         (["--node", "252"], "--node 252: that is a person's tool, and is believed"),
         (["--node", "300"], "--node 300: must be from 1 to 255"),
+        (["--begin", "6-5"], "--begin 6-5: must be two moments in s, the first and the last"),
+        (["--begin", "now"], "--begin now: must be two moments in s, the first and the last"),
         (["--seeds", "2-1"], "--seeds 2-1: must be a seed"),
         (["--cars", "0"], "--cars 0: must be above 0"),
     ],
