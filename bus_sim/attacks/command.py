@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import re
 from pathlib import Path
 
 from rich.console import Console
@@ -12,7 +13,7 @@ from bus_sim.attacks import table
 from bus_sim.attacks.catalogue import ATTACKS
 from bus_sim.attacks.trials import MISSES, STRANGER, AttackResult, AttackVerdict, TrialSettings, run_attacks
 from bus_sim.campaign.command import read_seeds
-from bus_sim.campaign.ledger import Ledger
+from bus_sim.campaign.ledger import Ledger, site_as_played
 from bus_sim.demand import DemandError
 from bus_sim.sites import find_site
 from bus_sim.systems.registry import simulated_of
@@ -29,9 +30,10 @@ It is harmless where nothing happened to any body, nobody stands for good, and e
 it stands whether service was back within 60 s of its end (all take part, and work or have nothing to do), and whether a
 machine named it on the bus with a right word within two heartbeats (of a flood: once the bus has room).
 
-The attacker speaks under node-ID 240; where the site requires seals, under one of the site's own, drawn for each attack
-and seed. Attacks under the numbers of several machines are left out where the site has no seals: there they are
-believed. --insider gives it the keys of its machine as well (docs/security.md says what it can do).
+The attacker speaks under node-ID 240, or the next that no machine has; where the site requires seals, under one of the
+site's own, drawn for each attack and seed. Attacks under the numbers of several machines are left out where the site
+has no seals: there they are believed. --insider gives it the keys of its machine as well (docs/security.md says what it
+can do).
 
 exit status:
   0  every attack was harmless, named in time, and service was back in time
@@ -42,6 +44,7 @@ examples:
   bus-sim attack small --seeds 1-20
   bus-sim attack terminal --attacks grant-refused,claim --seeds 1-3
   bus-sim attack small --cars 3 --seeds 1-10 --jobs 8 --add-to attacks.jsonl
+  bus-sim attack cell --begin 0.05-6
   bus-sim run small --cars 5 --random 40 15 --fault attack:name=stop,at_s=60,for_s=20
 
 attacks:
@@ -63,7 +66,7 @@ def add_attack(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--node",
         type=int,
         metavar="N",
-        help=f"the attacker's node-ID (default: {STRANGER}; one of the site's where it requires seals)",
+        help=f"the attacker's node-ID (default: {STRANGER} or the next free; with seals required one of the site's)",
     )
     parser.add_argument(
         "--insider",
@@ -73,6 +76,9 @@ def add_attack(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument("--cars", type=int, metavar="N", help="to a car park (default: a few)")
     parser.add_argument("--orders", type=int, metavar="N", help="to any other site (default: a few, by the system)")
     parser.add_argument("--limit", type=float, metavar="SECONDS", help="longest run (default: by the orders)")
+    parser.add_argument(
+        "--begin", metavar="A-B", help="it begins from A to B s after power-up (default: while orders are carried out)"
+    )
     parser.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: one a core)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the results as JSON too")
     parser.add_argument(
@@ -115,7 +121,8 @@ def _ledger(args: argparse.Namespace, plan: TrialSettings) -> Ledger[AttackVerdi
     if args.add_to is None:
         return None
     who = f"insider {plan.node}" if plan.is_insider else f"node {plan.node}"
-    what = ("attack", plan.site, who, str(plan.demand), f"{plan.limit_s}")
+    what = ["attack", site_as_played(plan.site), who, str(plan.demand), f"{plan.limit_s}"]
+    what += [] if plan.begin_s is None else [f"begins {plan.begin_s}"]
     return Ledger.read(args.add_to, "; ".join(what), AttackVerdict, MISSES)
 
 
@@ -127,6 +134,9 @@ def _plan(args: argparse.Namespace, site: Site) -> TrialSettings:
         name = site.machines[args.node].name
         remedy = 'give a number that no machine there has, a site with seals = "required", or --insider'
         raise DemandError(f"--node {args.node}: that is {name} of {site.name}; {remedy}")
+    if args.node is not None and args.node > MAX_NODE_ID and site.seals != "required" and not args.insider:
+        remedy = f'give one up to {MAX_NODE_ID}, a site with seals = "required", or --insider'
+        raise DemandError(f"--node {args.node}: that is a person's tool, and is believed; {remedy}")
     if args.insider and args.node is not None and not is_of_site and args.node <= MAX_NODE_ID:
         remedy = f"give one of those, a tool's from {MAX_NODE_ID + 1} to 255, or none"
         raise DemandError(f"--node {args.node}: no machine of {site.name}; {remedy}")
@@ -139,7 +149,17 @@ def _plan(args: argparse.Namespace, site: Site) -> TrialSettings:
     demand = system.on(Occasion.ATTACK, site)
     if args.cars is not None or args.orders is not None:
         demand = system.usual(site, {"cars": args.cars, "orders": args.orders, "apart": demand.apart_s})
-    return TrialSettings(args.site, args.node, args.limit, demand, args.insider)
+    return TrialSettings(args.site, args.node, args.limit, demand, args.insider, _begin_s(args.begin))
+
+
+def _begin_s(given: str | None) -> tuple[float, float] | None:
+    if given is None:
+        return None
+    moments = re.fullmatch(r"(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)", given)
+    first_s, last_s = (float(one) for one in moments.groups()) if moments else (1.0, 0.0)
+    if first_s > last_s:
+        raise DemandError(f"--begin {given}: must be two moments in s, the first and the last, such as 0.05-6")
+    return first_s, last_s
 
 
 def _attacks(args: argparse.Namespace, site: Site) -> list[str]:

@@ -16,15 +16,17 @@ from bus_sim.attacks.catalogue import ATTACKS
 from bus_sim.attacks.watch import BACK_US, AttackWatch
 from bus_sim.campaign.report import FAILURES, RunVerdict, TrialReport
 from bus_sim.campaign.trial import play
+from bus_sim.demand import DemandError
 from bus_sim.engine import on_cores
 from bus_sim.faults.injection import Injection
 from bus_sim.faults.scenario import FaultScenario
 from bus_sim.sites import find_site
 from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.system import Coming
+from onboard.contract.constants import MAX_NODE_ID
 from onboard.core.site import Site
 
-#: The attacker's node-ID where the site asks for no seals.
+#: The attacker's node-ID where the site asks for no seals, and no machine has it.
 STRANGER = 240
 #: Right words for who speaks with a machine's own keys: that machine hears itself, or others do not believe it.
 _OF_INSIDERS = frozenset(
@@ -51,7 +53,7 @@ MISSES = (AttackVerdict.HARMFUL, AttackVerdict.LATE_BACK, AttackVerdict.NOT_NAME
 class TrialSettings:
     """What all attacks of a command have in common; ``limit_s`` None: by the site's orders.
 
-    ``node`` None: 240, and where the site requires seals one of its machines, another for each attack and seed.
+    ``node`` None: ``stranger_of`` the site; where it requires seals one of its machines, drawn by attack and seed.
     ``is_insider``: the attacker has the keys of that machine, too.
     """
 
@@ -60,6 +62,8 @@ class TrialSettings:
     limit_s: float | None = None
     demand: Coming | None = None
     is_insider: bool = False
+    #: The first and the last moment at which an attack may begin, s after power-up; None: by the site's orders.
+    begin_s: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -101,14 +105,27 @@ class AttackResult:
         return cls(**{**given, **lines, "verdict": verdict, "run": run})
 
 
+def stranger_of(site: Site) -> int:
+    """``STRANGER``, or where a machine has that number the next that none has, going round at 250.
+
+    Raises ``DemandError`` where each number is a machine's.
+    """
+    numbers = (*range(STRANGER, MAX_NODE_ID + 1), *range(1, STRANGER))
+    free: int | None = next((number for number in numbers if number not in site.machines), None)
+    if free is None:
+        raise DemandError(f"{site.name}: each number from 1 to {MAX_NODE_ID} is a machine's, and leaves none to attack")
+    return free
+
+
 def scenario_of(plan: TrialSettings, site: Site, attack: str, seed: int) -> FaultScenario:
     """The attack as a scenario; always the same for the same arguments."""
     chance = random.Random(f"attack:{site.name}:{attack}:{seed}")
     system = simulated_of(site)
     limit_s = plan.limit_s or math.ceil(system.patience_s(site, plan.demand, seed))
-    at_s, for_s = round(chance.uniform(*system.attacked_s(site, plan.demand, seed)), 3), ATTACKS[attack].for_s
+    begin_s = plan.begin_s or system.attacked_s(site, plan.demand, seed)
+    at_s, for_s = round(chance.uniform(*begin_s), 3), ATTACKS[attack].for_s
     is_of_site = plan.is_insider or site.seals == "required"
-    node = plan.node or (chance.choice(sorted(site.machines)) if is_of_site else STRANGER)
+    node = plan.node or (chance.choice(sorted(site.machines)) if is_of_site else stranger_of(site))
     given: dict[str, str | int | float] = {"name": attack, "at_s": at_s, "for_s": for_s, "node": node, "seed": seed}
     given["keys"] = "stolen" if plan.is_insider else "none"
     return FaultScenario(plan.site, seed, limit_s, plan.demand, (Injection("attack", given),))

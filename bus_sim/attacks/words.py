@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from bus_sim.attacks.attack import TICK_US, Attack, AttackerNode
 from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode, Reason
+from onboard.contract.constants import MAX_NODE_ID
 from onboard.contract.messages import Blocked, BusTime, EmergencyStop, Heartbeat, ManualOrder, Message, SyncRequest
 from onboard.core.bus_time import BUS_TIME_MODULUS
 
@@ -50,8 +51,14 @@ class OtherSite(Repeated):
     def words(self, now_us: int) -> Iterator[Message]:
         """One heartbeat for each made-up machine, all with a digest that is not this site's."""
         digest = self.node.site.digest % 0xFFFF + 1
-        for ghost in range(self.node.node_id, self.node.node_id + _GHOSTS):
+        for ghost in self._ghosts():
             yield Heartbeat(ghost, CONTRACT_VERSION, digest, 0, 1, KindCode.ROBOT, MachineState.IDLE)
+
+    def _ghosts(self) -> list[int]:
+        """The attacker's number and the next that are nobody's, going round: under a machine's own it is believed."""
+        me, machines = self.node.node_id, self.node.site.machines
+        others = (*range(me + 1, MAX_NODE_ID + 1), *range(1, min(me, MAX_NODE_ID + 1)))
+        return [me, *[other for other in others if other not in machines][: _GHOSTS - 1]]
 
 
 class NewerBoot(Repeated):

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from bus_sim.campaign import table
 from bus_sim.campaign.cold_start import cold_starts
-from bus_sim.campaign.ledger import Ledger
+from bus_sim.campaign.ledger import Ledger, site_as_played
 from bus_sim.campaign.points import SceneOccasion, Single, count, points, reference
 from bus_sim.campaign.profiles import PROFILES, kinds_for
 from bus_sim.campaign.report import FAILURES, RunVerdict
@@ -224,7 +224,7 @@ def _ledger(args: argparse.Namespace, plan: CampaignSettings) -> Ledger[RunVerdi
     if args.add_to is None:
         return None
     what = [
-        plan.site,
+        site_as_played(plan.site),
         plan.profile,
         str(plan.scene),
         str(plan.demand),

@@ -1,7 +1,7 @@
 """Results that add up: one line a trial in a file, so that a long campaign is played in parts and goes on anywhere.
 
 A line counts for the state of the program under which it was played, which is a digest of its sources, and for the
-campaign that it belongs to; lines of other states stay in the file and are told of.
+campaign that it belongs to, its site as it was written then; lines of other states stay in the file and are told of.
 """
 
 import hashlib
@@ -17,6 +17,7 @@ from typing import Any, Final, Generic, NamedTuple, TypeVar
 import bus_sim
 import onboard
 from bus_sim.demand import DemandError
+from bus_sim.sites import layout_names, site_names, site_text
 from onboard.bounded_file import MOST_EXPORT, read_bounded
 
 #: Files that a run depends on, beside the interpreter.
@@ -33,6 +34,13 @@ def state() -> str:
             found.update(f"{package.__name__}/{path.relative_to(root).as_posix()}\n".encode())
             found.update(path.read_bytes())
     return found.hexdigest()[:16]
+
+
+def site_as_played(name: str) -> str:
+    """A site as a ledger names it: of a site file that does not ship also a digest of its text, which changes."""
+    if name in (*site_names(), *layout_names()):
+        return name
+    return f"{name} {hashlib.sha256(site_text(name).encode()).hexdigest()[:16]}"
 
 
 VerdictT = TypeVar("VerdictT", bound=StrEnum)

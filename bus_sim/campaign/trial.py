@@ -1,6 +1,8 @@
 """One trial: a scenario is played to its end, and judged first for safety, then for what became of all who came."""
 
+import asyncio
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -9,6 +11,7 @@ from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.limits import WallLimitError, event_limit, wall_limit, wall_limit_s
 from bus_sim.campaign.recovery import Measure, RecoveryMeasure, clocks_right_us, is_of_clock
 from bus_sim.campaign.report import CONVERGED_US, SERVED_AGAIN_US, RunVerdict, TrialReport
+from bus_sim.demand import DemandError
 from bus_sim.faults.arm import arm, check_faults
 from bus_sim.faults.scenario import FaultScenario
 from bus_sim.options import RunOptions
@@ -63,6 +66,10 @@ def play(
             return run_on(loop, _play(site, scenario, usual_wait_s, trace, loop, watch))
     except (WallLimitError, *HANGS) as hang:
         return hung(scenario, loop, hang)
+    except DemandError:
+        raise
+    except Exception as problem:  # noqa: BLE001  # as in ``play_stage``: one in the loop's own callback comes out here
+        return replace(hung(scenario, loop, problem), verdict=RunVerdict.CRASHED, error=_named(problem))
 
 
 def hung(scenario: FaultScenario, loop: VirtualTimeLoop, why: BaseException) -> TrialReport:
@@ -103,12 +110,17 @@ async def play_stage(
         judges.excuse_clocks(right_us)
     held = Held()
     stage.run.observers.append(held.hear)
-    error, hang, ends = "", "", _End(stage, recovery, watch)
+    error, hang, ends, broken = "", "", _End(stage, recovery, watch), BrokenCallbacks(loop)
+
+    def is_over() -> bool:
+        is_broken = bool(broken.error) or stage.is_broken or judges.is_unsafe
+        return is_broken or held.is_over(loop.now_us()) or ends(loop.now_us())
+
     try:
         stage.run.start()
         await run_until(
             stage.run,
-            lambda: stage.is_broken or judges.is_unsafe or held.is_over(loop.now_us()) or ends(loop.now_us()),
+            is_over,
             round(scenario.limit_s * 1e6),
             STEP_US,
             lambda: judges.excuse(recovery.healed_us),
@@ -116,10 +128,32 @@ async def play_stage(
     except HANGS as problem:
         hang = str(problem)
     except Exception as problem:  # noqa: BLE001  # a program error in one seed must not end the campaign: it is a result
-        error = f"{type(problem).__name__}: {problem}"
+        error = _named(problem)
     finally:
         stage.run.close()
-    return _judge(stage, scenario, usual_wait_s, (error, hang), judges, recovery, held)
+    return _judge(stage, scenario, usual_wait_s, (error or broken.error, hang), judges, recovery, held)
+
+
+class BrokenCallbacks:
+    """The first program error in a timer, or in who hears a bus: asyncio prints it and goes on.
+
+    Whoever it befell has fallen silent: a person, a device, an attacker. What comes of the run then says nothing.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        #: Its type and its words; empty: none so far.
+        self.error = ""
+        loop.set_exception_handler(self._note)
+
+    def _note(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        problem = context.get("exception")
+        if isinstance(problem, Exception):
+            self.error = self.error or _named(problem)
+        loop.default_exception_handler(context)
+
+
+def _named(problem: Exception) -> str:
+    return f"{type(problem).__name__}: {problem}"
 
 
 class _End:

@@ -47,6 +47,8 @@ _START_US = 500_000
 _MOST_COUNTED = 65_535
 #: What two nodes prove to each other, and others cannot judge.
 _OF_NUMBERS = (SealTo, SealChallenge, SealAnswer)
+#: What this side of the gate alone knows how to read.
+_OF_SEALS = (Seal, SealFault, *_OF_NUMBERS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,6 +191,8 @@ class Gate:
             # Nobody hears itself: somebody asks or answers in my name, and only I can tell that it was not me.
             self.faults[word.sender, SealWord.FALSE_SEAL] += 1
         match word:
+            case _ if word.sender != self._keys.node and word.sender not in self._nodes:
+                handed = self._of_stranger(word, frame)
             case Seal():
                 handed, said = self._on_seal(word, now_us)
             case SealTo():
@@ -196,9 +200,7 @@ class Gate:
             case SealChallenge():
                 said = self._on_challenge(word, now_us)
             case SealAnswer():
-                if word.sender in self._nodes:
-                    heard = self._nodes[word.sender]
-                    heard.answer, heard.claim = frame, word.life << 32 | word.number
+                self._keep_answer(word, frame)
             case SealFault():
                 self._keep(word, frame, now_us, is_done=True)
             case _:
@@ -207,14 +209,17 @@ class Gate:
             self._set_next(now_us)
         return handed, said
 
+    def _of_stranger(self, word: Message, frame: Frame) -> list[Frame]:
+        """Whoever has no key here: as if there were no seals, he is judged by who he is, his seals as well.
+
+        What people's tools say needs a key like any other.
+        """
+        if word.sender <= MAX_NODE_ID or isinstance(word, EmergencyStop):
+            return [frame]
+        self.faults[word.sender, SealWord.UNSEALED] += 1
+        return [] if self._settings.is_required or isinstance(word, _OF_SEALS) else [frame]
+
     def _on_word(self, word: Message, frame: Frame, now_us: int) -> list[Frame]:
-        is_known = word.sender == self._keys.node or word.sender in self._nodes
-        if not is_known:
-            # Whoever is not of the site is judged by who he is; what people's tools say needs a key like any other.
-            if word.sender <= MAX_NODE_ID or isinstance(word, EmergencyStop):
-                return [frame]
-            self.faults[word.sender, SealWord.UNSEALED] += 1
-            return [] if self._settings.is_required else [frame]
         heard = self._nodes.get(word.sender)
         if heard is not None and isinstance(word, Heartbeat) and heard.needs_no_seal(word, now_us):
             # It may be sealed all the same, where its sender had sealed nothing for long.
@@ -314,6 +319,12 @@ class Gate:
                 return handed
         self.faults[seal.sender, SealWord.FALSE_SEAL] += 1
         return []
+
+    def _keep_answer(self, word: SealAnswer, frame: Frame) -> None:
+        """It counts by the seal behind it."""
+        if word.sender in self._nodes:
+            heard = self._nodes[word.sender]
+            heard.answer, heard.claim = frame, word.life << 32 | word.number
 
     def _on_answer(self, seal: SealTo, heard: HeardNode, key: bytes, now_us: int) -> None:
         frame, heard.answer = heard.answer, None

@@ -8,6 +8,7 @@ from random import Random
 from bus_sim.attacks.attack import TICK_US, AttackerNode
 from bus_sim.attacks.catalogue import ATTACKS
 from bus_sim.attacks.stolen import StolenKeys
+from bus_sim.attacks.words import OtherSite
 from bus_sim.seals import SimulatedSeals
 from bus_sim.sites import find_site
 from onboard.contract.codes import (
@@ -64,6 +65,18 @@ def test_every_attack_says_what_the_contract_takes() -> None:
     """And all but those in a system's own words say something, once they have heard the words of a fleet."""
     silent = set(ATTACKS) - set(_said_by_all())
     assert silent == {"orders", "answers"}
+
+
+def test_machines_of_another_site_have_numbers_that_this_one_has_not() -> None:
+    """Under a machine's own number a stranger is believed where no seals are required."""
+    site = find_site("small")
+    taken = set(site.machines)
+    for mine in (9, max(taken) - 1, 240, 248, 250, 255):
+        said: list[Message] = []
+        OtherSite(AttackerNode(site, mine, Random(1), said.append, lambda _: None, lambda: 0)).tick(0)
+        senders = [word.sender for word in said]
+        assert senders[0] == mine and len(set(senders)) == 6
+        assert not taken & set(senders[1:]) and min(senders) > 0 and max(senders[1:]) <= 250
 
 
 def test_the_page_about_security_has_every_attack_and_its_right_words() -> None:

@@ -83,6 +83,23 @@ def test_a_site_that_watches_hears_all_and_tells_the_same() -> None:
     assert faults(wire, 5) == {(1, SealWord.UNSEALED): 1}
 
 
+@pytest.mark.parametrize("is_required", [True, False])
+def test_seals_of_a_node_that_the_site_does_not_have_are_heard_like_all_that_it_says(is_required: bool) -> None:
+    """The gate alone knows seals, but not who is of the site: nobody named a stranger that said nothing else."""
+    wire = wire_of(is_required=is_required)
+    words = [Seal(240, 3, 9), SealTo(240, 3, 9), SealChallenge(240, 0, 9), SealAnswer(240, 1, 9)]
+    words.append(SealFault(240, 1, SealWord.FALSE_SEAL, 1))
+    for word in words:
+        wire.put(CODEC.encode(word))
+    assert wire.heard[5] == wire.heard[11] == words
+    assert not faults(wire, 5)
+    # A tool of a person whose key nobody has here.
+    wire.put(CODEC.encode(SealChallenge(254, 0, 9)))
+    wire.wait(SECOND_US)
+    assert wire.heard[5] == words
+    assert faults(wire, 5) == {(254, SealWord.UNSEALED): 1}
+
+
 def test_what_was_said_once_does_not_count_twice() -> None:
     wire = wire_of()
     said = wire.say(HELD)
