@@ -1,198 +1,163 @@
-// Ways in space and time (chapter 7): legs, the windows in which they need segments, and the soonest plan around others.
-import { ANY, frontOf, reachUs } from "./site.mjs";
+// Ways in space and time (chapter 7): legs, the windows in which they need segments, and plans around others.
+import { ANY, frontOf, isSpur, reachUs } from "./site.mjs";
 
-const ROUND = 10_000;
-const MOST_GAPS = 12;
-export const endOf = (steps) => steps.at(-1) && [steps.at(-1).track, steps.at(-1).to, steps.at(-1).end];
-const isLink = (leg) => leg.action === "TRAVEL" && leg.from === leg.to;
+export const ROUND = 10_000; // T_round
+export const WORK = "WORK";
+const MOST_DELAYS = 200;
+const overlap = (a, b, other) => a < other.b - ROUND && other.a < b - ROUND;
+/** Where and when a robot is behind these steps: { track, index, us }. */
+export const endOf = (steps) => steps.at(-1) && { track: steps.at(-1).track, index: steps.at(-1).to, us: steps.at(-1).end };
 
 /** P4: [{ key, a, b, leg, from, to }] of legs with begin and end; the last place is kept without end. */
 export function windowsOf(site, legs, isOpen = true) {
   const last = new Map();
   const found = [];
-  const add = (key, a, b, leg, ride = {}) => {
+  const add = (key, a, b, leg, { from, to } = {}) => {
     const before = last.get(key);
-    if (before && before.b >= a - ROUND) return Object.assign(before, { b: Math.max(before.b, b), leg, to: ride.to ?? before.to });
-    last.set(key, { key, a, b, leg, ...ride });
-    return found.push(last.get(key));
+    if (before?.b >= a - ROUND) {
+      Object.assign(before, { b: Math.max(before.b, b), leg, from: before.from ?? from, to: to ?? before.to });
+    } else {
+      last.set(key, { key, a, b, leg, from, to });
+      found.push(last.get(key));
+    }
   };
-  const { length_mm, clearance_mm } = site.carrier;
-  legs.forEach(({ action, track, from, to, begin, end, mouth }, n) => {
-    if (action === "RIDE") return add(track << 8, begin, end, n, { from, to });
-    if (action !== "TRAVEL" || from === to) {
-      if (mouth !== undefined) add(mouth, begin, end, n);
-      return add(site.at(track, to), begin, end, n);
-    }
-    const [step, count] = [Math.sign(to - from), Math.abs(to - from)];
-    const [mm, half] = [count * site.pitch, (site.pitch + length_mm) / 2 + clearance_mm];
-    const whole = site.run(mm);
-    for (let k = 0; k <= count; k++) {
+  const half = (site.pitch + site.carrier.length_mm) / 2 + site.carrier.clearance_mm;
+  legs.forEach((one, leg) => {
+    const { action, track, from, to, begin, end, mouth } = one;
+    const [step, count] = [Math.sign(to - from), action === "TRAVEL" ? Math.abs(to - from) : 0];
+    if (action === "RIDE") add(track << 8, begin, end, leg, one);
+    if (mouth !== undefined) add(mouth, begin, end, leg);
+    if (action !== "RIDE" && !count) add(site.at(track, to), begin, end, leg);
+    const mm = count * site.pitch;
+    for (let k = 0; count && k <= count; k++) {
       const enter = begin + reachUs(k * site.pitch - half, mm, site.carrier);
-      const leave = end - whole + reachUs(Math.min(mm, k * site.pitch + half), mm, site.carrier);
-      add(site.at(track, from + k * step), enter, k === count ? end : Math.max(enter, leave), n);
+      const leave = end - site.run(mm) + reachUs(Math.min(mm, k * site.pitch + half), mm, site.carrier);
+      add(site.at(track, from + k * step), enter, k === count ? end : Math.max(enter, leave), leg);
     }
-    return undefined;
   });
-  if (isOpen && found.length) last.get(site.at(legs.at(-1).track, legs.at(-1).to)).b = Infinity;
+  if (isOpen) last.get(site.at(legs.at(-1).track, legs.at(-1).to)).b = Infinity;
   return found;
 }
 
 /** Whether windows of two need the same at the same time: the first such pair. */
 export function meeting(mine, theirs) {
-  for (const one of mine) {
-    for (const other of theirs) {
-      if (one.key === other.key && one.a < other.b - ROUND && other.a < one.b - ROUND) return [one, other];
-    }
-  }
-  return undefined;
+  const pairs = mine.flatMap((one) => theirs.map((other) => [one, other]));
+  return pairs.find(([one, other]) => one.key === other.key && overlap(one.a, one.b, other));
 }
 
+/** Puts whole ways off until nobody is in the way: it waits where it stands, and then goes through. */
 export class Planner {
-  /** `busy`: key: [{ a, b, from, to }], what others need; `ends`: where they rest. */
-  constructor(site, busy, ends) {
-    Object.assign(this, { site, busy, ends });
-    this.refuges = site.refuges(ends);
+  /** `busy`: key: [{ a, b, from, to }], what others need; `refuges`: where it may rest, or nothing for no rest. */
+  constructor(site, busy, refuges) {
+    Object.assign(this, { site, busy, refuges });
   }
 
-  /** The soonest way to do a task: { steps, over } or undefined. `free` are places for its car. */
-  task(call, begin, free) {
-    const sinks = call.to === ANY ? free : [call.to];
-    const start = this.#start(begin, Math.max(begin[2], call.deadline + 150_000));
-    const taken = call.isAboard ? start : this.#work(this.#go(start, frontOf(call.source)), call.source, true, call);
-    const left = sinks.map((sink) => this.#work(this.#go(taken, frontOf(sink)), sink, false, call)).flat();
-    for (const one of left.sort((a, b) => a.us - b.us)) {
-      const rested = this.#rest([one]);
-      if (rested) return { steps: stepsOf(rested), over: one.us };
+  /** The soonest way to do a task from `start`: { steps, over } with the rest behind it, or undefined. */
+  task(call, start, free) {
+    const { source, to } = call;
+    const taken = call.isAboard
+      ? [[]]
+      : ways(this.site, start, frontOf(source)).map((way) => [...way, this.#work(call, source, true)]);
+    const left = (to === ANY ? free : [to]).flatMap((sink) => taken.flatMap((way) => {
+      const here = way.length ? { track: source >> 8, index: source & 0x7f } : start;
+      return ways(this.site, here, frontOf(sink)).map((on) => [...way, ...on, this.#work(call, sink, false)]);
+    }));
+    return this.#soonest(start, left, Math.max(start.us, call.deadline + 150_000), call.ready);
+  }
+
+  /** The way to a refuge from standing somewhere. */
+  rest(start) {
+    const key = this.site.at(start.track, start.index);
+    if (this.refuges.includes(key) && this.#begin([{ key, a: 0, b: Infinity }], start, start.us) !== undefined) return [];
+    const all = this.refuges.flatMap((one) => ways(this.site, start, one)).filter((way) => way.length);
+    return this.#soonest(start, all, start.us)?.steps;
+  }
+
+  #work(call, place, takes) {
+    const index = place & 0x7f;
+    return { action: WORK, track: place >> 8, from: index, to: index, place, takes, call };
+  }
+
+  #soonest(start, all, least, ready = 0) {
+    let best;
+    for (const [steps, over] of all.map((way) => this.#timed(way)).sort((a, b) => a[1] - b[1])) {
+      if (best && least + over >= best.over) break;
+      const isWork = steps.at(-1).action === WORK;
+      const atBay = steps.find((one) => this.site.bays.has(one.place));
+      const windows = windowsOf(this.site, steps, !isWork);
+      const us = this.#begin(windows, start, Math.max(least, atBay ? ready - atBay.begin : 0));
+      if (us === undefined || best?.over <= us + over) continue;
+      const found = steps.map((one) => ({ ...one, begin: one.begin + us, end: one.end + us }));
+      const rest = isWork && this.refuges ? this.rest(endOf(found)) : [];
+      if (rest) best = { steps: [...found, ...rest], over: us + over };
+    }
+    return best;
+  }
+
+  #timed(way) {
+    let us = 0;
+    const steps = way.map((hop) => {
+      const begin = us;
+      us += hop.action === WORK ? this.site.handling(hop.place) : hopUs(this.site, hop);
+      return { ...hop, begin, end: us };
+    });
+    return [steps, us];
+  }
+
+  /** The least time to begin, no sooner than `us`; where it stands until then it stands from the start. */
+  #begin(windows, start, us) {
+    const here = windows[0].key === this.site.at(start.track, start.index) ? windows[0] : undefined;
+    const later = (one) => {
+      const inWay = this.#needs(one).find((other) => overlap(one === here ? start.us : us + one.a, us + one.b, other));
+      return inWay && (one === here ? Infinity : inWay.b - one.a);
+    };
+    for (let n = 0; n < MOST_DELAYS && us < Infinity; n++) {
+      const found = windows.map(later).find((one) => one !== undefined);
+      if (found === undefined) return us;
+      us = found;
     }
     return undefined;
   }
 
-  /** The way to a refuge from standing somewhere. */
-  rest(begin) {
-    const rested = this.#rest(this.#start(begin, begin[2]));
-    return rested && stepsOf(rested);
-  }
-
-  #start([track, index, us], begin) {
-    const key = this.site.at(track, index);
-    return [{ us: begin, limit: this.#free(this.busy.get(key) ?? [], us), track, index, key }];
-  }
-
-  #rest(states) {
-    const here = states.filter((one) => one.limit === Infinity && this.refuges.includes(one.key));
-    if (here.length) return here[0];
-    const found = this.refuges.flatMap((key) => this.#go(states, key)).filter((one) => one.limit === Infinity);
-    return found.sort((a, b) => a.us - b.us)[0];
-  }
-
-  #go(states, key) {
-    const found = states.flatMap((state) =>
-      ways(this.site, state, key).flatMap((way) => way.reduce((now, hop) => now.flatMap((one) => this.#hop(one, hop)), [state])),
-    );
-    const best = new Map();
-    for (const one of found) if (!(best.get(one.limit)?.us <= one.us)) best.set(one.limit, one);
-    return [...best.values()];
-  }
-
-  /** All gaps that a hop can end in, each as soon as it can. */
-  #hop(state, hop) {
-    const { site } = this;
-    const still = { ...hop, begin: 0, end: hopUs(site, hop) };
-    const windows = windowsOf(site, [still], false);
-    const key = hop.action === "RIDE" ? hop.track << 8 : site.at(hop.track, hop.to);
-    const leave = windows[0].key === state.key ? windows[0].b : still.end;
-    const found = [];
-    let us = state.us;
-    for (let n = 0; n < MOST_GAPS; n++) {
-      us = this.#soonest(windows, us, hop.ride, state);
-      if (us + leave > state.limit + ROUND) break;
-      const limit = this.#free(this.#needs(key, hop.ride), us + still.end);
-      const step = { ...hop, begin: us, end: us + still.end };
-      found.push({ us: us + still.end, limit, track: hop.track, index: hop.to, key, step, before: state });
-      if (limit === Infinity || hop.action === "RIDE") break;
-      us = Math.max(us + 1, ...this.#needs(key, hop.ride).filter((one) => one.a === limit).map((one) => one.b - windows.at(-1).a));
-    }
-    return found;
-  }
-
-  #soonest(windows, begin, ride, state) {
-    let us = begin;
-    for (let again = true, n = 0; again && us < Infinity && n < 200; n++) {
-      again = false;
-      for (const one of windows) {
-        if (one.key === state.key) continue;
-        for (const { a, b } of this.#needs(one.key, ride)) {
-          if (us + one.a < b - ROUND && us + one.b > a + ROUND) [us, again] = [b - one.a, true];
-        }
-      }
-    }
-    return us;
-  }
-
   /** P6: a lift is free in the gaps between rides, less its own run to where this one begins and theirs. */
-  #needs(key, ride) {
-    const busy = this.busy.get(key) ?? [];
-    if (!ride || !this.site.liftOf(key)) return busy;
+  #needs({ key, from: first, to: last }) {
     const run = (from, to) => (from === undefined || to === undefined ? 0 : this.site.ride(from, to));
-    return busy.map((one) => ({ a: one.a - run(ride[1], one.from), b: one.b + run(one.to, ride[0]) }));
-  }
-
-  #free(busy, us) {
-    return Math.min(Infinity, ...busy.filter((one) => one.b > us + ROUND).map((one) => Math.max(one.a, us - ROUND)));
-  }
-
-  #work(states, place, takes, call) {
-    return states.flatMap((one) => {
-      const begin = Math.max(one.us, call.ready && this.site.bays.has(place) ? call.ready : 0);
-      const end = begin + this.site.handling(place);
-      if (end > one.limit + ROUND) return [];
-      const index = place & 0x7f;
-      const step = { action: "WORK", track: place >> 8, from: index, to: index, begin, end, place, takes, call };
-      return [{ ...one, us: end, step, before: one }];
-    });
+    return (this.busy.get(key) ?? []).map(({ a, b, from, to }) => ({ a: a - run(last, from), b: b + run(to, first) }));
   }
 }
 
 /** B3: the least end of a task, of a robot before the car when the call ends, all ways free. */
 export function floorOf(site, call) {
-  const free = new Planner(site, new Map(), []);
-  free.refuges = [...site.length].flatMap(([track, length]) => Array.from({ length }, (_, n) => (track << 8) | (n + 1)));
-  const before = [call.source >> 8, call.source & 0x7f, call.deadline];
-  return free.task(call, before, site.places).over;
+  const before = { track: call.source >> 8, index: call.source & 0x7f, us: call.deadline };
+  return new Planner(site, new Map()).task(call, before, site.places).over;
 }
 
-export function hopUs(site, hop) {
-  if (hop.action === "RIDE") return site.ride(hop.from, hop.to);
-  return isLink(hop) ? site.run(site.pitch) + site.carrier.turn_ms * 1_000 : site.run(Math.abs(hop.to - hop.from) * site.pitch);
+export function hopUs(site, { action, from, to }) {
+  if (action === "RIDE") return site.ride(from, to);
+  return from === to ? site.run(site.pitch) + site.carrier.turn_ms * 1_000 : site.run(Math.abs(to - from) * site.pitch);
 }
 
-/** All ways from where a state is to a segment, as hops. */
+/** All ways from where something is to a segment, as hops. */
 function ways(site, { track, index }, key) {
   const [goal, end] = [key >> 8, key & 0xff];
   const travel = (on, from, to) => (from === to ? [] : [{ action: "TRAVEL", track: on, from, to }]);
+  const link = (into, beyond) => ({ action: "TRAVEL", track: into >> 8, from: into & 0xff, to: into & 0xff, mouth: beyond });
   if (track === goal) return [travel(track, index, end)];
-  const [here, there] = [track, goal].map((one) => site.spurs.find((spur) => spur.track === one));
-  if (here) {
-    const link = { action: "TRAVEL", track: here.mouth >> 8, from: here.mouth & 0xff, to: here.mouth & 0xff, mouth: (track << 8) | 1 };
-    const out = [...travel(track, index, 1), link];
-    return ways(site, { track: here.mouth >> 8, index: here.mouth & 0xff }, key).map((one) => [...out, ...one]);
+  if (isSpur(track)) {
+    const { mouth } = site.spurOf(track);
+    const out = [...travel(track, index, 1), link(mouth, (track << 8) | 1)];
+    return ways(site, { track: mouth >> 8, index: mouth & 0xff }, key).map((on) => [...out, ...on]);
   }
-  if (there) {
-    const link = { action: "TRAVEL", track: goal, from: 1, to: 1, mouth: there.mouth };
-    return ways(site, { track, index }, there.mouth).map((one) => [...one, link, ...travel(goal, 1, end)]);
+  if (isSpur(goal)) {
+    const { mouth } = site.spurOf(goal);
+    const into = [link((goal << 8) | 1, mouth), ...travel(goal, 1, end)];
+    return ways(site, { track, index }, mouth).map((on) => [...on, ...into]);
   }
   return site.lifts.filter((one) => one.floors.includes(track) && one.floors.includes(goal)).map((lift) => {
-    const ride = [lift.floors.indexOf(track) + 1, lift.floors.indexOf(goal) + 1];
-    const hop = (one) => ({ ...one, ride });
-    const on = travel(track, index, site.sill(lift, track));
-    return [...on, { action: "RIDE", track: lift.track, from: ride[0], to: ride[1] }, ...travel(goal, site.sill(lift, goal), end)].map(hop);
+    const [from, to] = [track, goal].map((floor) => lift.floors.indexOf(floor) + 1);
+    const ride = { action: "RIDE", track: lift.track, from, to };
+    return [...travel(track, index, site.sill(lift, track)), ride, ...travel(goal, site.sill(lift, goal), end)];
   });
-}
-
-function stepsOf(state) {
-  const steps = [];
-  for (let one = state; one.step; one = one.before) steps.unshift(one.step);
-  return steps;
 }
 
 /** P1, P2: steps as told: what waits between them, and where the first begins. */
@@ -200,9 +165,8 @@ export function legsOf(steps, awardUs) {
   const legs = [];
   let us = awardUs;
   for (const one of steps) {
-    const isLater = one.begin > us + ROUND;
-    if (isLater && (legs.length || one.action === "TRAVEL")) {
-      const [track, index] = one.mouth !== undefined ? [one.mouth >> 8, one.mouth & 0xff] : [one.track, one.from];
+    if (one.begin > us + ROUND && (legs.length || one.action === "TRAVEL")) {
+      const [track, index] = one.mouth === undefined ? [one.track, one.from] : [one.mouth >> 8, one.mouth & 0xff];
       legs.push({ action: "STAND", track, from: index, to: index, begin: us, end: one.begin });
     }
     legs.push(one);
@@ -210,4 +174,3 @@ export function legsOf(steps, awardUs) {
   }
   return legs;
 }
-
