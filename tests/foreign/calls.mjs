@@ -322,7 +322,7 @@ export class Calls extends Fleet {
   #bid(call) {
     const { due } = call;
     const isLate = this.now >= call.deadline - 2 * this.site.us.deadline_guard;
-    const isAble = this.mayGive && this.plan && this.hasTime && !this.isAway && !this.leftOut.get(call.key)?.includes(this.node);
+    const isAble = this.mayGive() && this.plan && this.hasTime() && !this.isAway() && !this.leftOut.get(call.key)?.includes(this.node);
     call.due = undefined;
     if (isLate || !isAble || !this.#search(call)) return;
     if (call.due > due + 5 * MS && !this.isDue(call.due)) return;
@@ -366,7 +366,7 @@ export class Calls extends Fleet {
     if (word.winner !== this.node || word.result !== "AWARDED") return this.#isLost(word, which);
     if (one) return this.report(which, one.phase === "LOADED" ? "LOADED" : "AWARDED", this.#sink(which));
     if (this.done.has(which)) return this.report(which, "DONE", this.done.get(which));
-    const found = call?.hasBid && this.mayTake && this.#arrange(this.#kept(), [call]);
+    const found = call?.hasBid && this.mayTake() && this.#arrange(this.#kept(), [call]);
     if (!found) return this.forfeit(which, call?.hasBid ? "IMPOSSIBLE" : "JOURNAL_LOST");
     Object.assign(call, { isMine: false, phase: "AWARDED" });
     this.stamp = [call.deadline_ms, call.initiator, call.number & 0xff];

@@ -7,28 +7,25 @@ import { CONTRACT, crc16, decode, encode, joined, singles } from "./words.mjs";
 export const [S, MS] = [1_000_000, 1_000];
 const LETTING = ["STARTING", "IDLE", "WORKING", "WAITING"];
 const RIGHTS = ["TokenGrant", "TokenHeld", "CarAt", "Award"];
+const WAITING = ["Waiting", "TaskReport", "TokenRequest", "ItineraryHead"];
 export const newer = (a, b, bits) => a !== b && (a - b + 2 ** bits) % 2 ** bits < 2 ** (bits - 1);
 export const next = (n) => (n % 255) + 1;
 
 export class Fleet {
   constructor({ node, site, digest }, kept) {
     Object.assign(this, { node, site: new Site(site, digest), epoch: 0, ...kept });
-    Object.assign(this, { frames: [], words: [], now: 0, local: 0, next: Infinity, beatUs: -S, beatAt: 0 });
-    this.boot = next(kept.boot ?? 0);
-    this.isAgain = Boolean(kept.boot);
-    this.peers = new Map(this.site.nodes.filter((one) => one !== node).map((one) => [one, { node: one, heard: -Infinity }]));
-    this.others = [...this.peers.values()];
-    this.tokens = new Tokens(this, kept.tokens);
-    this.cars = new Map(kept.cars); // origin << 16 | number: { station, by, version, wheelbase }
-    this.blocked = new Set();
+    Object.assign(this, { frames: [], words: [], digests: [], now: 0, local: 0, next: Infinity, beatUs: -S, beatAt: 0 });
+    Object.assign(this, { blocked: new Set(), askers: new Set(), ownUntil: 0, listenUntil: 0 });
     this.stops = new Map(); // who stopped me: until when
-    this.askers = new Set();
     this.drops = new Map(); // reason: [count, told]
     this.marks = new Map(); // what is done at most so often: when it may be again
-    this.digests = [];
-    this.ownUntil = 0;
-    this.listenUntil = 0;
+    this.cars = new Map(kept.cars); // origin << 16 | number: { station, by, version, wheelbase }
+    this.boot = next(kept.boot ?? 0);
+    this.isAgain = Boolean(kept.boot);
     this.rank = this.site.nodes.indexOf(node);
+    this.others = this.site.nodes.filter((one) => one !== node).map((one) => ({ node: one, heard: -Infinity }));
+    this.peers = new Map(this.others.map((one) => [one.node, one]));
+    this.tokens = new Tokens(this, kept.tokens);
   }
 
   /** R1: what is kept before it is said. */
@@ -40,6 +37,11 @@ export class Fleet {
 
   // --- frames and times
 
+  save = () => (this.isDirty = true);
+  tell = (name, signals) => this.frames.push(["device", ...encode("device", this.node, name, signals)]);
+  drop = (reason) => this.drops.set(reason, { told: 0, ...this.drops.get(reason), count: (this.drops.get(reason)?.count ?? 0) + 1 });
+
+  /** Whether it is time; else it is woken then. */
   isDue(us) {
     if (us > this.now) this.next = Math.min(this.next, us);
     return us <= this.now;
@@ -55,19 +57,6 @@ export class Fleet {
   say(name, signals) {
     this.words.push([name, signals]);
     if (name === "ItineraryHead" || name === "CarAt") this.beatSoon();
-  }
-
-  tell(name, signals) {
-    this.frames.push(["device", ...encode("device", this.node, name, signals)]);
-  }
-
-  save() {
-    this.isDirty = true;
-  }
-
-  drop(reason) {
-    const [count, told] = this.drops.get(reason) ?? [0, 0];
-    this.drops.set(reason, [count + 1, told]);
   }
 
   /** One frame (or none) at a time of the own clock: what is said, and by `next` when it wants to be woken. */
@@ -88,16 +77,14 @@ export class Fleet {
   #onFrame(number, data) {
     const word = data ? decode("fleet", number, data) : { fault: "UNKNOWN_IDENTIFIER" };
     const kind = word.sender > 250 ? "Gateway" : this.site.kinds.get(word.sender);
+    const peer = this.peers.get(word.sender);
     const isStop = word.name === "EmergencyStop";
     if (word.fault) return this.drop(word.fault);
     if (word.sender === this.node) return this.#onOwn(word);
-    if (!isStop && !kind) return this.drop("NOT_OF_SITE");
-    if (!isStop && !word.senders.includes(kind)) return this.drop("NOT_OF_KIND");
-    if (word.name === "BusTime") this.#onTime(word.bus_time_us);
+    if (!isStop && !word.senders.includes(kind)) return this.drop(kind ? "NOT_OF_KIND" : "NOT_OF_SITE");
+    if (word.name === "BusTime") return this.#onTime(word.bus_time_us);
     if (this.offset === undefined) return undefined;
-    this.now = this.local + this.offset;
-    const peer = this.peers.get(word.sender);
-    if (peer && word.name !== "BusTime") this.#isHeard(peer);
+    if (peer) this.#isHeard(peer);
     if (isStop || word.name === "Go") return this.#onStop(word);
     if (peer?.beat && word.name !== "Heartbeat" && this.isStranger(peer.beat)) return undefined;
     return singles(word).forEach((one) => this.hear(one, peer));
@@ -109,31 +96,26 @@ export class Fleet {
     if (name === "TokenAssigned") this.#onAssigned(word);
     else if (!name.startsWith("Token")) this[`on${/^(Call|Itinerary)/.exec(name)?.[0] ?? name}`]?.(word, peer);
     else if (peer && !this.ownUntil) this.tokens.hear(word);
-    if (peer && ["Waiting", "TaskReport", "TokenRequest", "ItineraryHead"].includes(name)) peer.waitsUs = this.now;
+    if (peer && WAITING.includes(name)) peer.waitsUs = this.now;
   }
 
   /** T2, T3. */
   #onTime(told) {
     const error = told - this.local - (this.offset ?? 0);
+    const isSame = Math.abs(error - this.far) <= 20 * MS;
+    const [isFirst, isNear] = [this.offset === undefined, Math.abs(error) <= 100 * MS];
     this.timeAt = this.local;
-    if (this.offset === undefined) {
-      this.offset = error;
-      this.now = told;
-      this.begin();
-    } else if (Math.abs(error) <= 100 * MS) {
-      this.far = undefined;
-      this.offset += Math.max(-2 * MS, Math.min(2 * MS, error));
-    } else if (Math.abs(error - this.far) <= 20 * MS) {
-      [this.offset, this.far] = [this.offset + error, undefined];
-      this.now += error;
-      this.sleep();
-    } else this.far = error;
+    this.far = isFirst || isNear || isSame ? undefined : error;
+    if (this.far !== undefined) return;
+    const step = isNear && !isFirst ? Math.max(-2 * MS, Math.min(2 * MS, error)) : error;
+    this.offset = (this.offset ?? 0) + step;
+    this.now = this.local + this.offset;
+    if (isFirst) this.begin();
+    else if (!isNear) this.sleep();
   }
 
   /** T5. */
-  get hasTime() {
-    return this.far === undefined && this.local - this.timeAt <= 4 * this.site.us.bus_time;
-  }
+  hasTime = () => this.far === undefined && this.local - this.timeAt <= 4 * this.site.us.bus_time;
 
   // --- presence
 
@@ -162,25 +144,17 @@ export class Fleet {
     this.beatAt = this.now;
   }
 
-  isStranger({ contract, site_digest, epoch }) {
-    return contract !== CONTRACT || site_digest !== this.site.digest || epoch !== this.epoch;
-  }
+  lives = (peer) => this.now - peer.heard <= 3 * this.site.us.heartbeat;
+  isRobot = ({ node }) => this.site.kinds.get(node) === "Robot";
+  isStranger = (beat) => [CONTRACT, this.site.digest, this.epoch].join() !== [beat.contract, beat.site_digest, beat.epoch].join();
 
   /** J8: of two halves that with the lowest node-ID counts. */
-  get isOutvoted() {
+  isOutvoted() {
     const live = this.others.filter((one) => one.beat && this.lives(one));
     const strangers = live.filter((one) => this.isStranger(one.beat));
     const lowest = Math.min(this.node, ...live.map((one) => one.node));
     const excess = 2 * strangers.length - live.length - 1;
     return excess > 0 || (excess === 0 && strangers.some((one) => one.node === lowest));
-  }
-
-  lives(peer) {
-    return this.now - peer.heard <= 3 * this.site.us.heartbeat;
-  }
-
-  isRobot({ node }) {
-    return this.site.kinds.get(node) === "Robot";
   }
 
   /** J6. */
@@ -197,17 +171,9 @@ export class Fleet {
     return stopper !== undefined ? ["EMERGENCY_STOP", stopper, 0] : undefined;
   }
 
-  get isAway() {
-    return Boolean(this.hold) || this.now < this.listenUntil || this.isOutvoted;
-  }
-
-  get mayTake() {
-    return this.synced && !this.frozen && !this.person && !this.ownUntil;
-  }
-
-  get mayGive() {
-    return this.synced && !this.frozen && !this.hold;
-  }
+  isAway = () => Boolean(this.hold) || this.now < this.listenUntil || this.isOutvoted();
+  mayTake = () => this.synced && !this.frozen && !this.person && !this.ownUntil;
+  mayGive = () => this.synced && !this.frozen && !this.hold;
 
   /** J4. */
   digest() {
@@ -219,9 +185,7 @@ export class Fleet {
   }
 
   /** J2: after a word that changes digests. */
-  beatSoon() {
-    this.beatAt = Math.min(this.beatAt, Math.max(this.now + 100 * MS, this.beatUs + 300 * MS));
-  }
+  beatSoon = () => (this.beatAt = Math.min(this.beatAt, Math.max(this.now + 100 * MS, this.beatUs + 300 * MS)));
 
   beat() {
     const { heartbeat } = this.site.us;
@@ -229,13 +193,12 @@ export class Fleet {
     this.say("Heartbeat", { ...mine, boot: this.boot, kind: "ROBOT", state: this.state, epoch: this.epoch });
     const phase = Math.floor((this.rank * heartbeat) / this.site.nodes.length);
     this.beatUs = this.now;
-    this.beatAt = this.now + heartbeat - ((((this.now - phase) % heartbeat) + heartbeat) % heartbeat);
-    const [reason, cause, needs_person] = this.hold ?? (this.waitsForAll ? ["JOURNAL_LOST", this.missing[0].node, 0] : []);
-    if (reason) this.say("Halted", { machine: this.node, reason, cause, needs_person, boot: this.boot });
-    const isLowest = this.others.every((one) => one.node > this.node || this.isObstacle(one));
-    const isSilent = (one) => one.heard > -Infinity && !this.lives(one);
-    for (const one of isLowest && !this.isAway ? this.others.filter(isSilent) : []) {
-      this.say("Halted", { machine: one.node, reason: one.reason ?? "NODE_SILENT", boot: one.boot });
+    this.beatAt = (Math.floor((this.now - phase) / heartbeat) + 1) * heartbeat + phase;
+    const [reason, cause, needs_person] = this.hold ?? (this.isNew() ? ["JOURNAL_LOST", this.missing()[0]?.node, 0] : []);
+    if (cause !== undefined) this.say("Halted", { machine: this.node, reason, cause, needs_person, boot: this.boot });
+    const isLowest = !this.isAway() && this.others.every((one) => one.node > this.node || this.isObstacle(one));
+    for (const one of this.others.filter(({ heard }) => isLowest && heard > -Infinity)) {
+      if (!this.lives(one)) this.say("Halted", { machine: one.node, reason: one.reason ?? "NODE_SILENT", boot: one.boot });
     }
   }
 
@@ -249,9 +212,8 @@ export class Fleet {
     this.beatAt = this.now;
     if (name === "EmergencyStop") return this.stops.set(sender, this.now + 30 * S);
     for (const one of this.stops.keys()) if (stopper === 0 || stopper === one) this.stops.delete(one);
-    if (stopper === this.node && this.person && !/JOURNAL/.test(this.person)) this.#comeBack();
-    else if (!this.stops.size) this.listen();
-    return undefined;
+    if (stopper === this.node && this.person && !/JOURNAL/.test(this.person)) return this.#comeBack();
+    return this.stops.size || this.listen();
   }
 
   /** H3. */
@@ -275,25 +237,14 @@ export class Fleet {
     this.begin();
   }
 
-  /** R7: somebody who has not answered yet knows more of my rights than my journal. */
-  isComparing(node) {
-    return !this.synced && !this.peers.get(node).hasAnswered;
-  }
-
-  isOutdated() {
-    this.holdFor(this.isAgain ? "JOURNAL_SHORT" : "JOURNAL_LOST");
-  }
-
   #wakeHolds() {
     for (const [sender, us] of this.stops) {
-      if (!this.isDue(us)) continue;
-      this.stops.delete(sender);
-      if (!this.stops.size) this.listen();
+      if (this.isDue(us) && this.stops.delete(sender) && !this.stops.size) this.listen();
     }
     if (this.ownUntil && !this.person && this.isDue(this.ownUntil)) this.#comeBack();
     if (this.frozen && !this.frozen.isRead && this.isDue(this.frozen.said + 10 * S)) this.frozen = undefined;
     this.isDue(this.listenUntil);
-    if (this.wasAway !== this.isAway) [this.wasAway, this.beatAt] = [this.isAway, this.now];
+    if (this.wasAway !== this.isAway()) [this.wasAway, this.beatAt] = [this.isAway(), this.now];
   }
 
   // --- questions and answers
@@ -309,15 +260,14 @@ export class Fleet {
   }
 
   onHeartbeat(word, peer) {
-    const again = peer.boot !== undefined && (peer.boot !== word.boot || (word.state === "STARTING" && peer.beat.state !== "STARTING"));
-    if (again) {
-      Object.assign(peer, { plan: undefined, isStarted: true });
-      this.ask(peer, peer.boot, this.now);
-    }
-    if (word.state !== "OBSTACLE" && word.state !== "STOPPED") peer.halted = false;
-    Object.assign(peer, { beat: word, boot: word.boot, known: word.state === "STARTING" ? peer.known : word.boot });
+    const { boot, state, mirror_digest } = word;
+    const isAnew = peer.boot !== undefined && (peer.boot !== boot || (state === "STARTING" && peer.beat.state !== state));
+    if (isAnew) this.ask(peer, peer.boot, this.now);
+    if (isAnew) Object.assign(peer, { plan: undefined, isStarted: true });
+    if (state !== "OBSTACLE" && state !== "STOPPED") peer.halted = false;
+    Object.assign(peer, { beat: word, boot, known: state === "STARTING" ? peer.known : boot });
     if (this.isStranger(word)) return;
-    const isSame = [this.digest(), ...this.digests.map(([, one]) => one)].includes(word.mirror_digest);
+    const isSame = [this.digest(), ...this.digests.map(([, one]) => one)].includes(mirror_digest);
     peer.apart = isSame || !this.plan ? 0 : peer.apart + 1;
     const isTurn = peer.apart && (peer.apart <= 3 || peer.apart % 8 === 0);
     if (isTurn) this.ask(peer, 0, this.now + 20 * MS + 5 * MS * this.rank);
@@ -336,40 +286,35 @@ export class Fleet {
     if (whom === 0 && peer?.known && !(this.now < peer.askedUs + 250 * MS)) this.ask(peer, peer.known, this.now);
   }
 
-  /** R8: a first life in a fleet that has a past. */
-  get waitsForAll() {
-    return !this.synced && !this.isAgain && this.others.some((one) => one.boot > 1) && this.missing.length > 0;
-  }
-
-  /** R2: whose answer to the question of the own start is waited for. */
-  get missing() {
-    const isPast = !this.isAgain && this.others.some((one) => one.boot > 1);
-    const mayLive = (one) => !one.halted && (this.lives(one) || this.now < this.started + 6 * S);
-    return this.others.filter((one) => !one.hasAnswered && (isPast || mayLive(one)));
-  }
+  /** R7: somebody who has not answered yet knows more of my rights than my journal. */
+  isComparing = (node) => !this.synced && !this.peers.get(node).hasAnswered;
+  isOutdated = () => this.holdFor(this.isAgain ? "JOURNAL_SHORT" : "JOURNAL_LOST");
+  /** R8: a first life in a fleet that has a past waits for all, else (R2) for whoever lives. */
+  isNew = () => !this.synced && !this.isAgain && this.others.some((one) => one.boot > 1);
+  mayLive = (one) => !one.halted && (this.lives(one) || this.now < this.started + 6 * S);
+  missing = () => this.others.filter((one) => !one.hasAnswered && (this.isNew() || this.mayLive(one)));
 
   #wakeSync() {
-    for (const one of this.others) {
-      const { question } = one;
-      if (!question || !this.isDue(question.at)) continue;
+    for (const one of this.others.filter(({ question }) => question && this.isDue(question.at))) {
+      const { before } = one.question;
       one.question = undefined;
-      if (one.apart && !question.before && one.beat?.mirror_digest === this.digest()) continue;
+      if (one.apart && !before && one.beat?.mirror_digest === this.digest()) continue;
       Object.assign(one, { isAsked: true, askedUs: this.now });
-      this.say("SyncRequest", { whom: one.node, boot_before: question.before });
+      this.say("SyncRequest", { whom: one.node, boot_before: before });
     }
     if (this.synced || !this.isDue(this.started + this.site.us.heartbeat)) return;
-    this.synced = !this.missing.length;
+    this.synced = !this.missing().length;
     if (this.synced || !this.every("ask who is missing", 500 * MS)) return;
-    for (const one of this.missing) this.say("SyncRequest", { whom: one.node, boot_before: 0 });
+    for (const one of this.missing()) this.say("SyncRequest", { whom: one.node, boot_before: 0 });
   }
 
   /** R3, R4. */
   #answer() {
     if (!this.askers.size || !this.isDue(this.quietUntil)) return;
     this.stateAll();
-    const isAnew = (peer, by) => peer?.isStarted && this.askers.has(peer.node) && by.life !== peer.boot;
-    const isAway = (peer) => peer && !this.lives(peer);
-    this.tokens.tellSeen((one) => isAnew(this.peers.get(one.by), one) || isAway(this.peers.get(one.holder)));
+    const isAnew = (peer, life) => peer?.isStarted && this.askers.has(peer.node) && life !== peer.boot;
+    const isSilent = (peer) => peer && !this.lives(peer);
+    this.tokens.tellSeen(({ by, life, holder }) => isAnew(this.peers.get(by), life) || isSilent(this.peers.get(holder)));
     this.say("SyncDone", { whom: this.askers.size === 1 ? [...this.askers][0] : 0, boot: this.boot });
     this.askers.clear();
     this.quietUntil = this.now + 250 * MS;
@@ -378,27 +323,25 @@ export class Fleet {
   // --- rights made anew
 
   #onAssigned(word) {
-    const key = keyOf(word);
-    const isNew = this.frozen && !this.frozen.list.some(([one]) => one === key);
-    if (isNew) this.frozen.list.push([key, word.version, word.holder]);
+    const isNew = this.frozen && !this.frozen.list.some(([key]) => key === keyOf(word));
+    if (isNew) this.frozen.list.push([keyOf(word), word.version, word.holder]);
   }
 
   onRegeneration({ regeneration_phase: phase, epoch, lost, absent, tokens, digest }) {
-    const frozen = this.frozen?.epoch === epoch ? this.frozen : undefined;
-    const list = phase === "FREEZE" ? [] : (frozen?.list ?? []).toSorted((a, b) => a[0] - b[0]);
+    const frozen = this.frozen?.epoch === epoch && phase !== "FREEZE" ? this.frozen : undefined;
+    const list = (frozen?.list ?? []).toSorted((a, b) => a[0] - b[0]);
     const rows = list.flatMap(([key, ...row]) => [key >> 24, key & 0xffffff, ...row]);
     const sum = crc32(Buffer.from(Uint32Array.from(rows).buffer).swap32()) & 0xffff;
+    const isMine = absent === this.node || (lost === this.node && !/JOURNAL/.test(this.person));
     const answer = (state, reason = "NONE") => {
       this.say("RegenerationState", { regeneration_phase: state, epoch, tokens: list.length, digest: sum, reason });
     };
-    const isMine = absent === this.node || (lost === this.node && !/JOURNAL/.test(this.person));
     if (phase === "ABORT") this.frozen = undefined;
     else if (phase === "FREEZE" && epoch !== next(this.epoch)) answer("REFUSED", "OTHER_EPOCH");
     else if (phase === "FREEZE" && isMine) answer("REFUSED", "NOT_AUTHORISED");
     else if (phase === "FREEZE") {
       answer("FREEZE");
-      this.frozen ??= { epoch, list: [] };
-      this.frozen.said = this.now;
+      this.frozen = { epoch, list: [], ...this.frozen, said: this.now };
       if (this.every("say all that is frozen", 4 * S)) this.#sayAllOf(lost);
     } else if (phase === "READ_BACK" && frozen) {
       answer("READ_BACK");
@@ -411,6 +354,7 @@ export class Fleet {
     }
   }
 
+  /** G2. */
   #sayAllOf(lost) {
     this.tokens.state();
     for (const [car, one] of this.cars) if (one.by === lost && one.station !== OUTSIDE) this.sayCar(car, one);
@@ -422,17 +366,16 @@ export class Fleet {
   wakeFleet() {
     this.#wakeHolds();
     this.#wakeSync();
-    for (const [reason, [count, told]] of this.drops) {
-      if (count === told || !this.every(reason, this.site.us.heartbeat)) continue;
-      this.drops.set(reason, [count, count]);
-      this.say("Diagnostic", { reason, count });
+    for (const [reason, one] of this.drops) {
+      if (one.count === one.told || !this.every(reason, this.site.us.heartbeat)) continue;
+      one.told = one.count;
+      this.say("Diagnostic", { reason, count: one.count });
     }
     this.#answer();
     if (this.isDue(this.beatAt)) this.beat();
     this.isDue(this.beatAt);
-    const digest = this.digest();
     this.digests = this.digests.filter(([us]) => us > this.now);
-    if (digest !== this.lastDigest) this.digests.push([this.now + 300 * MS, this.lastDigest]);
-    this.lastDigest = digest;
+    if (this.digest() !== this.lastDigest) this.digests.push([this.now + 300 * MS, this.lastDigest]);
+    this.lastDigest = this.digest();
   }
 }

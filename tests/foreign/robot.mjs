@@ -31,7 +31,7 @@ export class Robot extends Calls {
 
   get state() {
     if (!this.plan) return "STARTING";
-    if (this.isAway || this.frozen) return "OBSTACLE";
+    if (this.isAway() || this.frozen) return "OBSTACLE";
     return this.steps.length ? "WORKING" : "IDLE";
   }
 
@@ -80,7 +80,7 @@ export class Robot extends Calls {
     this.wanted.clear();
     const isReady = this.place && this.shuttle && (this.synced || !this.isAgain);
     if (!this.plan && !this.person && isReady) this.#start();
-    if (this.isAway || !this.synced) this.orderUs = 0;
+    if (this.isAway() || !this.synced) this.orderUs = 0;
     else if (this.plan && !this.frozen) {
       if (this.meets && this.every("give way", S)) this.#giveWay();
       this.#wakeAll();

@@ -135,7 +135,7 @@ export class Tokens {
   #offered(one, word) {
     const { robot } = this;
     const { sender, version } = word;
-    if (!robot.mayTake) return;
+    if (!robot.mayTake()) return;
     if (this.holds(one.key) || version <= (one.given?.[0] ?? 0)) this.#answer(one);
     else if (sender !== one.holder) {
       one.disputed = word;
@@ -178,7 +178,7 @@ export class Tokens {
     if (isUnheard) this.#grant(one);
     one.open.delete(sender);
     one.open.set(sender, { us: robot.now, plan, predecessor });
-    if (!this.holds(one.key) || !robot.mayGive) return;
+    if (!this.holds(one.key) || !robot.mayGive()) return;
     const reason = robot.objection(one.key, sender, one.open.get(sender));
     if (!reason) this.give([one.key], sender);
     else robot.say("TokenRefusal", { ...of(one), version: one.version & LOW, requester: sender, reason });
