@@ -1,25 +1,23 @@
 // Calls, bids, tasks, and what others plan (chapters 4 to 7).
 import { Fleet, MS, S, newer, next } from "./fleet.mjs";
-import { Planner, ROUND, WORK, endOf, floorOf, legsOf, meeting, windowsOf } from "./plan.mjs";
+import { Planner, WORK, endOf, floorOf, legsOf, meeting, windowsOf } from "./plan.mjs";
 import { ANY, frontOf, isSpur } from "./site.mjs";
 import { carKey, isSegment } from "./tokens.mjs";
 
 const MOST_LEGS = 31;
 const ALWAYS = { a: -Infinity, b: Infinity };
 const reference = (origin, number) => origin * 65_536 + number;
-const task = (word) => reference(word.task_origin, word.task_number);
+const taskOf = (word) => reference(word.task_origin, word.task_number);
+const isBeaten = ({ best }, us, node) => best && (best[0] < us || (best[0] === us && best[1] < node));
 
 export class Calls extends Fleet {
   constructor(setup, kept) {
     super(setup, kept);
     this.tasks = new Map(kept.tasks); // task: its call, with the phase that the task is in
     this.done = new Map(kept.done); // task: where the car was left
-    this.steps = [];
-    this.calls = new Map();
-    this.leftOut = new Map();
-    this.sets = new Map();
     this.forfeits = new Map(); // task: [reason, how often it was said]
     this.order = new Map(); // node and segment: whether it passes there before me
+    Object.assign(this, { steps: [], calls: new Map(), leftOut: new Map(), sets: new Map() });
   }
 
   journal() {
@@ -34,26 +32,23 @@ export class Calls extends Fleet {
     return this.others.filter((one) => this.isRobot(one));
   }
 
-  get nowMs() {
-    return Math.ceil(this.now / MS) % 2 ** 32;
+  get windows() {
+    return windowsOf(this.site, this.steps.length ? this.steps : [this.standing()]);
   }
 
+  nowMs = () => Math.ceil(this.now / MS) % 2 ** 32;
+  stampOf = (call) => [call.deadline_ms, call.initiator, call.number & 0xff];
   /** F6. */
-  near(ms) {
-    const now = Math.floor(this.now / MS);
-    return (now + ((ms - now) | 0)) * MS;
-  }
+  near = (ms) => (Math.floor(this.now / MS) + ((ms - Math.floor(this.now / MS)) | 0)) * MS;
 
   /** F4: the frames of a set by their places, when it is whole. */
   #collect(key, place, word, isWhole) {
-    const set = this.sets.get(key) ?? { words: {} };
-    const before = set.words[place];
+    const { words } = this.sets.get(key) ?? { words: {} };
+    const isOther = Object.keys(words[place] ?? {}).some((one) => one !== "senders" && words[place][one] !== word[one]);
     this.sets.delete(key);
-    if (before && Object.keys(word).some((one) => one !== "senders" && before[one] !== word[one])) return undefined;
-    set.words[place] = word;
-    set.said = this.now;
-    if (isWhole(set.words)) return set.words;
-    this.sets.set(key, set);
+    words[place] = word;
+    if (!isOther && isWhole(words)) return words;
+    if (!isOther) this.sets.set(key, { words, said: this.now });
     return undefined;
   }
 
@@ -66,17 +61,15 @@ export class Calls extends Fleet {
     const { head, ...legs } = this.#collect(key, word.leg ?? "head", word, isWhole) ?? {};
     if (!head || head.grade === "TENTATIVE" || (peer.plan && !newer(head.version, peer.plan.version, 8))) return;
     const award = this.near(head.stamp_award_ms);
-    let [begin, here] = [award, peer.place?.track];
-    const steps = Object.values(legs).map(({ action, track, side, from_index: from, to_index: to, end_ms }) => {
-      const end = award + end_ms * MS;
-      const mouth = action === "TRAVEL" && from === to ? this.#beyond(track, to, here) : undefined;
-      const step = { action, track, from, to, begin, end, mouth, place: (track << 8) | ((side === "FAR") << 7) | to };
-      [begin, here] = [end, track];
-      return step;
-    });
+    const steps = [];
+    for (const { action, track, side, from_index: from, to_index: to, end_ms } of Object.values(legs)) {
+      const before = steps.at(-1) ?? { end: award, track: peer.place?.track };
+      const mouth = action === "TRAVEL" && from === to ? this.#beyond(track, to, before.track) : undefined;
+      const place = (track << 8) | ((side === "FAR") << 7) | to;
+      steps.push({ action, track, from, to, begin: before.end, end: award + end_ms * MS, mouth, place });
+    }
     const stamp = [head.stamp_award_ms, head.stamp_initiator, head.stamp_call];
-    peer.plan = { version: head.version, stamp, steps, leg: 0, windows: steps.length ? windowsOf(this.site, steps) : [] };
-    if (head.grade === "RELEASED") peer.plan = undefined;
+    peer.plan = !steps.length ? undefined : { version: head.version, stamp, steps, leg: 0, windows: windowsOf(this.site, steps) };
     this.compare();
   }
 
@@ -96,8 +89,8 @@ export class Calls extends Fleet {
     if (peer.plan?.version !== itinerary_version) return;
     peer.plan.leg = Math.max(leg, peer.plan.leg);
     const now = peer.plan.steps[peer.plan.leg];
-    const left = (one) => now?.track === track && one >> 8 === track && ((one & 0xff) - index) * Math.sign(now.to - now.from) < 0;
-    peer.plan.windows = peer.plan.windows.filter((one) => one.leg > leg || (one.leg === leg && !left(one.key)));
+    const isLeft = (one) => now?.track === track && one >> 8 === track && (one - key) * Math.sign(now.to - now.from) < 0;
+    peer.plan.windows = peer.plan.windows.filter((one) => one.leg > leg || (one.leg === leg && !isLeft(one.key)));
   }
 
   /** J6: it stands where its plan has left. */
@@ -114,35 +107,28 @@ export class Calls extends Fleet {
     return this.compare();
   }
 
-  onClear(word) {
-    this.onBlocked(word);
-  }
+  onClear = (word) => this.onBlocked(word);
 
   /** P6, J7: what the others need, and where they rest. */
   planner() {
-    const busy = new Map();
+    const busy = new Map([...this.blocked].map((key) => [key, [ALWAYS]]));
     const add = (key, window) => busy.set(key, [...(busy.get(key) ?? []), window]);
     const ends = [];
     for (const one of this.robots) {
       const isIdle = !one.plan || this.isObstacle(one);
       const rights = [...this.tokens.all.values()].filter(({ key, holder }) => holder === one.node && isSegment(key));
-      const windows = isIdle ? rights.map(({ key }) => ({ key, ...ALWAYS })) : one.plan.windows;
-      const end = isIdle ? one.place : { track: one.plan.steps.at(-1).track, index: one.plan.steps.at(-1).to };
-      if (isIdle && one.place) add(one.place.key, ALWAYS);
+      const body = one.place ? [one.place] : [];
+      const end = isIdle ? body[0] : endOf(one.plan.steps);
+      const windows = isIdle ? [...rights, ...body].map(({ key }) => ({ key, ...ALWAYS })) : one.plan.windows;
       for (const window of windows) add(window.key, window);
       if (end) ends.push(this.site.at(end.track, end.index));
     }
-    for (const key of this.blocked) add(key, ALWAYS);
     for (const { node, track } of this.site.lifts) {
       const mine = this.steps.findLast((one) => one.track === track);
       const { place } = this.peers.get(node);
       if (mine ?? place) add(track << 8, { a: -Infinity, b: mine?.end ?? this.now, to: mine?.to ?? place.index });
     }
     return new Planner(this.site, busy, this.site.refuges(ends));
-  }
-
-  get windows() {
-    return windowsOf(this.site, this.steps.length ? this.steps : [this.standing()]);
   }
 
   standing() {
@@ -152,17 +138,11 @@ export class Calls extends Fleet {
 
   /** K12: who passes a segment right before a robot, by the plans that I know; me too. */
   before(key, node) {
-    const windows = (one) => (one === this.node ? this.windows : (this.peers.get(one).plan?.windows ?? []));
-    const own = windows(node).find((one) => one.key === key);
-    const isBefore = (other, theirs) => {
-      const known = this.order.get(`${other === this.node ? node : other} ${key}`);
-      const isMeeting = meeting([theirs], [own]) && known !== undefined && [node, other].includes(this.node);
-      return isMeeting ? known !== (other === this.node) : theirs.a < own.a;
-    };
-    const others = [this.node, ...this.robots.filter((one) => !this.isObstacle(one)).map((one) => one.node)];
-    const found = others.filter((one) => own && one !== node).flatMap((other) => {
-      return windows(other).filter((one) => one.key === key && isBefore(other, one)).map(({ a }) => [a, other]);
-    });
+    const all = [this, ...this.robots.filter((one) => one.plan && !this.isObstacle(one))];
+    const windows = (one) => (one === this ? this.windows : one.plan.windows).filter((other) => other.key === key);
+    const own = all.filter((one) => one.node === node).flatMap(windows)[0];
+    const others = all.filter((one) => own && one.node !== node);
+    const found = others.flatMap((one) => windows(one).filter(({ a }) => a < own.a).map(({ a }) => [a, one.node]));
     return found.sort((a, b) => b[0] - a[0])[0]?.[1] ?? 0;
   }
 
@@ -177,7 +157,7 @@ export class Calls extends Fleet {
     const peer = this.peers.get(node);
     const isMine = !isSegment(key) || this.site.liftOf(key) || this.body().includes(key);
     const sees = this.before(key, node);
-    const isNeeded = this.needed.includes(key) && (this.isRunning || sees === this.node);
+    const isNeeded = this.needed.includes(key) && (this.isRunning() || sees === this.node);
     if (isMine || isNeeded || this.now - peer.heard > 1.25 * this.site.us.heartbeat) return "TOKEN_NOT_GRANTABLE_YET";
     if (plan === 0) return "";
     const isOther = predecessor !== sees && predecessor !== this.node;
@@ -193,19 +173,17 @@ export class Calls extends Fleet {
   compare() {
     if (!this.plan || !this.place) return;
     const mine = this.windows;
-    const order = new Map();
     this.meets = mine.some((one) => this.blocked.has(one.key)) ? {} : undefined;
     for (const { node, plan } of this.robots.filter((one) => one.plan && !this.isObstacle(one))) {
       const pair = meeting(mine, plan.windows);
       if (pair && this.#yields(node, plan, ...pair)) this.meets = plan;
       for (const one of mine) {
         const theirs = plan.windows.find((other) => other.key === one.key);
-        const name = `${node} ${one.key}`;
-        const isFirst = theirs && (meeting([one], [theirs]) ? this.order.get(name) : theirs.a < one.a);
-        if (isFirst !== undefined) order.set(name, isFirst);
+        const isAgreed = theirs && !meeting([one], [theirs]);
+        if (isAgreed) this.order.set(`${node} ${one.key}`, theirs.a < one.a);
+        else if (!theirs) this.order.delete(`${node} ${one.key}`);
       }
     }
-    this.order = order;
   }
 
   #yields(node, plan, mine, theirs) {
@@ -225,39 +203,40 @@ export class Calls extends Fleet {
 
   onLeftOut(word) {
     const key = `${word.sender} ${word.call}`;
-    const nodes = [..."abcdef"].map((one) => word[`node_${one}`]);
-    this.leftOut.set(key, [...(this.leftOut.get(key) ?? []), ...nodes]);
+    this.leftOut.set(key, [...(this.leftOut.get(key) ?? []), ...[..."abcdef"].map((one) => word[`node_${one}`])]);
   }
+
+  isOut = (call, node) => this.leftOut.get(call.key)?.includes(node);
 
   onCall(word) {
     const key = `${word.sender} ${word.call}`;
-    const isWhole = ({ Call: head, CallTerms, CallLoad, CallParent }) => head && CallTerms && CallLoad && (!head.depth || CallParent);
+    const isWhole = (words) => words.Call && words.CallTerms && words.CallLoad && (!words.Call.depth || words.CallParent);
     const words = this.calls.has(key) ? undefined : this.#collect(key, word.name, word, isWhole);
     if (words) this.#opened(key, words);
   }
 
   /** B1, B3. */
   #opened(key, { Call: head, CallTerms: terms, CallLoad: load, CallParent: parent }) {
-    const { sender: initiator, call: number } = head;
-    const deadline = this.near(terms.deadline_ms);
     const { call_window: window, deadline_guard: guard, door } = this.site.us;
-    for (const one of [...this.calls.values()].filter((other) => other.initiator === initiator && other.task === task(head))) {
+    const { min_wheelbase_mm: least, max_wheelbase_mm: most } = this.site.cars;
+    const [initiator, number, task, deadline] = [head.sender, head.call, taskOf(head), this.near(terms.deadline_ms)];
+    const isSame = (one) => one.initiator === initiator && one.task === task;
+    for (const one of [...this.calls.values()].filter(isSame)) {
       if (deadline < one.deadline && !newer(number, one.number, 16)) return;
       this.calls.delete(one.key);
     }
-    this.forfeits.delete(task(head));
-    const isKnown = ["PARK", "RETRIEVE"].includes(head.operation) && head.criterion === "FINISH_TIME" && !head.depth;
-    const isInTime = this.now < deadline - 2 * guard && deadline <= this.now + 60 * window;
-    const { min_wheelbase_mm: least, max_wheelbase_mm: most } = this.site.cars;
-    const { wheelbase_mm: wheelbase, to_station: to } = load;
-    const isFit = wheelbase === 1_500 || (wheelbase >= least && wheelbase <= most);
-    if (!isKnown || !isInTime || !isFit || !["ANY", "ROBOT"].includes(head.kind)) return;
+    this.forfeits.delete(task);
     const soonest = this.site.bays.has(terms.from_station) ? deadline - window + 9_500 * MS + door : 0;
     const ready = parent?.ready_ms ? deadline + parent.ready_ms * MS : soonest;
+    const { wheelbase_mm: wheelbase, to_station: to } = load;
     const car = reference(load.car_origin, load.car_number);
     const { from_station: source, deadline_ms } = terms;
-    const call = { key, initiator, number, task: task(head), deadline, deadline_ms, source, to, ready, car, wheelbase };
-    Object.assign(call, { floor: floorOf(this.site, call), heard: this.now });
+    const isKnown = /PARK|RETRIEVE/.test(head.operation) && head.criterion === "FINISH_TIME" && /ANY|ROBOT/.test(head.kind);
+    const isInTime = this.now < deadline - 2 * guard && deadline <= this.now + 60 * window;
+    const isFit = wheelbase === 1_500 || (wheelbase >= least && wheelbase <= most);
+    if (!isKnown || head.depth || !isInTime || !isFit) return;
+    const call = { key, initiator, number, task, deadline, deadline_ms, source, to, ready, car, wheelbase, heard: this.now };
+    call.floor = floorOf(this.site, call);
     this.calls.set(key, call);
     this.#search(call);
   }
@@ -273,13 +252,14 @@ export class Calls extends Fleet {
     const planner = this.planner();
     const after = (steps) => {
       const { us = 0, ...where } = endOf(steps) ?? this.place;
-      return { ...where, us: Math.max(us + this.late, this.now) };
+      return { ...where, us: Math.max(us + this.late(), this.now) };
     };
     let found = { steps: kept };
     for (const call of calls) {
       const { steps } = found;
       const done = steps.slice(0, Math.max(kept.length, steps.findLastIndex((one) => one.action === WORK) + 1));
-      const plan = planner.task({ ...call, isAboard: call.phase === "LOADED" || kept.some((one) => one.call === call) }, after(done), this.freePlaces(done));
+      const isAboard = call.phase === "LOADED" || kept.some((one) => one.call === call);
+      const plan = planner.task({ ...call, isAboard }, after(done), this.freePlaces(done));
       if (!plan) return undefined;
       for (const one of plan.steps) if (one.call) one.call = call;
       found = { steps: [...done, ...plan.steps], over: plan.over };
@@ -306,30 +286,25 @@ export class Calls extends Fleet {
     return true;
   }
 
-  #isBeaten({ best }, us, node) {
-    return best && (best[0] < us || (best[0] === us && best[1] < node));
-  }
-
   onBid({ sender, initiator, call: number, cost }, peer) {
     const call = this.calls.get(`${initiator} ${number}`);
-    if (!call || !peer || this.isObstacle(peer) || this.leftOut.get(call.key)?.includes(sender)) return;
+    if (!call || !peer || this.isObstacle(peer) || this.isOut(call, sender)) return;
     const us = this.near(cost);
     const isVoid = us < call.floor - 500 * MS || this.now > call.deadline - this.site.us.deadline_guard;
-    if (isVoid || this.#isBeaten(call, us, sender)) return;
-    Object.assign(call, { best: [us, sender], isMine: false });
+    if (!isVoid && !isBeaten(call, us, sender)) Object.assign(call, { best: [us, sender], isMine: false });
   }
 
   #bid(call) {
     const { due } = call;
     const isLate = this.now >= call.deadline - 2 * this.site.us.deadline_guard;
-    const isAble = this.mayGive() && this.plan && this.hasTime() && !this.isAway() && !this.leftOut.get(call.key)?.includes(this.node);
+    const isAble = this.mayGive() && this.plan && this.hasTime() && !this.isAway() && !this.isOut(call, this.node);
     call.due = undefined;
     if (isLate || !isAble || !this.#search(call)) return;
     if (call.due > due + 5 * MS && !this.isDue(call.due)) return;
     call.due = undefined;
-    if (this.#isBeaten(call, call.cost * MS, this.node)) return;
+    if (isBeaten(call, call.cost * MS, this.node)) return;
     Object.assign(call, { best: [call.cost * MS, this.node], isMine: true, hasBid: true });
-    this.say("Bid", { initiator: call.initiator, call: call.number, cost: call.cost % 2 ** 32, itinerary_version: 0 });
+    this.say("Bid", { initiator: call.initiator, call: call.number, cost: call.cost % 2 ** 32 });
   }
 
   wakeCalls() {
@@ -339,9 +314,7 @@ export class Calls extends Fleet {
       if (this.now > call.deadline + 60 * S) this.calls.delete(call.key);
     }
     for (const [key, set] of this.sets) {
-      if (!this.isDue(set.said + S)) continue;
-      this.sets.delete(key);
-      this.drop("INCOMPLETE_SET");
+      if (this.isDue(set.said + S) && this.sets.delete(key)) this.drop("INCOMPLETE_SET");
     }
     for (const [which, [reason, times]] of this.forfeits) {
       if (!this.every(`forfeit ${which}`, S)) continue;
@@ -354,12 +327,10 @@ export class Calls extends Fleet {
   // --- awards and tasks
 
   /** Where the load of a task will be. */
-  #sink(which) {
-    return this.steps.findLast((one) => one.call?.task === which)?.place ?? 0;
-  }
+  #sink = (which) => this.steps.findLast((one) => one.call?.task === which)?.place ?? 0;
 
   onAward(word) {
-    const which = task(word);
+    const which = taskOf(word);
     const call = this.calls.get(`${word.sender} ${word.call}`);
     const one = this.tasks.get(which);
     this.forfeits.delete(which);
@@ -369,7 +340,7 @@ export class Calls extends Fleet {
     const found = call?.hasBid && this.mayTake() && this.#arrange(this.#kept(), [call]);
     if (!found) return this.forfeit(which, call?.hasBid ? "IMPOSSIBLE" : "JOURNAL_LOST");
     Object.assign(call, { isMine: false, phase: "AWARDED" });
-    this.stamp = [call.deadline_ms, call.initiator, call.number & 0xff];
+    this.stamp = this.stampOf(call);
     this.tasks.set(which, call);
     this.#take(found);
     return this.report(which, "AWARDED", this.#sink(which));
@@ -384,17 +355,16 @@ export class Calls extends Fleet {
   /** U5. */
   forfeit(which, reason) {
     this.report(which, "FORFEITED", 0, reason);
-    if (reason === "JOURNAL_LOST") return;
     this.every(`forfeit ${which}`, S);
-    this.forfeits.set(which, [reason, 1]);
+    if (reason !== "JOURNAL_LOST") this.forfeits.set(which, [reason, 1]);
   }
 
   /** U6. */
   #isLost(word, which) {
     this.calls.delete(`${word.sender} ${word.call}`);
     const one = this.tasks.get(which);
-    const isOver = word.result === "AWARDED" ? newer(word.task_version, 1, 7) : ["REJECTED", "WITHDRAWN"].includes(word.result);
-    if (!one || one.phase !== "AWARDED" || one.initiator !== word.sender || !isOver) return;
+    const isOver = word.result === "AWARDED" ? newer(word.task_version, 1, 7) : /REJECTED|WITHDRAWN/.test(word.result);
+    if (!isOver || one?.phase !== "AWARDED" || one.initiator !== word.sender) return;
     this.tasks.delete(which);
     if (this.hand?.which === which) this.hand = undefined;
     if (!this.remake()) this.#take({ steps: this.inHand().filter((step) => step.call?.task !== which) });
@@ -402,14 +372,11 @@ export class Calls extends Fleet {
 
   /** All that is left is planned anew, behind the run or the work in hand; whether there is a way. */
   remake() {
-    const kept = this.cut(this.inHand());
-    const found = this.#arrange(kept, [...this.tasks.values()].filter((one) => !this.isDoneBy(one, kept)));
+    const kept = this.inHand();
+    const isLeft = (call) => !kept.some((one) => one.call === call && !one.takes);
+    const found = this.#arrange(kept, [...this.tasks.values()].filter(isLeft));
     if (found) this.#take(found);
     return Boolean(found);
-  }
-
-  isDoneBy(call, steps) {
-    return steps.some((one) => one.call === call && !one.takes);
   }
 
   onCarAt({ sender, car_origin, car_number, station, version, wheelbase_mm: wheelbase }) {
@@ -437,23 +404,27 @@ export class Calls extends Fleet {
   /** P1, J5. */
   publish() {
     const version = next(this.version);
-    if (!this.steps.length) this.stamp = [this.nowMs, this.node, 0];
-    const [award, initiator, call] = this.stamp;
-    const legs = legsOf(this.steps.length ? this.steps : [this.standing()], this.near(award));
-    const stamp = { stamp_award_ms: award, stamp_initiator: initiator, stamp_call: call };
-    const lines = legs.map((one, leg) => {
-      const [side, line] = [one.place & 0x80 ? "FAR" : "NEAR", { track: one.track, from_index: one.from, to_index: one.to }];
-      const end_ms = Math.max(0, Math.ceil((one.end - this.near(award)) / MS));
-      return ["ItineraryLeg", { version, action: one.action, leg, side, ...line, end_ms }];
+    if (!this.steps.length) this.stamp = [this.nowMs(), this.node, 0];
+    const [stamp_award_ms, stamp_initiator, stamp_call] = this.stamp;
+    const award = this.near(stamp_award_ms);
+    const legs = legsOf(this.steps.length ? this.steps : [this.standing()], award);
+    const head = { version, grade: "FIRM", legs: legs.length, stamp_award_ms, stamp_initiator, stamp_call };
+    const lines = legs.map(({ action, track, from: from_index, to: to_index, place, end }, leg) => {
+      const end_ms = Math.max(0, Math.ceil((end - award) / MS));
+      return { version, action, leg, side: place & 0x80 ? "FAR" : "NEAR", track, from_index, to_index, end_ms };
     });
-    this.plan = { version, legs, words: [["ItineraryHead", { version, grade: "FIRM", legs: legs.length, ...stamp }], ...lines] };
-    for (const [name, signals] of this.plan.words) this.say(name, signals);
+    this.plan = { version, legs, words: [["ItineraryHead", head], ...lines.map((one) => ["ItineraryLeg", one])] };
+    this.#sayPlan();
     this.compare();
+  }
+
+  #sayPlan() {
+    for (const [name, signals] of this.plan.words) this.say(name, signals);
   }
 
   /** R3: all that I vouch for. */
   stateAll() {
-    for (const [name, signals] of this.plan?.words ?? []) this.say(name, signals);
+    if (this.plan) this.#sayPlan();
     if (this.plan) this.sayPlace();
     for (const which of this.tasks.keys()) this.report(which, "AWARDED", this.#sink(which));
     const mine = [...this.cars].filter(([car, one]) => one.by === this.node && this.tokens.holds(carKey(car)));

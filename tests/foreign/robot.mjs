@@ -1,15 +1,15 @@
 // A robot written from docs/protocol.md, docs/site-file.md and the DBC files alone: what it does with drive and shuttle.
 // A line in is a time with a frame or a wake, the lines out are frames, what is to be kept, and the next wake.
-import { readSync, writeSync } from "node:fs";
+import { createInterface } from "node:readline";
 import { Calls } from "./calls.mjs";
 import { FAULTS } from "./faults.mjs";
-import { MS, S } from "./fleet.mjs";
-import { WORK, hopUs, meeting, windowsOf } from "./plan.mjs";
+import { MS, S, next } from "./fleet.mjs";
+import { WORK, hopUs } from "./plan.mjs";
 import { ABOARD, ANY, gateOf, isSpur } from "./site.mjs";
 import { carKey, isSegment, stationKey } from "./tokens.mjs";
 
 const ACTIONS = { true: ["REACH", "GRIP", "RETRACT"], false: ["REACH", "RELEASE", "RETRACT"] };
-const AFTER = { REACH: "REACHED", GRIP: "REACHED", RELEASE: "REACHED", RETRACT: "HOME" };
+const AFTER = { REACH: ["REACHED"], GRIP: ["REACHED"], RELEASE: ["REACHED"], RETRACT: ["HOME"], undefined: ["HOME", "REACHED"] };
 const MARK_MM = 5; // so near to a mark it is there
 
 export class Robot extends Calls {
@@ -19,15 +19,17 @@ export class Robot extends Calls {
     [this.home] = [...this.site.homes].find(([, node]) => node === this.node);
     this.track ??= this.home >> 8;
     this.soon = Math.ceil(((v * v) / (2 * a) + 3 * v) / this.site.pitch) + 1;
-    this.said = { index: 0, isMoving: false, us: 0 };
-    this.needed = [];
-    this.wanted = new Set();
+    Object.assign(this, { said: { index: 0, isMoving: false, us: 0 }, needed: [], wanted: new Set() });
     this.tell("StateRequest", {});
   }
 
   journal() {
     return { ...super.journal(), hand: this.hand, track: this.track };
   }
+
+  isStanding = () => this.drive.mode === "STANDING";
+  isAt = (mm) => Math.abs(mm - this.drive.position_mm) <= MARK_MM;
+  isRunning = () => !this.isStanding() || (this.orderUs && !this.isAt(this.driveOrder.target_mm));
 
   get state() {
     if (!this.plan) return "STARTING";
@@ -42,19 +44,9 @@ export class Robot extends Calls {
   }
 
   get place() {
-    if (!this.drive) return undefined;
-    const index = this.axisIndex;
-    const key = this.site.at(this.track, index);
-    if (isSpur(this.track) && index === 0) return { track: key >> 8, index: key & 0xff, key };
-    return { track: this.track, index, key };
-  }
-
-  get isStanding() {
-    return this.drive.mode === "STANDING";
-  }
-
-  get isRunning() {
-    return !this.isStanding || (this.orderUs && Math.abs(this.driveOrder.target_mm - this.drive.position_mm) > MARK_MM);
+    const key = this.drive && this.site.at(this.track, this.axisIndex);
+    const isMouth = isSpur(this.track) && !isSpur(key >> 8);
+    return key && (isMouth ? { track: key >> 8, index: key & 0xff, key } : { track: this.track, index: this.axisIndex, key });
   }
 
   onDevice(word) {
@@ -64,12 +56,11 @@ export class Robot extends Calls {
     }
     if (word.name !== "DriveState") return;
     this.driveOrder ??= { sequence: word.sequence, target_mm: word.position_mm, across: word.across };
-    const wasAcross = isSpur(this.track);
-    if (this.drive && word.across && !wasAcross) this.track = this.steps[0]?.track;
-    if (!word.across && wasAcross) this.track = this.site.spurOf(this.track).mouth >> 8;
-    if (wasAcross !== isSpur(this.track)) this.save();
-    this.drive = word;
-    this.driveUs = this.now;
+    const before = this.track;
+    if (this.drive && word.across && !isSpur(before)) this.track = this.steps[0]?.track;
+    if (!word.across && isSpur(before)) this.track = this.site.spurOf(before).mouth >> 8;
+    if (this.track !== before) this.save();
+    Object.assign(this, { drive: word, driveUs: this.now });
     if (this.offset !== undefined && this.plan) this.#tellPlace();
   }
 
@@ -95,11 +86,8 @@ export class Robot extends Calls {
     const { which, place, takes, isBegun } = this.hand ?? {};
     const call = this.tasks.get(which) ?? [...this.tasks.values()].at(-1);
     this.sayPlace();
-    this.stamp = call ? [call.deadline_ms, call.initiator, call.number & 0xff] : [this.nowMs, this.node, 0];
-    if (isBegun) {
-      const [track, index, end] = [place >> 8, place & 0x7f, this.now + this.site.handling(place)];
-      this.steps = [{ action: WORK, track, from: index, to: index, begin: this.now, end, place, takes, call }];
-    }
+    this.stamp = call ? this.stampOf(call) : [this.nowMs(), this.node, 0];
+    if (isBegun) this.steps = [{ ...this.standing(), ...workAt(place), end: this.now + this.site.handling(place), takes, call }];
     if (!this.isAgain || !this.remake()) this.publish();
   }
 
@@ -110,34 +98,22 @@ export class Robot extends Calls {
 
   /** What of the plan cannot be changed any more. */
   inHand() {
-    const [step] = this.steps;
-    if (!step) return [];
-    const isFixed = { TRAVEL: step === this.begun && this.isRunning, RIDE: true, WORK: this.hand?.isBegun };
-    let count = isFixed[step.action] || this.site.liftOf(this.place.key) ? 1 : 0;
     const isOnLift = ({ action, track, to }) => action === "RIDE" || this.site.liftOf(this.site.at(track, to));
-    while (count && count < this.steps.length && isOnLift(this.steps[count - 1])) count += 1;
-    return this.steps.slice(0, count);
+    const isBegun = { TRAVEL: this.steps[0] === this.begun && this.isRunning(), RIDE: true, WORK: this.hand?.isBegun };
+    const isFixed = (n) => (n ? isOnLift(this.steps[n - 1]) : isBegun[this.steps[0].action] || this.site.liftOf(this.place.key));
+    const count = this.steps.findIndex((_, n) => !isFixed(n));
+    return count < 0 ? this.steps : this.steps.slice(0, count);
   }
 
-  /** A run that may end sooner ends where its order of now does. */
-  cut(steps) {
-    const [step] = steps;
-    const to = Math.round(this.driveOrder.target_mm / this.site.pitch) + 1;
-    const isRun = step?.action === "TRAVEL" && step.from !== step.to && !this.site.liftOf(this.place.key);
-    if (!isRun || to === step.to) return steps;
-    const end = step.begin + this.site.run(Math.abs(to - step.from) * this.site.pitch);
-    this.begun = { ...step, to, end: Math.max(this.now, end) };
-    return [this.begun];
-  }
+  does = { TRAVEL: (step) => this.#travel(step), RIDE: (step) => this.#ride(step), WORK: (step) => this.#handle(step) };
 
   #work() {
-    const does = { TRAVEL: (step) => this.#travel(step), RIDE: (step) => this.#ride(step), WORK: (step) => this.#handle(step) };
     for (let [step] = this.steps; ; [step] = this.steps) {
       const isEarly = step && this.begun !== step && !this.isDue(step.begin - 10 * MS);
       if (isEarly && step.action === "TRAVEL") return this.#travel(step, false);
       if (!step || isEarly) return this.#stand();
       if (this.begun !== step) this.#beginStep(step);
-      const isOver = does[step.action](step);
+      const isOver = this.does[step.action](step);
       if (this.steps[0] === step && !isOver) return this.#isLate(step);
       if (isOver) this.#endStep(step);
     }
@@ -152,47 +128,33 @@ export class Robot extends Calls {
     if (takes) this.report(call.task, "STARTED", place);
   }
 
-  /** P9: what follows begins later, or sooner where nobody is in the way then. */
+  /** P9: what follows begins later, or sooner where it follows at once. */
   #endStep(step) {
     this.steps.shift();
     this.wanted.clear();
     const by = this.steps.length ? this.now - this.steps[0].begin : 0;
-    const isNext = by && this.steps[0].begin <= step.end + 10 * MS;
-    if (by > 500 * MS || (by < -500 * MS && isNext)) this.#shift(this.steps, by);
+    if (by > 500 * MS || (by < -500 * MS && this.steps[0].begin <= step.end + 10 * MS)) this.remake();
   }
 
   /** P9: it lasts longer, and what follows comes later. */
   #isLate(step) {
-    const by = this.late;
-    if (by > 2 * S) {
-      step.end += by;
-      this.#shift(this.steps.slice(1), by);
-    }
+    const by = this.late();
+    if (by > 2 * S) step.end += by;
+    if (by > 2 * S) this.remake();
     return this.isDue(this.now + Math.max(100 * MS, 2 * S - by));
   }
 
-  #shift(steps, by) {
-    const shifted = steps.map((one) => ({ ...one, begin: one.begin + by, end: one.end + by }));
-    const isFree = by > 0 || !this.robots.some(({ plan }) => plan && meeting(windowsOf(this.site, shifted), plan.windows));
-    if (!isFree) return;
-    for (const one of steps) Object.assign(one, { begin: one.begin + by, end: one.end + by });
-    this.publish();
-  }
-
   /** By how much a step that is in hand will be over later than planned, as far as can be seen. */
-  get late() {
+  late() {
     const [step] = this.steps;
     if (!step || step !== this.begun) return 0;
     const { action, from, to, place, end } = step;
-    const { acceleration_mm_s2: a } = this.site.carrier;
+    const left_mm = Math.abs((to - 1) * this.site.pitch - this.drive.position_mm);
+    const moving = (1e6 * Math.abs(this.drive.speed_mm_s)) / (2 * this.site.carrier.acceleration_mm_s2);
     let over = end;
     if (action === WORK && !this.hand?.isBegun) over = this.now + this.site.handling(place);
-    else if (action === "TRAVEL" && from === to && !this.isRunning) over = this.now + hopUs(this.site, step);
-    else if (action === "TRAVEL" && from !== to) {
-      const left_mm = Math.abs((to - 1) * this.site.pitch - this.drive.position_mm);
-      const moving = (1e6 * Math.abs(this.drive.speed_mm_s)) / (2 * a);
-      over = (this.isStanding ? this.now : this.driveUs) + this.site.run(left_mm) - moving;
-    }
+    else if (action === "TRAVEL" && from === to && !this.isRunning()) over = this.now + hopUs(this.site, step);
+    else if (from !== to && action === "TRAVEL") over = (moving ? this.driveUs : this.now) + this.site.run(left_mm) - moving;
     return Math.max(0, over - end, this.now - end);
   }
 
@@ -205,24 +167,28 @@ export class Robot extends Calls {
     return Array.from({ length: high - least + 1 }, (_, n) => this.site.at(this.track, least + n));
   }
 
-  #stand(needed = []) {
+  #stand() {
     this.orderUs = 0;
-    this.#giveBack([...this.body(), ...needed]);
+    this.#giveBack(this.body());
   }
 
-  /** L1, L4, L5: whether the sill of a lift may be crossed at a track. */
-  #mayCross(platform, track) {
-    const lift = this.site.liftOf(platform);
-    const { place = {} } = this.peers.get(lift.node);
-    const gate = gateOf(platform);
-    if (!this.tokens.holds(platform) || !this.tokens.holds(gate)) return false;
-    const { version } = this.tokens.get(gate);
-    const isSaid = place.mark === (version & 0x1fff);
+  /** L1, L4: the lift's word under the gate that I hold. */
+  #sillWord(platform) {
+    const { node } = this.site.liftOf(platform);
+    const { place } = this.peers.get(node);
+    const { version } = this.tokens.get(gateOf(platform));
+    if (!this.tokens.holds(platform) || !this.tokens.holds(gateOf(platform))) return undefined;
+    if (place?.mark === (version & 0x1fff)) return place;
     // A second after the gate came: until then its word may be on its way.
-    if (!isSaid && this.sillVersion !== version) this.marks.set("sill", this.now + S);
+    if (this.sillVersion !== version) this.marks.set("sill", this.now + S);
     this.sillVersion = version;
-    if (!isSaid && this.every("sill", S)) this.say("SyncRequest", { whom: lift.node, boot_before: 0 });
-    return isSaid && place.isStill && place.index === lift.floors.indexOf(track) + 1;
+    if (this.every("sill", S)) this.say("SyncRequest", { whom: node, boot_before: 0 });
+    return undefined;
+  }
+
+  #mayCross(platform, track) {
+    const word = this.#sillWord(platform);
+    return word?.isStill && word.index === this.site.liftOf(platform).floors.indexOf(track) + 1;
   }
 
   /** What lies ahead of a leg, from where it is: { key, mm, across }. */
@@ -240,12 +206,12 @@ export class Robot extends Calls {
     return Array.from({ length: Math.abs(to - index) + 1 }, (_, n) => at(index + n * way));
   }
 
-  /** K2, K14, K15: as far as an unbroken line of held segments leads. */
+  /** K2, K14, K15: as far as an unbroken line of held segments leads; the rights are asked for before it begins. */
   #travel(step, isBegun = true) {
     const { site, tokens } = this;
     const { mm: goal, across } = this.#line({ ...step, mouth: undefined }).at(-1);
-    const isDone = this.isStanding && this.drive.sequence === this.driveOrder.sequence && this.drive.across === across;
-    if (isBegun && isDone && Math.abs(this.drive.position_mm - goal) <= MARK_MM) {
+    const isDone = this.isStanding() && this.drive.sequence === this.driveOrder.sequence && this.drive.across === across;
+    if (isBegun && isDone && this.isAt(goal)) {
       this.#stand();
       return true;
     }
@@ -258,14 +224,13 @@ export class Robot extends Calls {
     const platform = ahead.find((key) => site.liftOf(key));
     for (const key of all ?? [...body, ...soon]) this.wanted.add(key);
     if (this.wanted.has(platform)) this.wanted.add(gateOf(platform));
-    let reach = 0;
-    while (reach + 1 < ahead.length && tokens.holds(ahead[reach + 1])) reach += 1;
+    const held = ahead.findIndex((key, n) => n && !tokens.holds(key));
+    let reach = (held < 0 ? ahead.length : held) - 1;
     if (platform !== undefined && !this.#mayCross(platform, this.track)) {
       reach = platform === ahead[0] ? 0 : Math.min(reach, ahead.length - 2);
     }
-    const isReady = isBegun && this.shuttle.mode === "HOME" && !this.all;
-    const mayMove = isReady && body.every((key) => tokens.holds(key));
-    if (mayMove && line[reach].mm !== undefined && (reach || this.isRunning)) this.#driveTo(line[reach]);
+    const isReady = isBegun && this.shuttle.mode === "HOME" && !this.all && body.every((key) => tokens.holds(key));
+    if (isReady && line[reach].mm !== undefined && (reach || this.isRunning())) this.#driveTo(line[reach]);
     else this.orderUs = 0;
     const needed = [...body, ...ahead, ...(all ?? [])];
     this.#giveBack([...needed, ...needed.filter((key) => site.liftOf(key)).map(gateOf)], reach > 0);
@@ -274,14 +239,14 @@ export class Robot extends Calls {
 
   #driveTo({ mm: target_mm, across }) {
     const isNew = target_mm !== this.driveOrder.target_mm || across !== this.driveOrder.across;
-    if (isNew) this.driveOrder = { sequence: (this.driveOrder.sequence % 255) + 1, target_mm, across };
+    if (isNew) this.driveOrder = { sequence: next(this.driveOrder.sequence), target_mm, across };
     if (!isNew && this.orderUs && !this.isDue(this.orderUs)) return;
     this.orderUs = this.now + this.site.us.drive_refresh;
     this.isDue(this.orderUs);
     this.tell("DriveOrder", { ...this.driveOrder, speed_limit_mm_s: this.site.carrier.speed_mm_s });
   }
 
-  /** K14: what is not needed goes to whose turn it is, else to its steward, in lines of one version. */
+  /** K14: what is not needed goes to whose turn it is, else to its steward, together. */
   #giveBack(needed, isSoon = false) {
     const { site, tokens } = this;
     this.needed = needed;
@@ -292,13 +257,8 @@ export class Robot extends Calls {
     if (!left.length || (isSoon && !isUrgent && left.length < 8 && !this.isDue(this.leftUs + 8 * S))) return;
     this.sayPlace();
     this.leftUs = undefined;
-    const lines = new Map();
-    for (const key of left) {
-      const to = tokens.nextOf(key) || site.stewards.get(key >> 8);
-      const line = `${to} ${gateOf(key) === key ? key : key >> 8}`;
-      lines.set(line, [...(lines.get(line) ?? []), key]);
-    }
-    for (const [line, keys] of lines) tokens.give(keys, parseInt(line, 10));
+    const to = new Map(left.map((key) => [key, tokens.nextOf(key) || site.stewards.get(key >> 8)]));
+    for (const one of new Set(to.values())) tokens.give(left.filter((key) => to.get(key) === one), one);
   }
 
   /** K13: whether an order of passing has come about; all or none where none has for long. */
@@ -322,23 +282,18 @@ export class Robot extends Calls {
     }
   }
 
-  /** L3: it rides while the gate is away, and is there when that comes back with the lift's word. */
+  /** L3, L5: it rides while the gate is away, and is there when that comes back with the lift's word. */
   #ride(step) {
     const platform = step.track << 8;
-    const lift = this.site.liftOf(platform);
-    const there = lift.floors[step.to - 1];
-    if (this.ridden !== step) this.#stand();
+    const there = this.site.liftOf(platform).floors[step.to - 1];
+    if (this.ridden !== step || this.#sillWord(platform)) this.#stand();
     this.ridden = step;
     this.wanted.add(gateOf(platform));
-    if (this.#mayCross(platform, there)) {
-      this.track = there;
-      this.save();
-      this.sayPlace();
-      return true;
-    }
-    const isElsewhere = this.peers.get(lift.node).place?.mark === (this.tokens.get(gateOf(platform)).version & 0x1fff);
-    if (this.tokens.holds(gateOf(platform)) && isElsewhere) this.#stand();
-    return false;
+    if (!this.#mayCross(platform, there)) return false;
+    this.track = there;
+    this.save();
+    this.sayPlace();
+    return true;
   }
 
   // --- the shuttle
@@ -349,22 +304,19 @@ export class Robot extends Calls {
     const { hand, shuttle } = this;
     const keys = [stationKey(place), carKey(call.car)];
     const mark = this.#line({ ...step, from: 0 }).at(-1);
-    if (!hand.isBegun && Math.abs(mark.mm - this.drive.position_mm) > MARK_MM) return this.#driveTo(mark);
+    if (!hand.isBegun && !this.isAt(mark.mm)) return this.#driveTo(mark);
     this.#stand();
     for (const key of keys) this.wanted.add(key);
     const isFull = [...this.cars].some(([car, one]) => one.station === place && car !== call.car);
     if (!takes && isFull && !hand.isBegun) return this.#leaveElsewhere(step);
     const { action, sequence } = this.shuttleOrder;
-    const isDone = action ? shuttle.sequence === sequence && shuttle.mode === AFTER[action] : ["HOME", "REACHED"].includes(shuttle.mode);
+    const isDone = AFTER[action].includes(shuttle.mode) && (!action || shuttle.sequence === sequence);
     if (!isDone || !keys.every((key) => this.tokens.holds(key))) return false;
     if (action) hand.actions = hand.actions.slice(1);
-    if (!hand.actions.length) {
-      this.shuttleOrder = { sequence };
-      this.#handled(step, keys);
-      return true;
-    }
+    this.shuttleOrder = { sequence };
+    if (!hand.actions.length) return this.#handled(step, keys);
     const side = place & 0x80 ? "FAR" : "NEAR";
-    this.shuttleOrder = { sequence: (sequence % 255) + 1, action: hand.actions[0], side, wheelbase_mm: this.#wheelbase(call) };
+    this.shuttleOrder = { sequence: next(sequence), action: hand.actions[0], side, wheelbase_mm: this.#wheelbase(call) };
     hand.isBegun = true;
     if (takes) call.phase = "BEGUN";
     this.save();
@@ -378,37 +330,30 @@ export class Robot extends Calls {
     const isFetched = this.robots.some(({ plan }) => plan?.steps.slice(plan.leg).some(isFetch));
     this.fullUs ??= this.now;
     const waitUs = !this.site.bays.has(place) ? 0 : isFetched ? 10 * S : 60 * S;
-    if (!this.isDue(this.fullUs + waitUs) || !this.every("leave elsewhere", S)) return false;
+    if (!this.isDue(this.fullUs + waitUs) || !this.every("leave elsewhere", S)) return;
     call.to = ANY;
     if (this.remake()) [this.hand, this.fullUs] = [undefined, undefined];
-    return false;
   }
 
-  #wheelbase(call) {
-    return this.cars.get(call.car)?.wheelbase ?? call.wheelbase;
-  }
+  #wheelbase = (call) => this.cars.get(call.car)?.wheelbase ?? call.wheelbase;
 
   #handled({ call, place, takes }, [station, car]) {
     const keeper = this.site.keeper(place);
     const version = this.tokens.get(car).version & 0xffff;
-    const one = { station: takes ? ABOARD : place, by: this.node, version, wheelbase: this.#wheelbase(call) };
-    this.cars.set(call.car, one);
+    this.cars.set(call.car, { station: takes ? ABOARD : place, by: this.node, version, wheelbase: this.#wheelbase(call) });
     this.hand = undefined;
     call.phase = "LOADED";
-    if (!takes) {
-      this.tasks.delete(call.task);
-      this.done.set(call.task, place);
-    }
-    this.save();
-    const said = this.sayCar(call.car, one);
+    if (!takes && this.tasks.delete(call.task)) this.done.set(call.task, place);
+    const said = this.sayCar(call.car, this.cars.get(call.car));
     if (!takes) this.tokens.give([car], keeper, said);
     this.tokens.give([station], keeper);
     this.report(call.task, takes ? "LOADED" : "DONE", place);
+    return true;
   }
 
   // --- where it is
 
-  get leg() {
+  #leg() {
     const { legs } = this.plan;
     const n = legs.indexOf(this.steps[0] ?? legs.at(-1));
     return n > 0 && this.begun !== this.steps[0] && legs[n - 1].action === "STAND" ? n - 1 : Math.max(0, n);
@@ -419,37 +364,27 @@ export class Robot extends Calls {
     const isMouth = isSpur(this.track) && !isSpur(track);
     const offset_mm = isMouth ? 0 : this.drive.position_mm - (index - 1) * this.site.pitch;
     const where = { track, index, offset_mm, speed_mm_s: this.drive.speed_mm_s };
-    this.say("Progress", { itinerary_version: this.version, leg: this.plan ? this.leg : 0, ...where });
-    this.said = { index, isMoving: !this.isStanding, us: this.now };
+    this.say("Progress", { itinerary_version: this.version, leg: this.plan ? this.#leg() : 0, ...where });
+    this.said = { index, isMoving: !this.isStanding(), us: this.now };
   }
 
   /** P10. */
   #tellPlace() {
     const { index, isMoving, us } = this.said;
-    const isStop = this.isStanding && isMoving;
-    if (isStop || (this.place.index !== index && (!isMoving || this.now - us >= 8 * S))) this.sayPlace();
+    const isPast = this.place.index !== index && (!isMoving || this.now - us >= 8 * S);
+    if (isPast || (this.isStanding() && isMoving)) this.sayPlace();
   }
 
   /** P11. */
-  waits(key, blocker, reason) {
-    this.say("Waiting", { track: key >> 8, index: key & 0xff, blocker, reason });
-  }
+  waits = (key, blocker, reason) => this.say("Waiting", { track: key >> 8, index: key & 0xff, blocker, reason });
 }
+
+const workAt = (place) => ({ action: WORK, track: place >> 8, from: place & 0x7f, to: place & 0x7f, place });
 
 // --- lines in and out
 
-function* lines() {
-  const chunk = Buffer.alloc(65_536);
-  let rest = "";
-  for (let count = readSync(0, chunk); count; count = readSync(0, chunk)) {
-    const parts = (rest + chunk.toString("utf8", 0, count)).split("\n");
-    rest = parts.pop();
-    yield* parts;
-  }
-}
-
 let robot;
-for (const line of lines()) {
+for await (const line of createInterface({ input: process.stdin })) {
   const [local, kind, number, data] = line.split(" ", 4);
   if (kind === "start") {
     const [setup, journal] = JSON.parse(line.slice(line.indexOf("[")));
@@ -462,5 +397,5 @@ for (const line of lines()) {
   if (robot.isDirty) out.unshift(`keep ${JSON.stringify(robot.journal())}`);
   robot.isDirty = false;
   const due = robot.offset === undefined ? Infinity : robot.next - robot.offset;
-  writeSync(1, `${[...out, `wake ${due === Infinity ? -1 : due}`].join("\n")}\n`);
+  process.stdout.write(`${[...out, `wake ${due === Infinity ? -1 : due}`].join("\n")}\n`);
 }
