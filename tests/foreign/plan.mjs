@@ -5,34 +5,40 @@ export const ROUND = 10_000; // T_round
 export const WORK = "WORK";
 const MOST_DELAYS = 200;
 const overlap = (a, b, other) => a < other.b - ROUND && other.a < b - ROUND;
+/** Where a thing at a station's or segment's number is. */
+export const spotOf = (key) => ({ track: key >> 8, index: key & 0x7f });
 /** Where and when a robot is behind these steps: { track, index, us }. */
-export const endOf = (steps) => steps.at(-1) && { track: steps.at(-1).track, index: steps.at(-1).to, us: steps.at(-1).end };
+export const endOf = (steps) => steps.slice(-1).map(({ track, to, end }) => ({ track, index: to, us: end }))[0];
+export const workAt = (place, more) => {
+  return { action: WORK, track: place >> 8, from: place & 0x7f, to: place & 0x7f, place, ...more };
+};
 
-/** P4: [{ key, a, b, leg, from, to }] of legs with begin and end; the last place is kept without end. */
+/** P4: [key, from when, until when] of what a leg needs. */
+function passed(site, { action, track, from, to, begin, end, mouth }) {
+  if (action === "RIDE") return [[track << 8, begin, end]];
+  const here = [[site.at(track, to), begin, end]];
+  if (action !== "TRAVEL" || from === to) return mouth === undefined ? here : [[mouth, begin, end], ...here];
+  const [count, way] = [Math.abs(to - from), Math.sign(to - from)];
+  const [mm, half] = [count * site.pitch, (site.pitch + site.carrier.length_mm) / 2 + site.carrier.clearance_mm];
+  return Array.from({ length: count + 1 }, (_, k) => {
+    const enter = begin + reachUs(k * site.pitch - half, mm, site.carrier);
+    const leave = end - site.run(mm) + reachUs(Math.min(mm, k * site.pitch + half), mm, site.carrier);
+    return [site.at(track, from + k * way), enter, k === count ? end : Math.max(enter, leave)];
+  });
+}
+
+/** [{ key, a, b, leg, from, to }] of legs with begin and end; the last place is kept without end. */
 export function windowsOf(site, legs, isOpen = true) {
   const last = new Map();
   const found = [];
-  const add = (key, a, b, leg, { from, to } = {}) => {
-    const before = last.get(key);
-    if (before?.b >= a - ROUND) {
-      Object.assign(before, { b: Math.max(before.b, b), leg, from: before.from ?? from, to: to ?? before.to });
-    } else {
-      last.set(key, { key, a, b, leg, from, to });
-      found.push(last.get(key));
-    }
-  };
-  const half = (site.pitch + site.carrier.length_mm) / 2 + site.carrier.clearance_mm;
   legs.forEach((one, leg) => {
-    const { action, track, from, to, begin, end, mouth } = one;
-    const [step, count] = [Math.sign(to - from), action === "TRAVEL" ? Math.abs(to - from) : 0];
-    if (action === "RIDE") add(track << 8, begin, end, leg, one);
-    if (mouth !== undefined) add(mouth, begin, end, leg);
-    if (action !== "RIDE" && !count) add(site.at(track, to), begin, end, leg);
-    const mm = count * site.pitch;
-    for (let k = 0; count && k <= count; k++) {
-      const enter = begin + reachUs(k * site.pitch - half, mm, site.carrier);
-      const leave = end - site.run(mm) + reachUs(Math.min(mm, k * site.pitch + half), mm, site.carrier);
-      add(site.at(track, from + k * step), enter, k === count ? end : Math.max(enter, leave), leg);
+    const stops = one.action === "RIDE" ? { from: one.from, to: one.to } : {};
+    for (const [key, a, b] of passed(site, one)) {
+      const before = last.get(key);
+      const isOn = before?.b >= a - ROUND;
+      if (!isOn) found.push({ key, a, b, leg, ...stops });
+      else Object.assign(before, { b: Math.max(before.b, b), leg, ...stops, from: before.from ?? stops.from });
+      if (!isOn) last.set(key, found.at(-1));
     }
   });
   if (isOpen) last.get(site.at(legs.at(-1).track, legs.at(-1).to)).b = Infinity;
@@ -55,32 +61,26 @@ export class Planner {
   /** The soonest way to do a task from `start`: { steps, over } with the rest behind it, or undefined. */
   task(call, start, free) {
     const { source, to } = call;
-    const taken = call.isAboard
-      ? [[]]
-      : ways(this.site, start, frontOf(source)).map((way) => [...way, this.#work(call, source, true)]);
-    const left = (to === ANY ? free : [to]).flatMap((sink) => taken.flatMap((way) => {
-      const here = way.length ? { track: source >> 8, index: source & 0x7f } : start;
-      return ways(this.site, here, frontOf(sink)).map((on) => [...way, ...on, this.#work(call, sink, false)]);
-    }));
-    return this.#soonest(start, left, Math.max(start.us, call.deadline + 150_000), call.ready);
+    const on = (way, from, place, takes) => {
+      return ways(this.site, from, frontOf(place)).map((more) => [...way, ...more, workAt(place, { takes, call })]);
+    };
+    const taken = call.isAboard ? [[]] : on([], start, source, true);
+    const sinks = to === ANY ? free : [to];
+    const all = sinks.flatMap((sink) => taken.flatMap((way) => on(way, way.length ? spotOf(source) : start, sink, false)));
+    return this.#soonest(start, all, Math.max(start.us, call.deadline + 150_000), call.ready);
   }
 
-  /** The way to a refuge from standing somewhere. */
+  /** The way to a refuge from standing somewhere: steps, none where it is in one. */
   rest(start) {
     const key = this.site.at(start.track, start.index);
-    if (this.refuges.includes(key) && this.#begin([{ key, a: 0, b: Infinity }], start, start.us) !== undefined) return [];
+    const mayStay = this.refuges.includes(key) && this.#begin([{ key, a: 0, b: Infinity }], start, start.us) !== undefined;
     const all = this.refuges.flatMap((one) => ways(this.site, start, one)).filter((way) => way.length);
-    return this.#soonest(start, all, start.us)?.steps;
-  }
-
-  #work(call, place, takes) {
-    const index = place & 0x7f;
-    return { action: WORK, track: place >> 8, from: index, to: index, place, takes, call };
+    return mayStay ? [] : this.#soonest(start, all, start.us)?.steps;
   }
 
   #soonest(start, all, least, ready = 0) {
     let best;
-    for (const [steps, over] of all.map((way) => this.#timed(way)).sort((a, b) => a[1] - b[1])) {
+    for (const [steps, over] of all.map((way) => timed(this.site, way)).sort((a, b) => a[1] - b[1])) {
       if (best && least + over >= best.over) break;
       const isWork = steps.at(-1).action === WORK;
       const atBay = steps.find((one) => this.site.bays.has(one.place));
@@ -94,19 +94,9 @@ export class Planner {
     return best;
   }
 
-  #timed(way) {
-    let us = 0;
-    const steps = way.map((hop) => {
-      const begin = us;
-      us += hop.action === WORK ? this.site.handling(hop.place) : hopUs(this.site, hop);
-      return { ...hop, begin, end: us };
-    });
-    return [steps, us];
-  }
-
   /** The least time to begin, no sooner than `us`; where it stands until then it stands from the start. */
   #begin(windows, start, us) {
-    const here = windows[0].key === this.site.at(start.track, start.index) ? windows[0] : undefined;
+    const here = windows.find(({ key }, n) => n === 0 && key === this.site.at(start.track, start.index));
     const later = (one) => {
       const inWay = this.#needs(one).find((other) => overlap(one === here ? start.us : us + one.a, us + one.b, other));
       return inWay && (one === here ? Infinity : inWay.b - one.a);
@@ -121,32 +111,40 @@ export class Planner {
 
   /** P6: a lift is free in the gaps between rides, less its own run to where this one begins and theirs. */
   #needs({ key, from: first, to: last }) {
-    const run = (from, to) => (from === undefined || to === undefined ? 0 : this.site.ride(from, to));
-    return (this.busy.get(key) ?? []).map(({ a, b, from, to }) => ({ a: a - run(last, from), b: b + run(to, first) }));
+    const run = (from, to) => from && to && this.site.ride(from, to);
+    const padded = ({ a, b, from, to }) => ({ a: a - (run(last, from) || 0), b: b + (run(to, first) || 0) });
+    return (this.busy.get(key) ?? []).map(padded);
   }
 }
 
 /** B3: the least end of a task, of a robot before the car when the call ends, all ways free. */
 export function floorOf(site, call) {
-  const before = { track: call.source >> 8, index: call.source & 0x7f, us: call.deadline };
-  return new Planner(site, new Map()).task(call, before, site.places).over;
+  return new Planner(site, new Map()).task(call, { ...spotOf(call.source), us: call.deadline }, site.places).over;
 }
 
-export function hopUs(site, { action, from, to }) {
+export function hopUs(site, { action, from, to, place }) {
+  if (action === WORK) return site.handling(place);
   if (action === "RIDE") return site.ride(from, to);
   return from === to ? site.run(site.pitch) + site.carrier.turn_ms * 1_000 : site.run(Math.abs(to - from) * site.pitch);
+}
+
+/** Steps without a pause, from 0 on, and how long they last. */
+function timed(site, way) {
+  let us = 0;
+  const steps = way.map((hop) => ({ ...hop, begin: us, end: (us += hopUs(site, hop)) }));
+  return [steps, us];
 }
 
 /** All ways from where something is to a segment, as hops. */
 function ways(site, { track, index }, key) {
   const [goal, end] = [key >> 8, key & 0xff];
   const travel = (on, from, to) => (from === to ? [] : [{ action: "TRAVEL", track: on, from, to }]);
-  const link = (into, beyond) => ({ action: "TRAVEL", track: into >> 8, from: into & 0xff, to: into & 0xff, mouth: beyond });
+  const link = (into, mouth) => ({ action: "TRAVEL", track: into >> 8, from: into & 0xff, to: into & 0xff, mouth });
   if (track === goal) return [travel(track, index, end)];
   if (isSpur(track)) {
     const { mouth } = site.spurOf(track);
     const out = [...travel(track, index, 1), link(mouth, (track << 8) | 1)];
-    return ways(site, { track: mouth >> 8, index: mouth & 0xff }, key).map((on) => [...out, ...on]);
+    return ways(site, spotOf(mouth), key).map((on) => [...out, ...on]);
   }
   if (isSpur(goal)) {
     const { mouth } = site.spurOf(goal);
@@ -162,15 +160,10 @@ function ways(site, { track, index }, key) {
 
 /** P1, P2: steps as told: what waits between them, and where the first begins. */
 export function legsOf(steps, awardUs) {
-  const legs = [];
-  let us = awardUs;
-  for (const one of steps) {
-    if (one.begin > us + ROUND && (legs.length || one.action === "TRAVEL")) {
-      const [track, index] = one.mouth === undefined ? [one.track, one.from] : [one.mouth >> 8, one.mouth & 0xff];
-      legs.push({ action: "STAND", track, from: index, to: index, begin: us, end: one.begin });
-    }
-    legs.push(one);
-    us = one.end;
-  }
-  return legs;
+  return steps.flatMap((one, n) => {
+    const begin = n ? steps[n - 1].end : awardUs;
+    const { track, index } = one.mouth === undefined ? { track: one.track, index: one.from } : spotOf(one.mouth);
+    const stand = { action: "STAND", track, from: index, to: index, begin, end: one.begin };
+    return one.begin > begin + ROUND && (n || one.action === "TRAVEL") ? [stand, one] : [one];
+  });
 }

@@ -4,7 +4,7 @@ import { createInterface } from "node:readline";
 import { Calls } from "./calls.mjs";
 import { FAULTS } from "./faults.mjs";
 import { MS, S, next } from "./fleet.mjs";
-import { WORK, hopUs } from "./plan.mjs";
+import { WORK, hopUs, workAt } from "./plan.mjs";
 import { ABOARD, ANY, gateOf, isSpur } from "./site.mjs";
 import { carKey, isSegment, stationKey } from "./tokens.mjs";
 
@@ -87,7 +87,7 @@ export class Robot extends Calls {
     const call = this.tasks.get(which) ?? [...this.tasks.values()].at(-1);
     this.sayPlace();
     this.stamp = call ? this.stampOf(call) : [this.nowMs(), this.node, 0];
-    if (isBegun) this.steps = [{ ...this.standing(), ...workAt(place), end: this.now + this.site.handling(place), takes, call }];
+    if (isBegun) this.steps = [workAt(place, { begin: this.now, end: this.now + this.site.handling(place), takes, call })];
     if (!this.isAgain || !this.remake()) this.publish();
   }
 
@@ -250,7 +250,7 @@ export class Robot extends Calls {
   #giveBack(needed, isSoon = false) {
     const { site, tokens } = this;
     this.needed = needed;
-    const held = new Set([this.home, ...tokens.mine.map(({ key }) => key)].filter((key) => tokens.holds(key)));
+    const held = new Set([this.home, ...tokens.mine().map(({ key }) => key)].filter((key) => tokens.holds(key)));
     const left = [...held].filter((key) => isSegment(key) && !needed.includes(key)).sort((a, b) => a - b);
     this.leftUs = left.length ? (this.leftUs ?? this.now) : undefined;
     const isUrgent = left.some((key) => site.fronts.has(key) || site.liftOf(key) || tokens.nextOf(key));
@@ -378,8 +378,6 @@ export class Robot extends Calls {
   /** P11. */
   waits = (key, blocker, reason) => this.say("Waiting", { track: key >> 8, index: key & 0xff, blocker, reason });
 }
-
-const workAt = (place) => ({ action: WORK, track: place >> 8, from: place & 0x7f, to: place & 0x7f, place });
 
 // --- lines in and out
 

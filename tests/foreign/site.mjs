@@ -6,11 +6,10 @@ const DEFAULTS = {
   shuttle: { speed_mm_s: 750, acceleration_mm_s2: 500, reach_mm: 5_400 },
   lift: { speed_mm_s: 1_083, acceleration_mm_s2: 500, floor_height_mm: 2_500 },
   cars: { min_wheelbase_mm: 1_800, max_wheelbase_mm: 3_400 },
-};
-const TIMING = {
-  call_window_ms: 1_000, bid_delay_ms: 300, bid_half_ms: 10_000, deadline_guard_ms: 20, award_repeat_ms: 100,
-  token_repeat_ms: 200, heartbeat_ms: 2_000, bus_time_ms: 5_000, door_ms: 3_000, grip_ms: 2_000,
-  drive_refresh_ms: 200,
+  timing: {
+    call_window_ms: 1_000, bid_delay_ms: 300, bid_half_ms: 10_000, deadline_guard_ms: 20, token_repeat_ms: 200,
+    heartbeat_ms: 2_000, bus_time_ms: 5_000, door_ms: 3_000, grip_ms: 2_000, drive_refresh_ms: 200,
+  },
 };
 export const frontOf = (place) => place & 0xff7f;
 export const isSpur = (track) => track >= FIRST_SPUR;
@@ -23,16 +22,14 @@ export class Site {
   constructor(text, digest) {
     const { site, floors, compartments, robots, lifts = [], spurs = [], stewards = {} } = text;
     for (const [name, values] of Object.entries(DEFAULTS)) this[name] = { ...values, ...text[name] };
-    const times = Object.entries({ ...TIMING, ...text.timing });
-    this.us = Object.fromEntries(times.map(([key, value]) => [key.replace("_ms", ""), value * 1_000]));
-    this.digest = digest;
-    this.bitrate = site.bitrate ?? 500_000;
-    this.pitch = floors.pitch_mm ?? 2_400;
+    this.us = Object.fromEntries(Object.entries(this.timing).map(([key, ms]) => [key.replace("_ms", ""), ms * 1_000]));
+    Object.assign(this, { digest, bitrate: site.bitrate ?? 500_000, pitch: floors.pitch_mm ?? 2_400 });
     const numbers = Array.from({ length: floors.count }, (_, n) => n + 1);
-    this.length = new Map(numbers.map((floor) => [floor, floors.positions]));
     this.lifts = lifts.map((one, n) => ({ floors: numbers, ...one, track: FIRST_LIFT + n }));
-    this.spurs = spurs.map((one, n) => ({ ...one, track: FIRST_SPUR + n, mouth: segment(one.at) }));
-    const kinds = { Robot: robots, Lift: lifts, Compartment: compartments };
+    this.spurs = spurs.map((one, n) => ({ length: 1, ...one, track: FIRST_SPUR + n, mouth: segment(one.at) }));
+    const alleys = numbers.map((floor) => [floor, floors.positions]);
+    this.length = new Map([...alleys, ...this.spurs.map((one) => [one.track, one.length])]);
+    const kinds = { Robot: robots, Lift: this.lifts, Compartment: compartments };
     const machines = Object.entries(kinds).flatMap(([kind, all]) => all.map((one) => ({ ...one, kind })));
     machines.sort((a, b) => a.node - b.node);
     this.kinds = new Map(machines.map((one) => [one.node, one.kind]));
@@ -40,74 +37,48 @@ export class Site {
     this.homes = new Map(robots.map((one) => [segment(one.home), one.node]));
     this.bays = new Map(compartments.map((one) => [station(one, "near"), one.node]));
     this.fronts = new Set([...this.bays.keys()].map(frontOf));
-    // A track's steward is the fixed machine nearest to it: here always one that reaches it, or the lowest.
-    const isAt = (one, floor) => (one.kind === "Lift" ? one.floors ?? numbers : [segment(one.at ?? "0,0") >> 8]).includes(floor);
+    // A track's steward is the fixed machine nearest to it: here the lowest that reaches it, or the lowest at all.
     const fixed = machines.filter((one) => one.kind !== "Robot");
+    const isAt = (one, floor) => (one.floors ?? [segment(one.at) >> 8]).includes(floor);
     const steward = (floor) => (fixed.find((one) => isAt(one, floor)) ?? fixed[0]).node;
-    this.stewards = new Map(numbers.map((floor) => [floor, steward(floor)]));
-    for (const one of this.lifts) this.stewards.set(one.track, one.node);
-    for (const one of this.spurs) {
-      this.stewards.set(one.track, steward(one.mouth >> 8));
-      this.length.set(one.track, one.length ?? 1);
-    }
-    for (const [track, name] of Object.entries(stewards)) {
-      this.stewards.set(Number(track), machines.find((one) => one.name === name).node);
-    }
-    const taken = new Set([...this.bays.keys(), ...spurs.map((one) => station(one, "far"))]);
-    this.segments = [...this.length].flatMap(([track, length]) => {
-      return Array.from({ length }, (_, n) => (track << 8) | (n + 1));
-    });
+    const named = Object.entries(stewards).map(([track, name]) => [+track, fixed.find((one) => one.name === name).node]);
+    const ways = [...this.lifts.map((one) => [one.track, one.node]), ...this.spurs.map((one) => [one.track, steward(one.mouth >> 8)])];
+    this.stewards = new Map([...numbers.map((floor) => [floor, steward(floor)]), ...ways, ...named]);
+    const row = ([track, length]) => Array.from({ length }, (_, n) => (track << 8) | (n + 1));
     const sides = (key) => (floors.sides ?? ["near", "far"]).map((side) => key | ((side === "far") << 7));
-    this.places = this.segments.filter((key) => !isSpur(key >> 8)).flatMap(sides).filter((one) => !taken.has(one));
+    const taken = new Set([...this.bays.keys(), ...spurs.map((one) => station(one, "far"))]);
+    this.segments = [...this.length].flatMap(row);
+    this.places = alleys.flatMap(row).flatMap(sides).filter((one) => !taken.has(one));
   }
+
+  /** Where a lift's platform is on an alley. */
+  sill = (lift, floor) => (lift.end === "left" ? 0 : this.length.get(floor) + 1);
+  liftOf = (key) => this.lifts[(key >> 8) - FIRST_LIFT];
+  spurOf = (track) => this.spurs[track - FIRST_SPUR];
+  /** C1: who keeps a station, and so the car in it. */
+  keeper = (place) => this.bays.get(place) ?? this.stewards.get(place >> 8);
 
   /** The segment at an index of a track: beyond an end of an alley the platform there, of a spur its mouth. */
   at(track, index) {
-    if (isSpur(track) && index === 0) return this.spurs[track - FIRST_SPUR].mouth;
+    if (isSpur(track) && index === 0) return this.spurOf(track).mouth;
     const lift = this.lifts.find((one) => one.floors.includes(track) && this.sill(one, track) === index);
     return lift ? lift.track << 8 : (track << 8) | index;
   }
 
-  /** Where a lift's platform is on an alley. */
-  sill(lift, floor) {
-    return lift.end === "left" ? 0 : this.length.get(floor) + 1;
-  }
-
-  liftOf(key) {
-    return this.lifts[(key >> 8) - FIRST_LIFT];
-  }
-
-  spurOf(track) {
-    return this.spurs[track - FIRST_SPUR];
-  }
-
-  /** C1: who keeps a station, and so the car in it. */
-  keeper(place) {
-    return this.bays.get(place) ?? this.stewards.get(place >> 8);
-  }
-
   /** P5: where a robot may rest while the plans of others end in `ends` (keys of segments). */
   refuges(ends) {
-    const closed = new Set(ends.map((one) => one >> 8));
-    if (this.nodes.length > 1 + this.bays.size) for (const one of this.fronts) closed.add(one >> 8);
-    const besides = (one) => one.floors.flatMap((floor) => [-1, 1].map((n) => (floor << 8) | (this.sill(one, floor) + n)));
+    const isShared = this.nodes.length > 1 + this.bays.size; // other robots, or lifts
+    const closed = new Set([...ends, ...(isShared ? this.fronts : [])].map((one) => one >> 8));
+    const besides = (one) => one.floors.flatMap((floor) => [-1, 1].map((n) => this.at(floor, this.sill(one, floor) + n)));
     const busy = new Set([...this.fronts, ...this.spurs.map((one) => one.mouth), ...this.lifts.flatMap(besides)]);
     return this.segments.filter((key) => !closed.has(key >> 8) && !busy.has(key));
   }
 
-  /** P4: a run of the carrier, and a ride; its 0.4 s are for gate and sill. */
-  run(mm) {
-    return runUs(mm, this.carrier);
-  }
-
-  ride(from, to) {
-    return from === to ? 0 : runUs(Math.abs(to - from) * this.lift.floor_height_mm, this.lift) + 400_000;
-  }
-
-  /** B3. */
-  handling(place) {
-    return 2 * runUs(this.shuttle.reach_mm, this.shuttle) + this.us.grip + 400_000 + (this.bays.has(place) && this.us.door);
-  }
+  /** P4: a run of the carrier, and a ride; its 0.4 s are for gate and sill. B3: work at a place. */
+  run = (mm) => runUs(mm, this.carrier);
+  ride = (from, to) => from !== to && runUs(Math.abs(to - from) * this.lift.floor_height_mm, this.lift) + 400_000;
+  handling = (place) =>
+    2 * runUs(this.shuttle.reach_mm, this.shuttle) + this.us.grip + 400_000 + (this.bays.has(place) && this.us.door);
 
   /** B4: how long a bid waits whose cost is so much above the floor. */
   delay(aboveUs, node) {
