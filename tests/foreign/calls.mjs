@@ -69,7 +69,8 @@ export class Calls extends Fleet {
       steps.push({ action, track, from, to, begin: before.end, end: award + end_ms * MS, mouth, place });
     }
     const stamp = [head.stamp_award_ms, head.stamp_initiator, head.stamp_call];
-    peer.plan = !steps.length ? undefined : { version: head.version, stamp, steps, leg: 0, windows: windowsOf(this.site, steps) };
+    const windows = steps.length && windowsOf(this.site, steps);
+    peer.plan = windows ? { version: head.version, stamp, steps, windows, leg: 0 } : undefined;
     this.compare();
   }
 
@@ -88,8 +89,8 @@ export class Calls extends Fleet {
     peer.place = { track, index, key, isStill, mark: (leg << 8) | itinerary_version };
     if (peer.plan?.version !== itinerary_version) return;
     peer.plan.leg = Math.max(leg, peer.plan.leg);
-    const now = peer.plan.steps[peer.plan.leg];
-    const isLeft = (one) => now?.track === track && one >> 8 === track && (one - key) * Math.sign(now.to - now.from) < 0;
+    const now = peer.plan.steps[peer.plan.leg] ?? {};
+    const isLeft = (one) => now.track === track && one >> 8 === track && (one - key) * (now.to - now.from) < 0;
     peer.plan.windows = peer.plan.windows.filter((one) => one.leg > leg || (one.leg === leg && !isLeft(one.key)));
   }
 
@@ -148,8 +149,7 @@ export class Calls extends Fleet {
 
   /** K13 asks for all or none without a plan. */
   claim(key) {
-    const isPlanned = !this.all;
-    return { itinerary_version: isPlanned ? this.version : 0, predecessor: isPlanned ? this.before(key, this.node) : 0 };
+    return this.all ? {} : { itinerary_version: this.version, predecessor: this.before(key, this.node) };
   }
 
   /** K12, K14: why a request is not served now; empty where it is. */
@@ -188,13 +188,14 @@ export class Calls extends Fleet {
 
   #yields(node, plan, mine, theirs) {
     const known = this.order.get(`${node} ${mine.key}`);
-    const [works, theirWorks] = [this.steps, plan.steps.slice(plan.leg)].map((all) => all.some((one) => one.action === WORK));
+    const isWork = (steps) => steps.some((one) => one.action === WORK);
+    const theirWorks = isWork(plan.steps.slice(plan.leg));
     if (mine.b === Infinity && !this.steps.length) return true;
     if (theirs.b === Infinity && plan.windows.length === 1) return false;
     if (known !== undefined) return known;
     if (this.tokens.holds(mine.key)) return false;
     if (this.tokens.get(mine.key).holder === node) return true;
-    if (works !== theirWorks) return theirWorks;
+    if (isWork(this.steps) !== theirWorks) return theirWorks;
     const n = this.stamp.findIndex((one, place) => one !== plan.stamp[place]);
     return n === 0 ? newer(this.stamp[0], plan.stamp[0], 32) : this.stamp[n] > plan.stamp[n];
   }
@@ -210,7 +211,9 @@ export class Calls extends Fleet {
 
   onCall(word) {
     const key = `${word.sender} ${word.call}`;
-    const isWhole = (words) => words.Call && words.CallTerms && words.CallLoad && (!words.Call.depth || words.CallParent);
+    const isWhole = ({ Call: head, CallTerms, CallLoad, CallParent }) => {
+      return head && CallTerms && CallLoad && (!head.depth || CallParent);
+    };
     const words = this.calls.has(key) ? undefined : this.#collect(key, word.name, word, isWhole);
     if (words) this.#opened(key, words);
   }
@@ -231,12 +234,13 @@ export class Calls extends Fleet {
     const { wheelbase_mm: wheelbase, to_station: to } = load;
     const car = reference(load.car_origin, load.car_number);
     const { from_station: source, deadline_ms } = terms;
-    const isKnown = /PARK|RETRIEVE/.test(head.operation) && head.criterion === "FINISH_TIME" && /ANY|ROBOT/.test(head.kind);
+    const isTask = /PARK|RETRIEVE/.test(head.operation) && !head.depth;
+    const isKnown = isTask && head.criterion === "FINISH_TIME" && /ANY|ROBOT/.test(head.kind);
     const isInTime = this.now < deadline - 2 * guard && deadline <= this.now + 60 * window;
     const isFit = wheelbase === 1_500 || (wheelbase >= least && wheelbase <= most);
-    if (!isKnown || head.depth || !isInTime || !isFit) return;
-    const call = { key, initiator, number, task, deadline, deadline_ms, source, to, ready, car, wheelbase, heard: this.now };
-    call.floor = floorOf(this.site, call);
+    if (!isKnown || !isInTime || !isFit) return;
+    const call = { key, initiator, number, task, deadline, deadline_ms, source, to, ready, car, wheelbase };
+    Object.assign(call, { heard: this.now, floor: floorOf(this.site, call) });
     this.calls.set(key, call);
     this.#search(call);
   }
@@ -342,14 +346,8 @@ export class Calls extends Fleet {
     Object.assign(call, { isMine: false, phase: "AWARDED" });
     this.stamp = this.stampOf(call);
     this.tasks.set(which, call);
-    this.#take(found);
+    this.publish(found.steps);
     return this.report(which, "AWARDED", this.#sink(which));
-  }
-
-  #take({ steps }) {
-    this.steps = steps;
-    this.save();
-    this.publish();
   }
 
   /** U5. */
@@ -367,7 +365,7 @@ export class Calls extends Fleet {
     if (!isOver || one?.phase !== "AWARDED" || one.initiator !== word.sender) return;
     this.tasks.delete(which);
     if (this.hand?.which === which) this.hand = undefined;
-    if (!this.remake()) this.#take({ steps: this.inHand().filter((step) => step.call?.task !== which) });
+    if (!this.remake()) this.publish(this.inHand().filter((step) => step.call?.task !== which));
   }
 
   /** All that is left is planned anew, behind the run or the work in hand; whether there is a way. */
@@ -375,7 +373,7 @@ export class Calls extends Fleet {
     const kept = this.inHand();
     const isLeft = (call) => !kept.some((one) => one.call === call && !one.takes);
     const found = this.#arrange(kept, [...this.tasks.values()].filter(isLeft));
-    if (found) this.#take(found);
+    if (found) this.publish(found.steps);
     return Boolean(found);
   }
 
@@ -402,8 +400,10 @@ export class Calls extends Fleet {
   }
 
   /** P1, J5. */
-  publish() {
+  publish(steps) {
     const version = next(this.version);
+    this.steps = steps;
+    this.save();
     if (!this.steps.length) this.stamp = [this.nowMs(), this.node, 0];
     const [stamp_award_ms, stamp_initiator, stamp_call] = this.stamp;
     const award = this.near(stamp_award_ms);

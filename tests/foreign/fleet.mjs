@@ -14,10 +14,10 @@ export const next = (n) => (n % 255) + 1;
 export class Fleet {
   constructor({ node, site, digest }, kept) {
     Object.assign(this, { node, site: new Site(site, digest), epoch: 0, ...kept });
-    Object.assign(this, { frames: [], words: [], digests: [], now: 0, local: 0, next: Infinity, beatUs: -S, beatAt: 0 });
-    Object.assign(this, { blocked: new Set(), askers: new Set(), ownUntil: 0, listenUntil: 0 });
+    Object.assign(this, { frames: [], words: [], digests: [], blocked: new Set(), askers: new Set() });
+    Object.assign(this, { now: 0, local: 0, next: Infinity, beatUs: -S, beatAt: 0, ownUntil: 0, listenUntil: 0 });
     this.stops = new Map(); // who stopped me: until when
-    this.drops = new Map(); // reason: [count, told]
+    [this.drops, this.told] = [new Map(), new Map()]; // reason: how often, now and when it was told
     this.marks = new Map(); // what is done at most so often: when it may be again
     this.cars = new Map(kept.cars); // origin << 16 | number: { station, by, version, wheelbase }
     this.boot = next(kept.boot ?? 0);
@@ -39,7 +39,7 @@ export class Fleet {
 
   save = () => (this.isDirty = true);
   tell = (name, signals) => this.frames.push(["device", ...encode("device", this.node, name, signals)]);
-  drop = (reason) => this.drops.set(reason, { told: 0, ...this.drops.get(reason), count: (this.drops.get(reason)?.count ?? 0) + 1 });
+  drop = (reason) => this.drops.set(reason, (this.drops.get(reason) ?? 0) + 1);
 
   /** Whether it is time; else it is woken then. */
   isDue(us) {
@@ -146,7 +146,8 @@ export class Fleet {
 
   lives = (peer) => this.now - peer.heard <= 3 * this.site.us.heartbeat;
   isRobot = ({ node }) => this.site.kinds.get(node) === "Robot";
-  isStranger = (beat) => [CONTRACT, this.site.digest, this.epoch].join() !== [beat.contract, beat.site_digest, beat.epoch].join();
+  isStranger = ({ contract, site_digest, epoch }) =>
+    contract !== CONTRACT || site_digest !== this.site.digest || epoch !== this.epoch;
 
   /** J8: of two halves that with the lowest node-ID counts. */
   isOutvoted() {
@@ -194,11 +195,12 @@ export class Fleet {
     const phase = Math.floor((this.rank * heartbeat) / this.site.nodes.length);
     this.beatUs = this.now;
     this.beatAt = (Math.floor((this.now - phase) / heartbeat) + 1) * heartbeat + phase;
-    const [reason, cause, needs_person] = this.hold ?? (this.isNew() ? ["JOURNAL_LOST", this.missing()[0]?.node, 0] : []);
-    if (cause !== undefined) this.say("Halted", { machine: this.node, reason, cause, needs_person, boot: this.boot });
+    const [awaited] = this.isNew() ? this.missing() : [];
+    const [reason, cause, needs_person] = this.hold ?? (awaited ? ["JOURNAL_LOST", awaited.node, 0] : []);
+    if (reason) this.say("Halted", { machine: this.node, reason, cause, needs_person, boot: this.boot });
     const isLowest = !this.isAway() && this.others.every((one) => one.node > this.node || this.isObstacle(one));
-    for (const one of this.others.filter(({ heard }) => isLowest && heard > -Infinity)) {
-      if (!this.lives(one)) this.say("Halted", { machine: one.node, reason: one.reason ?? "NODE_SILENT", boot: one.boot });
+    for (const one of this.others.filter((other) => isLowest && other.heard > -Infinity && !this.lives(other))) {
+      this.say("Halted", { machine: one.node, reason: one.reason ?? "NODE_SILENT", boot: one.boot });
     }
   }
 
@@ -261,7 +263,8 @@ export class Fleet {
 
   onHeartbeat(word, peer) {
     const { boot, state, mirror_digest } = word;
-    const isAnew = peer.boot !== undefined && (peer.boot !== boot || (state === "STARTING" && peer.beat.state !== state));
+    const isOther = peer.boot !== boot || (state === "STARTING" && peer.beat.state !== state);
+    const isAnew = peer.boot !== undefined && isOther;
     if (isAnew) this.ask(peer, peer.boot, this.now);
     if (isAnew) Object.assign(peer, { plan: undefined, isStarted: true });
     if (state !== "OBSTACLE" && state !== "STOPPED") peer.halted = false;
@@ -312,9 +315,9 @@ export class Fleet {
   #answer() {
     if (!this.askers.size || !this.isDue(this.quietUntil)) return;
     this.stateAll();
-    const isAnew = (peer, life) => peer?.isStarted && this.askers.has(peer.node) && life !== peer.boot;
+    const isAnew = (peer, { life }) => peer?.isStarted && this.askers.has(peer.node) && life !== peer.boot;
     const isSilent = (peer) => peer && !this.lives(peer);
-    this.tokens.tellSeen(({ by, life, holder }) => isAnew(this.peers.get(by), life) || isSilent(this.peers.get(holder)));
+    this.tokens.tellSeen((one) => isAnew(this.peers.get(one.by), one) || isSilent(this.peers.get(one.holder)));
     this.say("SyncDone", { whom: this.askers.size === 1 ? [...this.askers][0] : 0, boot: this.boot });
     this.askers.clear();
     this.quietUntil = this.now + 250 * MS;
@@ -366,10 +369,10 @@ export class Fleet {
   wakeFleet() {
     this.#wakeHolds();
     this.#wakeSync();
-    for (const [reason, one] of this.drops) {
-      if (one.count === one.told || !this.every(reason, this.site.us.heartbeat)) continue;
-      one.told = one.count;
-      this.say("Diagnostic", { reason, count: one.count });
+    for (const [reason, count] of this.drops) {
+      const isTold = this.told.get(reason) === count || !this.every(reason, this.site.us.heartbeat);
+      if (!isTold) this.say("Diagnostic", { reason, count });
+      if (!isTold) this.told.set(reason, count);
     }
     this.#answer();
     if (this.isDue(this.beatAt)) this.beat();

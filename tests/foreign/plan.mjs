@@ -65,17 +65,17 @@ export class Planner {
       return ways(this.site, from, frontOf(place)).map((more) => [...way, ...more, workAt(place, { takes, call })]);
     };
     const taken = call.isAboard ? [[]] : on([], start, source, true);
-    const sinks = to === ANY ? free : [to];
-    const all = sinks.flatMap((sink) => taken.flatMap((way) => on(way, way.length ? spotOf(source) : start, sink, false)));
+    const from = call.isAboard ? start : spotOf(source);
+    const all = (to === ANY ? free : [to]).flatMap((sink) => taken.flatMap((way) => on(way, from, sink, false)));
     return this.#soonest(start, all, Math.max(start.us, call.deadline + 150_000), call.ready);
   }
 
   /** The way to a refuge from standing somewhere: steps, none where it is in one. */
   rest(start) {
     const key = this.site.at(start.track, start.index);
-    const mayStay = this.refuges.includes(key) && this.#begin([{ key, a: 0, b: Infinity }], start, start.us) !== undefined;
+    const us = this.refuges.includes(key) ? this.#begin([{ key, a: 0, b: Infinity }], start, start.us) : undefined;
     const all = this.refuges.flatMap((one) => ways(this.site, start, one)).filter((way) => way.length);
-    return mayStay ? [] : this.#soonest(start, all, start.us)?.steps;
+    return us === undefined ? this.#soonest(start, all, start.us)?.steps : [];
   }
 
   #soonest(start, all, least, ready = 0) {
@@ -131,7 +131,11 @@ export function hopUs(site, { action, from, to, place }) {
 /** Steps without a pause, from 0 on, and how long they last. */
 function timed(site, way) {
   let us = 0;
-  const steps = way.map((hop) => ({ ...hop, begin: us, end: (us += hopUs(site, hop)) }));
+  const steps = way.map((hop) => {
+    const begin = us;
+    us += hopUs(site, hop);
+    return { ...hop, begin, end: us };
+  });
   return [steps, us];
 }
 

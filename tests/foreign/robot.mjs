@@ -1,15 +1,15 @@
-// A robot written from docs/protocol.md, docs/site-file.md and the DBC files alone: what it does with drive and shuttle.
+// A robot written from docs/protocol.md, docs/site-file.md and the DBC files alone: its drive and its shuttle.
 // A line in is a time with a frame or a wake, the lines out are frames, what is to be kept, and the next wake.
 import { createInterface } from "node:readline";
 import { Calls } from "./calls.mjs";
 import { FAULTS } from "./faults.mjs";
 import { MS, S, next } from "./fleet.mjs";
-import { WORK, hopUs, workAt } from "./plan.mjs";
+import { WORK, hopUs, spotOf, workAt } from "./plan.mjs";
 import { ABOARD, ANY, gateOf, isSpur } from "./site.mjs";
 import { carKey, isSegment, stationKey } from "./tokens.mjs";
 
 const ACTIONS = { true: ["REACH", "GRIP", "RETRACT"], false: ["REACH", "RELEASE", "RETRACT"] };
-const AFTER = { REACH: ["REACHED"], GRIP: ["REACHED"], RELEASE: ["REACHED"], RETRACT: ["HOME"], undefined: ["HOME", "REACHED"] };
+const AFTER = { REACH: "REACHED", GRIP: "REACHED", RELEASE: "REACHED", RETRACT: "HOME", undefined: "REACHED HOME" };
 const MARK_MM = 5; // so near to a mark it is there
 
 export class Robot extends Calls {
@@ -45,8 +45,8 @@ export class Robot extends Calls {
 
   get place() {
     const key = this.drive && this.site.at(this.track, this.axisIndex);
-    const isMouth = isSpur(this.track) && !isSpur(key >> 8);
-    return key && (isMouth ? { track: key >> 8, index: key & 0xff, key } : { track: this.track, index: this.axisIndex, key });
+    if (isSpur(this.track) && !isSpur(key >> 8)) return key && { ...spotOf(key), key };
+    return key && { track: this.track, index: this.axisIndex, key };
   }
 
   onDevice(word) {
@@ -87,8 +87,9 @@ export class Robot extends Calls {
     const call = this.tasks.get(which) ?? [...this.tasks.values()].at(-1);
     this.sayPlace();
     this.stamp = call ? this.stampOf(call) : [this.nowMs(), this.node, 0];
-    if (isBegun) this.steps = [workAt(place, { begin: this.now, end: this.now + this.site.handling(place), takes, call })];
-    if (!this.isAgain || !this.remake()) this.publish();
+    const times = { begin: this.now, end: this.now + this.site.handling(place) };
+    if (isBegun) this.steps = [workAt(place, { ...times, takes, call })];
+    if (!this.isAgain || !this.remake()) this.publish(this.steps);
   }
 
   #giveWay() {
@@ -100,8 +101,8 @@ export class Robot extends Calls {
   inHand() {
     const isOnLift = ({ action, track, to }) => action === "RIDE" || this.site.liftOf(this.site.at(track, to));
     const isBegun = { TRAVEL: this.steps[0] === this.begun && this.isRunning(), RIDE: true, WORK: this.hand?.isBegun };
-    const isFixed = (n) => (n ? isOnLift(this.steps[n - 1]) : isBegun[this.steps[0].action] || this.site.liftOf(this.place.key));
-    const count = this.steps.findIndex((_, n) => !isFixed(n));
+    const isFixed = ({ action }) => isBegun[action] || this.site.liftOf(this.place.key);
+    const count = this.steps.findIndex((one, n) => !(n ? isOnLift(this.steps[n - 1]) : isFixed(one)));
     return count < 0 ? this.steps : this.steps.slice(0, count);
   }
 
@@ -151,10 +152,11 @@ export class Robot extends Calls {
     const { action, from, to, place, end } = step;
     const left_mm = Math.abs((to - 1) * this.site.pitch - this.drive.position_mm);
     const moving = (1e6 * Math.abs(this.drive.speed_mm_s)) / (2 * this.site.carrier.acceleration_mm_s2);
+    const seen = moving ? this.driveUs : this.now;
     let over = end;
     if (action === WORK && !this.hand?.isBegun) over = this.now + this.site.handling(place);
     else if (action === "TRAVEL" && from === to && !this.isRunning()) over = this.now + hopUs(this.site, step);
-    else if (from !== to && action === "TRAVEL") over = (moving ? this.driveUs : this.now) + this.site.run(left_mm) - moving;
+    else if (from !== to && action === "TRAVEL") over = seen + this.site.run(left_mm) - moving;
     return Math.max(0, over - end, this.now - end);
   }
 
@@ -210,8 +212,8 @@ export class Robot extends Calls {
   #travel(step, isBegun = true) {
     const { site, tokens } = this;
     const { mm: goal, across } = this.#line({ ...step, mouth: undefined }).at(-1);
-    const isDone = this.isStanding() && this.drive.sequence === this.driveOrder.sequence && this.drive.across === across;
-    if (isBegun && isDone && this.isAt(goal)) {
+    const isThere = this.isStanding() && this.drive.across === across && this.isAt(goal);
+    if (isBegun && isThere && this.drive.sequence === this.driveOrder.sequence) {
       this.#stand();
       return true;
     }
@@ -276,7 +278,9 @@ export class Robot extends Calls {
     if (this.all?.every(isHeld)) [this.all, this.noOrderUs] = [undefined, undefined];
     else if (!this.all && this.noOrderUs !== undefined && this.isDue(this.noOrderUs + 5 * S)) {
       this.all = [...new Set(this.windows.map(({ key }) => key))].filter((key) => !this.site.liftOf(key));
-    } else if (this.all?.some((key) => isHeld(key) && !body.includes(key)) && this.isDue((this.partUs ??= this.now) + 2 * S)) {
+    } else if (this.all?.some((key) => isHeld(key) && !body.includes(key))) {
+      this.partUs ??= this.now;
+      if (!this.isDue(this.partUs + 2 * S)) return;
       [this.pauseUs, this.partUs] = [this.now + 5 * S, undefined];
       this.#giveBack(body);
     }
@@ -315,8 +319,8 @@ export class Robot extends Calls {
     if (action) hand.actions = hand.actions.slice(1);
     this.shuttleOrder = { sequence };
     if (!hand.actions.length) return this.#handled(step, keys);
-    const side = place & 0x80 ? "FAR" : "NEAR";
-    this.shuttleOrder = { sequence: next(sequence), action: hand.actions[0], side, wheelbase_mm: this.#wheelbase(call) };
+    const order = { action: hand.actions[0], side: place & 0x80 ? "FAR" : "NEAR", wheelbase_mm: this.#wheelbase(call) };
+    this.shuttleOrder = { sequence: next(sequence), ...order };
     hand.isBegun = true;
     if (takes) call.phase = "BEGUN";
     this.save();
@@ -339,8 +343,8 @@ export class Robot extends Calls {
 
   #handled({ call, place, takes }, [station, car]) {
     const keeper = this.site.keeper(place);
-    const version = this.tokens.get(car).version & 0xffff;
-    this.cars.set(call.car, { station: takes ? ABOARD : place, by: this.node, version, wheelbase: this.#wheelbase(call) });
+    const one = { by: this.node, version: this.tokens.get(car).version & 0xffff, wheelbase: this.#wheelbase(call) };
+    this.cars.set(call.car, { ...one, station: takes ? ABOARD : place });
     this.hand = undefined;
     call.phase = "LOADED";
     if (!takes && this.tasks.delete(call.task)) this.done.set(call.task, place);

@@ -41,9 +41,11 @@ export class Site {
     const fixed = machines.filter((one) => one.kind !== "Robot");
     const isAt = (one, floor) => (one.floors ?? [segment(one.at) >> 8]).includes(floor);
     const steward = (floor) => (fixed.find((one) => isAt(one, floor)) ?? fixed[0]).node;
-    const named = Object.entries(stewards).map(([track, name]) => [+track, fixed.find((one) => one.name === name).node]);
-    const ways = [...this.lifts.map((one) => [one.track, one.node]), ...this.spurs.map((one) => [one.track, steward(one.mouth >> 8)])];
-    this.stewards = new Map([...numbers.map((floor) => [floor, steward(floor)]), ...ways, ...named]);
+    const shafts = this.lifts.map((one) => [one.track, one.node]);
+    const branches = this.spurs.map((one) => [one.track, steward(one.mouth >> 8)]);
+    const byName = new Map(fixed.map((one) => [one.name, one.node]));
+    const named = Object.entries(stewards).map(([track, name]) => [Number(track), byName.get(name)]);
+    this.stewards = new Map([...numbers.map((floor) => [floor, steward(floor)]), ...shafts, ...branches, ...named]);
     const row = ([track, length]) => Array.from({ length }, (_, n) => (track << 8) | (n + 1));
     const sides = (key) => (floors.sides ?? ["near", "far"]).map((side) => key | ((side === "far") << 7));
     const taken = new Set([...this.bays.keys(), ...spurs.map((one) => station(one, "far"))]);
@@ -69,7 +71,8 @@ export class Site {
   refuges(ends) {
     const isShared = this.nodes.length > 1 + this.bays.size; // other robots, or lifts
     const closed = new Set([...ends, ...(isShared ? this.fronts : [])].map((one) => one >> 8));
-    const besides = (one) => one.floors.flatMap((floor) => [-1, 1].map((n) => this.at(floor, this.sill(one, floor) + n)));
+    const sides = (one, floor) => [-1, 1].map((n) => this.at(floor, this.sill(one, floor) + n));
+    const besides = (one) => one.floors.flatMap((floor) => sides(one, floor));
     const busy = new Set([...this.fronts, ...this.spurs.map((one) => one.mouth), ...this.lifts.flatMap(besides)]);
     return this.segments.filter((key) => !closed.has(key >> 8) && !busy.has(key));
   }

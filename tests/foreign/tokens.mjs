@@ -35,7 +35,11 @@ export class Tokens {
   holds = (key) => this.get(key).holder === this.node;
   /** Those that I hold, but for what was never given. */
   mine = () => [...this.all.values()].filter((one) => one.holder === this.node && one.version);
-  held = (key) => this.mine().filter((one) => Math.abs(one.key - key) < 16 && isSegment(key) && one.key >> 8 === key >> 8);
+  /** Of those the ones in line with a segment, 15 to either side. */
+  inLine(key) {
+    return this.mine().filter((one) => isSegment(key) && one.key >> 8 === key >> 8 && Math.abs(one.key - key) < 16);
+  }
+
   #say = (name, { key, version }, signals = {}) =>
     this.robot.say(name, { token_kind: KINDS[key >> 24], token: key & 0xffffff, version, ...signals });
 
@@ -69,7 +73,7 @@ export class Tokens {
 
   /** K3, K4: several at once, so that what goes together has one version. */
   give(keys, to, carAt = undefined) {
-    const versions = keys.flatMap((key) => [this.get(key), ...this.held(key)]).map((one) => one.version);
+    const versions = keys.flatMap((key) => [this.get(key), ...this.inLine(key)]).map((one) => one.version);
     const version = Math.max(...versions) + 1;
     this.robot.save();
     for (const one of keys.map((key) => this.get(key))) {
