@@ -260,7 +260,9 @@ export class Robot extends Calls {
     this.sayPlace();
     this.leftUs = undefined;
     const to = new Map(left.map((key) => [key, tokens.nextOf(key) || site.stewards.get(key >> 8)]));
-    for (const one of new Set(to.values())) tokens.give(left.filter((key) => to.get(key) === one), one);
+    const lineOf = (key) => `${to.get(key)} ${gateOf(key) === key ? key : key >> 8}`;
+    const lines = new Map(left.map((key) => [lineOf(key), left.filter((one) => lineOf(one) === lineOf(key))]));
+    for (const keys of lines.values()) tokens.give(keys, to.get(keys[0]));
   }
 
   /** K13: whether an order of passing has come about; all or none where none has for long. */
@@ -290,10 +292,11 @@ export class Robot extends Calls {
   #ride(step) {
     const platform = step.track << 8;
     const there = this.site.liftOf(platform).floors[step.to - 1];
-    if (this.ridden !== step || this.#sillWord(platform)) this.#stand();
+    const isThere = this.#mayCross(platform, there);
+    if (this.ridden !== step || (!isThere && this.#sillWord(platform))) this.#stand();
     this.ridden = step;
     this.wanted.add(gateOf(platform));
-    if (!this.#mayCross(platform, there)) return false;
+    if (!isThere) return false;
     this.track = there;
     this.save();
     this.sayPlace();
