@@ -90,7 +90,8 @@ export class Calls extends Fleet {
     if (peer.plan?.version !== itinerary_version) return;
     peer.plan.leg = Math.max(leg, peer.plan.leg);
     const now = peer.plan.steps[peer.plan.leg] ?? {};
-    const isLeft = (one) => now.track === track && one >> 8 === track && ((one & 0xff) - index) * (now.to - now.from) < 0;
+    const isHere = (one) => now.track === track && one >> 8 === track;
+    const isLeft = (one) => isHere(one) && ((one & 0xff) - index) * (now.to - now.from) < 0;
     peer.plan.windows = peer.plan.windows.filter((one) => one.leg > leg || (one.leg === leg && !isLeft(one.key)));
   }
 

@@ -4,7 +4,7 @@ import { createInterface } from "node:readline";
 import { Calls } from "./calls.mjs";
 import { FAULTS } from "./faults.mjs";
 import { MS, S, next } from "./fleet.mjs";
-import { WORK, hopUs, spotOf, workAt } from "./plan.mjs";
+import { WORK, hopUs, meeting, spotOf, windowsOf, workAt } from "./plan.mjs";
 import { ABOARD, ANY, gateOf, isSpur } from "./site.mjs";
 import { carKey, isSegment, stationKey } from "./tokens.mjs";
 
@@ -134,15 +134,24 @@ export class Robot extends Calls {
     this.steps.shift();
     this.wanted.clear();
     const by = this.steps.length ? this.now - this.steps[0].begin : 0;
-    if (by > 500 * MS || (by < -500 * MS && this.steps[0].begin <= step.end + 10 * MS)) this.remake();
+    if (by > 500 * MS || (by < -500 * MS && this.steps[0].begin <= step.end + 10 * MS)) this.#shift(this.steps, by);
   }
 
   /** P9: it lasts longer, and what follows comes later. */
   #isLate(step) {
     const by = this.late();
     if (by > 2 * S) step.end += by;
-    if (by > 2 * S) this.remake();
+    if (by > 2 * S) this.#shift(this.steps.slice(1), by);
     return this.isDue(this.now + Math.max(100 * MS, 2 * S - by));
+  }
+
+  /** P8: later as it is, so that the order stays; sooner only where nobody is in the way. */
+  #shift(steps, by) {
+    const shifted = steps.map((one) => ({ ...one, begin: one.begin + by, end: one.end + by }));
+    const isMeeting = ({ plan }) => plan && meeting(windowsOf(this.site, shifted), plan.windows);
+    if (by < 0 && this.robots.some(isMeeting)) return;
+    steps.forEach((one, n) => Object.assign(one, shifted[n]));
+    this.publish(this.steps);
   }
 
   /** By how much a step that is in hand will be over later than planned, as far as can be seen. */
