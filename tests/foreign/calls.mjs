@@ -1,312 +1,315 @@
 // Calls, bids, tasks, and what others plan (chapters 4 to 7).
-import { Fleet, newer } from "./fleet.mjs";
-import { Planner, endOf, floorOf, legsOf, meeting, windowsOf } from "./plan.mjs";
-import { frontOf } from "./site.mjs";
-import { carKey } from "./tokens.mjs";
+import { Fleet, MS, S, newer, next } from "./fleet.mjs";
+import { Planner, WORK, endOf, floorOf, legsOf, meeting, windowsOf } from "./plan.mjs";
+import { ANY, frontOf, isSpur } from "./site.mjs";
+import { carKey, isSegment } from "./tokens.mjs";
 
-const [S, MS] = [1_000_000, 1_000];
 const MOST_LEGS = 31;
+const ALWAYS = { a: -Infinity, b: Infinity };
 const reference = (origin, number) => origin * 65_536 + number;
-const task = (word) => reference(word.task_origin, word.task_number);
+const taskOf = (word) => reference(word.task_origin, word.task_number);
+const isBeaten = ({ best }, us, node) => best && (best[0] < us || (best[0] === us && best[1] < node));
 
 export class Calls extends Fleet {
-  constructor(setup, journal) {
-    super(setup, journal);
-    Object.assign(this, { version: 0, stamp: [0, this.node, 0], steps: [], calls: new Map(), leftOut: new Map(), sets: new Map(), order: new Map(), needed: [] });
-    this.tasks = new Map(journal.tasks); // task: { call, phase }, what was won
-    this.done = new Map(journal.done); // task: where the car was left
-    this.forfeits = new Map(); // task: [reason, times, due]
+  constructor(setup, kept) {
+    super(setup, kept);
+    this.tasks = new Map(kept.tasks); // task: its call, with the phase that the task is in
+    this.done = new Map(kept.done); // task: where the car was left
+    this.forfeits = new Map(); // task: [reason, how often it was said]
+    this.order = new Map(); // node and segment: whether it passes there before me
+    Object.assign(this, { steps: [], calls: new Map(), leftOut: new Map(), sets: new Map() });
   }
 
   journal() {
     return { ...super.journal(), tasks: [...this.tasks], done: [...this.done] };
   }
 
-  hear(word, peer) {
-    const { name } = word;
-    if (name.startsWith("Token") && name !== "TokenAssigned") {
-      if (peer && !this.ownUntil) this.tokens.hear(word);
-    } else if (name === "TokenAssigned") {
-      const key = (["SEGMENT", "STATION", "CAR", "TASK"].indexOf(word.token_kind) << 24) | word.token;
-      if (this.frozen && !this.frozen.list.some(([one]) => one === key)) this.frozen.list.push([key, word.version, word.holder]);
-    } else if (name === "Heartbeat" && peer) this.onHeartbeat(word, peer);
-    else if (name.startsWith("Sync")) this.onSync(word, peer);
-    else if (name === "Regeneration") this.onRegeneration(word);
-    else if (name === "Halted" && word.machine === word.sender) Object.assign(peer, { halted: true, reason: word.reason });
-    else if (/^(Call|LeftOut)/.test(name)) this.#onCall(word);
-    else if (name === "Bid") this.#onBid(word, peer);
-    else if (name === "Award") this.#onAward(word);
-    else if (name === "CarAt") this.#onCar(word);
-    else if (name.startsWith("Itinerary")) this.#onPlan(word, peer);
-    else if (name === "Progress") this.#onPlace(word, peer);
-    else if (name === "Blocked" || name === "Clear") this.#onBlocked(word);
-    if (peer && ["Waiting", "TaskReport", "TokenRequest", "ItineraryHead"].includes(name)) peer.waitsUs = this.now;
-  }
-
-  // --- what others plan, and where they are
-
-  #onPlan(word, peer) {
-    if (word.name === "ItineraryHead") {
-      if (peer.open?.version === word.version && peer.open.head.stamp_award_ms !== word.stamp_award_ms) peer.open = undefined;
-      else peer.open = { version: word.version, head: word, legs: [], said: this.now };
-    } else if (peer.open?.version === word.version && this.now < peer.open.said + S) Object.assign(peer.open, { said: this.now }).legs[word.leg] = word;
-    const { head, legs } = peer.open ?? {};
-    if (!head || Object.keys(legs).length < head.legs) return;
-    peer.open = undefined;
-    if (head.grade === "TENTATIVE" || (peer.plan && !newer(head.version, peer.plan.version, 8))) return;
-    const award = this.near(head.stamp_award_ms);
-    let [begin, here] = [award, peer.place?.track];
-    const steps = legs.map(({ action, track, side, from_index: from, to_index: to, end_ms }) => {
-      const end = award + end_ms * MS;
-      const mouth = action === "TRAVEL" && from === to ? this.#beyond(track, to, here) : undefined;
-      const place = (track << 8) | (Number(side === "FAR") << 7) | to;
-      const step = { action, track, from, to, begin, end, mouth, place };
-      [begin, here] = [end, track];
-      return step;
-    });
-    const stamp = [head.stamp_award_ms, head.stamp_initiator, head.stamp_call];
-    peer.plan = head.grade === "RELEASED" ? undefined : { version: head.version, stamp, steps, leg: 0 };
-    if (peer.plan) peer.plan.windows = windowsOf(this.site, steps);
-    this.compare();
-  }
-
-  /** The other side of a linked end that a leg goes over. */
-  #beyond(track, index, before) {
-    const isHere = (one) => one.track === before && one.mouth === ((track << 8) | index);
-    const spur = this.site.spurs.find((one) => one.track === track) ?? this.site.spurs.find(isHere);
-    return spur && (spur.track === track ? spur.mouth : (spur.track << 8) | 1);
-  }
-
-  #onPlace({ itinerary_version, leg, track, index, offset_mm, speed_mm_s, sender }, peer) {
-    const lift = this.site.lifts.find((one) => one.node === sender);
-    if (lift) peer.stop = { index, isStill: speed_mm_s === 0 && Math.abs(offset_mm) <= 5, mark: (leg << 8) | itinerary_version };
-    const place = { track, index, key: this.site.at(track, index) };
-    if (peer.place?.key !== place.key) peer.movedUs = this.now;
-    peer.place = place;
-    if (peer.plan?.version !== itinerary_version) return;
-    Object.assign(peer.plan, { leg: Math.max(leg, peer.plan.leg) });
-    const now = peer.plan.steps[peer.plan.leg];
-    const left = (key) => now?.track === track && key >> 8 === track && ((key & 0xff) - index) * Math.sign(now.to - now.from) < 0;
-    peer.plan.windows = peer.plan.windows.filter((one) => one.leg > leg || (one.leg === leg && !left(one.key)));
-  }
-
-  /** J6: it stands where its plan has left. */
-  hasLeft(peer) {
-    const here = peer.plan.windows.some((one) => one.key === peer.place?.key && one.b > this.now - 20 * S);
-    const since = Math.max(peer.movedUs ?? 0, peer.plan.windows.filter((one) => one.key === peer.place?.key).at(-1)?.b ?? 0);
-    return Boolean(peer.place) && !here && this.now > since + (peer.waitsUs > since ? 600 : 20) * S;
-  }
-
-  #onBlocked({ name, sender, track, index }) {
-    if (sender <= 250 && this.site.stewards.get(track) !== sender) return this.drop("NOT_AUTHORISED");
-    if (name === "Blocked") this.blocked.add((track << 8) | index);
-    else this.blocked.delete((track << 8) | index);
-    this.beatSoon();
-    return this.compare();
+  get version() {
+    return this.plan?.version ?? 0;
   }
 
   get robots() {
-    return this.others.filter((one) => this.site.kinds.get(one.node) === "Robot");
-  }
-
-  /** What the others need, and where they rest. */
-  planner() {
-    const busy = new Map();
-    const add = (key, window) => (busy.has(key) ? busy.get(key).push(window) : busy.set(key, [window]));
-    const ends = [];
-    for (const one of this.robots) {
-      const isIdle = !one.plan || this.isObstacle(one);
-      if (isIdle && one.place) add(one.place.key, { a: -Infinity, b: Infinity });
-      if (!isIdle) one.plan.windows.forEach((window) => add(window.key, window));
-      const end = !isIdle && one.plan.steps.at(-1);
-      if (end || one.place) ends.push(end ? this.site.at(end.track, end.to) : one.place.key);
-      for (const [key, [, holder]] of isIdle ? this.tokens.believed : []) if (holder === one.node && key < 1 << 24) add(key, { a: -Infinity, b: Infinity });
-    }
-    for (const key of this.blocked) add(key, { a: -Infinity, b: Infinity });
-    for (const lift of this.site.lifts) {
-      const { stop } = this.peers.get(lift.node);
-      const mine = this.steps.findLast((one) => one.track === lift.track);
-      const last = mine ? { b: mine.end, to: mine.to } : stop && { b: this.now, to: stop.index };
-      if (last) add(lift.track << 8, { a: -Infinity, ...last });
-    }
-    return new Planner(this.site, busy, ends);
-  }
-
-  /** K12: who passes a segment right before a robot, by the plans that I know; me too. */
-  before(key, node) {
-    const windows = (one) => (one === this.node ? this.windows : (this.peers.get(one).plan?.windows ?? []));
-    const own = windows(node).find((one) => one.key === key);
-    const others = [this.node, ...this.robots.filter((one) => !this.isObstacle(one)).map((one) => one.node)].filter((one) => one !== node);
-    const found = others.flatMap((other) => windows(other).filter((one) => own && one.key === key && this.#isBefore(other, one, own, node)).map(({ a }) => [a, other]));
-    return found.sort((a, b) => b[0] - a[0])[0]?.[1] ?? 0;
-  }
-
-  /** K13 asks for all or none without a plan. */
-  claim(key) {
-    return this.all ? { itinerary_version: 0, predecessor: 0 } : { itinerary_version: this.version, predecessor: this.before(key, this.node) };
-  }
-
-  /** K12, K14: why a request is not served now; empty where it is. */
-  objection(key, node, { plan, predecessor }) {
-    const peer = this.peers.get(node);
-    const body = this.body();
-    if (key >= 1 << 24 || this.site.liftOf(key) || body.includes(key) || !peer || this.now - peer.heard > 1.25 * this.site.us.heartbeat) return "TOKEN_NOT_GRANTABLE_YET";
-    const needs = this.needed.includes(key) && (this.isRunning || this.before(key, node) === this.node);
-    if (needs) return "TOKEN_NOT_GRANTABLE_YET";
-    if (plan === 0) return "";
-    const sees = this.before(key, node);
-    const isOther = predecessor !== sees && predecessor !== this.node;
-    if (peer.plan && !newer(plan, peer.plan.version, 8) && !isOther) return sees && sees !== this.node ? "TOKEN_NOT_GRANTABLE_YET" : "";
-    for (const one of [node, predecessor]) {
-      const of = this.peers.get(one);
-      if (!of || this.now < (of.viewUs ?? -S) + S || this.site.kinds.get(one) !== "Robot") continue;
-      of.viewUs = this.now;
-      this.ask(one, 0, this.now);
-    }
-    return "MIRROR_BEHIND";
-  }
-
-  #isBefore(other, theirs, mine, node) {
-    const overlap = theirs.a < mine.b - 10 * MS && mine.a < theirs.b - 10 * MS;
-    const known = this.order.get(`${other === this.node ? node : other} ${mine.key}`);
-    return overlap && known !== undefined ? known !== (other === this.node) : theirs.a < mine.a;
+    return this.others.filter((one) => this.isRobot(one));
   }
 
   get windows() {
     return windowsOf(this.site, this.steps.length ? this.steps : [this.standing()]);
   }
 
+  nowMs = () => Math.ceil(this.now / MS) % 2 ** 32;
+  stampOf = (call) => [call.deadline_ms, call.initiator, call.number & 0xff];
+  /** F6. */
+  near = (ms) => (Math.floor(this.now / MS) + ((ms - Math.floor(this.now / MS)) | 0)) * MS;
+
+  /** F4: the frames of a set by their places, when it is whole. */
+  #collect(key, place, word, isWhole) {
+    const { words } = this.sets.get(key) ?? { words: {} };
+    const isOther = Object.keys(words[place] ?? {}).some((one) => one !== "senders" && words[place][one] !== word[one]);
+    this.sets.delete(key);
+    words[place] = word;
+    if (!isOther && isWhole(words)) return words;
+    if (!isOther) this.sets.set(key, { words, said: this.now });
+    return undefined;
+  }
+
+  // --- what others plan, and where they are
+
+  onItinerary(word, peer) {
+    const key = `plan ${word.sender} ${word.version}`;
+    if (word.name === "ItineraryLeg" && !this.sets.has(key)) return;
+    const isWhole = (words) => Object.keys(words).length > words.head.legs;
+    const { head, ...legs } = this.#collect(key, word.leg ?? "head", word, isWhole) ?? {};
+    if (!head || head.grade === "TENTATIVE" || (peer.plan && !newer(head.version, peer.plan.version, 8))) return;
+    const award = this.near(head.stamp_award_ms);
+    const steps = [];
+    for (const { action, track, side, from_index: from, to_index: to, end_ms } of Object.values(legs)) {
+      const before = steps.at(-1) ?? { end: award, track: peer.place?.track };
+      const mouth = action === "TRAVEL" && from === to ? this.#beyond(track, to, before.track) : undefined;
+      const place = (track << 8) | ((side === "FAR") << 7) | to;
+      steps.push({ action, track, from, to, begin: before.end, end: award + end_ms * MS, mouth, place });
+    }
+    const stamp = [head.stamp_award_ms, head.stamp_initiator, head.stamp_call];
+    const windows = steps.length && windowsOf(this.site, steps);
+    peer.plan = windows ? { version: head.version, stamp, steps, windows, leg: 0 } : undefined;
+    this.compare();
+  }
+
+  /** The other side of a linked end that a leg goes over. */
+  #beyond(track, index, before) {
+    if (isSpur(track)) return this.site.spurOf(track).mouth;
+    const isFrom = (one) => one.mouth === ((track << 8) | index) && (!isSpur(before) || one.track === before);
+    const spur = this.site.spurs.find(isFrom);
+    return spur && (spur.track << 8) | 1;
+  }
+
+  onProgress({ itinerary_version, leg, track, index, offset_mm, speed_mm_s }, peer) {
+    const isStill = speed_mm_s === 0 && Math.abs(offset_mm) <= 5;
+    const key = this.site.at(track, index);
+    if (peer.place?.key !== key) peer.movedUs = this.now;
+    peer.place = { track, index, key, isStill, mark: (leg << 8) | itinerary_version };
+    if (peer.plan?.version !== itinerary_version) return;
+    peer.plan.leg = Math.max(leg, peer.plan.leg);
+    const now = peer.plan.steps[peer.plan.leg] ?? {};
+    const isHere = (one) => now.track === track && one >> 8 === track;
+    const isLeft = (one) => isHere(one) && ((one & 0xff) - index) * (now.to - now.from) < 0;
+    peer.plan.windows = peer.plan.windows.filter((one) => one.leg > leg || (one.leg === leg && !isLeft(one.key)));
+  }
+
+  /** J6: it stands where its plan has left. */
+  hasLeft({ place, plan, movedUs, waitsUs = 0 }) {
+    const here = plan.windows.filter((one) => one.key === place?.key);
+    const since = Math.max(movedUs, here.at(-1)?.b ?? 0);
+    return Boolean(place) && this.now > Math.min(Math.max(since, waitsUs) + 20 * S, since + 600 * S);
+  }
+
+  onBlocked({ name, sender, track, index }) {
+    if (sender <= 250 && this.site.stewards.get(track) !== sender) return this.drop("NOT_AUTHORISED");
+    this.blocked[name === "Blocked" ? "add" : "delete"]((track << 8) | index);
+    this.beatSoon();
+    return this.compare();
+  }
+
+  onClear = (word) => this.onBlocked(word);
+
+  /** P6, J7: what the others need, and where they rest. */
+  planner() {
+    const busy = new Map([...this.blocked].map((key) => [key, [ALWAYS]]));
+    const add = (key, window) => busy.set(key, [...(busy.get(key) ?? []), window]);
+    const ends = [];
+    for (const one of this.robots) {
+      const isIdle = !one.plan || this.isObstacle(one);
+      const rights = [...this.tokens.all.values()].filter(({ key, holder }) => holder === one.node && isSegment(key));
+      const body = one.place ? [one.place] : [];
+      const end = isIdle ? body[0] : endOf(one.plan.steps);
+      const windows = isIdle ? [...rights, ...body].map(({ key }) => ({ key, ...ALWAYS })) : one.plan.windows;
+      for (const window of windows) add(window.key, window);
+      if (end) ends.push(this.site.at(end.track, end.index));
+    }
+    for (const { node, track } of this.site.lifts) {
+      const mine = this.steps.findLast((one) => one.track === track);
+      const { place } = this.peers.get(node);
+      if (mine ?? place) add(track << 8, { a: -Infinity, b: mine?.end ?? this.now, to: mine?.to ?? place.index });
+    }
+    return new Planner(this.site, busy, this.site.refuges(ends));
+  }
+
   standing() {
     const { track, index } = this.place;
-    return { action: "STAND", track, from: index, to: index, begin: this.now, end: this.now };
+    return { action: "STAND", track, from: index, to: index, begin: this.now, end: this.now + MS };
+  }
+
+  /** K12: who passes a segment right before a robot, by the plans that I know; me too. */
+  before(key, node) {
+    const all = [this, ...this.robots.filter((one) => one.plan && !this.isObstacle(one))];
+    const windows = (one) => (one === this ? this.windows : one.plan.windows).filter((other) => other.key === key);
+    const own = all.filter((one) => one.node === node).flatMap(windows)[0];
+    const others = all.filter((one) => own && one.node !== node);
+    const found = others.flatMap((one) => windows(one).filter(({ a }) => a < own.a).map(({ a }) => [a, one.node]));
+    return found.sort((a, b) => b[0] - a[0])[0]?.[1] ?? 0;
+  }
+
+  /** K13 asks for all or none without a plan. */
+  claim(key) {
+    return this.all ? {} : { itinerary_version: this.version, predecessor: this.before(key, this.node) };
+  }
+
+  /** K12, K14: why a request is not served now; empty where it is. */
+  objection(key, node, { plan, predecessor }) {
+    const peer = this.peers.get(node);
+    const isMine = !isSegment(key) || this.site.liftOf(key) || this.body().includes(key);
+    const sees = this.before(key, node);
+    const isNeeded = this.needed.includes(key) && (this.isRunning() || sees === this.node);
+    if (isMine || isNeeded || this.now - peer.heard > 1.25 * this.site.us.heartbeat) return "TOKEN_NOT_GRANTABLE_YET";
+    if (plan === 0) return "";
+    const isOther = predecessor !== sees && predecessor !== this.node;
+    const isKnown = peer.plan && !newer(plan, peer.plan.version, 8) && !isOther;
+    if (isKnown) return sees && sees !== this.node ? "TOKEN_NOT_GRANTABLE_YET" : "";
+    for (const one of this.robots.filter((other) => [node, predecessor].includes(other.node))) {
+      if (this.every(`view ${one.node}`, S)) this.ask(one, 0, this.now);
+    }
+    return "MIRROR_BEHIND";
   }
 
   /** P7, P8: whose plans meet mine, and whether it is I who makes it anew. */
   compare() {
-    if (!this.version || !this.place) return;
+    if (!this.plan || !this.place) return;
     const mine = this.windows;
-    const order = new Map();
-    this.meets = mine.find((one) => this.blocked.has(one.key)) && { node: 0 };
+    this.meets = mine.some((one) => this.blocked.has(one.key)) ? {} : undefined;
     for (const { node, plan } of this.robots.filter((one) => one.plan && !this.isObstacle(one))) {
       const pair = meeting(mine, plan.windows);
-      if (pair && this.#yields(node, plan, ...pair)) this.meets = { node, stamp: plan.stamp };
+      if (pair && this.#yields(node, plan, ...pair)) this.meets = plan;
       for (const one of mine) {
         const theirs = plan.windows.find((other) => other.key === one.key);
-        const [name, meet] = [`${node} ${one.key}`, theirs && theirs.a < one.b - 10 * MS && one.a < theirs.b - 10 * MS];
-        if (theirs && !meet) order.set(name, theirs.a < one.a);
-        else if (theirs && this.order.has(name)) order.set(name, this.order.get(name));
+        const isAgreed = theirs && !meeting([one], [theirs]);
+        if (isAgreed) this.order.set(`${node} ${one.key}`, theirs.a < one.a);
+        else if (!theirs) this.order.delete(`${node} ${one.key}`);
       }
     }
-    this.order = order;
   }
 
   #yields(node, plan, mine, theirs) {
+    const known = this.order.get(`${node} ${mine.key}`);
+    const isWork = (steps) => steps.some((one) => one.action === WORK);
+    const theirWorks = isWork(plan.steps.slice(plan.leg));
     if (mine.b === Infinity && !this.steps.length) return true;
     if (theirs.b === Infinity && plan.windows.length === 1) return false;
-    if (this.order.has(`${node} ${mine.key}`)) return this.order.get(`${node} ${mine.key}`);
+    if (known !== undefined) return known;
     if (this.tokens.holds(mine.key)) return false;
-    if (this.tokens.belief(mine.key)[1] === node) return true;
-    const [works, theirWorks] = [this.steps, plan.steps.slice(plan.leg)].map((steps) => steps.some((one) => one.action === "WORK"));
-    if (works !== theirWorks) return theirWorks;
-    const [[a, b, c], [x, y, z]] = [this.stamp, plan.stamp];
-    return a !== x ? newer(a, x, 32) : b !== y ? b > y : c > z;
+    if (this.tokens.get(mine.key).holder === node) return true;
+    if (isWork(this.steps) !== theirWorks) return theirWorks;
+    const n = this.stamp.findIndex((one, place) => one !== plan.stamp[place]);
+    return n === 0 ? newer(this.stamp[0], plan.stamp[0], 32) : this.stamp[n] > plan.stamp[n];
   }
 
   // --- calls and bids
 
-  near(ms) {
-    const now = Math.floor(this.now / MS);
-    const away = (((ms - now) % 2 ** 32) + 2 ** 32) % 2 ** 32;
-    return (now + (away >= 2 ** 31 ? away - 2 ** 32 : away)) * MS;
-  }
-
-  #onCall(word) {
+  onLeftOut(word) {
     const key = `${word.sender} ${word.call}`;
-    if (word.name === "LeftOut") {
-      const nodes = ["a", "b", "c", "d", "e", "f"].map((one) => word[`node_${one}`]);
-      return this.leftOut.set(key, [...(this.leftOut.get(key) ?? []), ...nodes.filter(Boolean)]);
-    }
-    if (this.calls.has(key)) return undefined;
-    if (!this.sets.has(key)) this.sets.set(key, { said: this.now });
-    const set = this.sets.get(key);
-    const isOther = set[word.name] && Object.keys(word).some((one) => one !== "senders" && set[word.name][one] !== word[one]);
-    if (isOther) return this.sets.delete(key);
-    Object.assign(set, { [word.name]: word, said: this.now });
-    const { Call: head, CallTerms: terms, CallLoad: load, CallParent: parent } = set;
-    if (!head || !terms || !load || (head.depth && !parent)) return undefined;
-    this.sets.delete(key);
-    return this.#opened(key, head, terms, load, parent);
+    this.leftOut.set(key, [...(this.leftOut.get(key) ?? []), ...[..."abcdef"].map((one) => word[`node_${one}`])]);
   }
 
-  #opened(key, head, terms, load, parent) {
-    const { sender: initiator, call: number } = head;
-    const deadline = this.near(terms.deadline_ms);
-    const known = ["PARK", "RETRIEVE"].includes(head.operation) && head.criterion === "FINISH_TIME" && !head.depth;
-    const { call_window: window, deadline_guard: guard } = this.site.us;
-    for (const [other, one] of this.calls) {
-      if (one.initiator !== initiator || one.task !== task(head)) continue;
+  isOut = (call, node) => this.leftOut.get(call.key)?.includes(node);
+
+  onCall(word) {
+    const key = `${word.sender} ${word.call}`;
+    const isWhole = ({ Call: head, CallTerms, CallLoad, CallParent }) => {
+      return head && CallTerms && CallLoad && (!head.depth || CallParent);
+    };
+    const words = this.calls.has(key) ? undefined : this.#collect(key, word.name, word, isWhole);
+    if (words) this.#opened(key, words);
+  }
+
+  /** B1, B3. */
+  #opened(key, { Call: head, CallTerms: terms, CallLoad: load, CallParent: parent }) {
+    const { call_window: window, deadline_guard: guard, door } = this.site.us;
+    const { min_wheelbase_mm: least, max_wheelbase_mm: most } = this.site.cars;
+    const [initiator, number, task, deadline] = [head.sender, head.call, taskOf(head), this.near(terms.deadline_ms)];
+    const isSame = (one) => one.initiator === initiator && one.task === task;
+    for (const one of [...this.calls.values()].filter(isSame)) {
       if (deadline < one.deadline && !newer(number, one.number, 16)) return;
-      this.calls.delete(other);
+      this.calls.delete(one.key);
     }
-    this.forfeits.delete(task(head));
-    const inTime = this.now < deadline - 2 * guard && deadline <= this.now + 60 * window;
-    if (!known || !inTime || !["ANY", "ROBOT"].includes(head.kind)) return;
-    const soonest = this.site.bays.has(terms.from_station) ? deadline - window + 9_500 * MS + this.site.us.door : 0;
+    this.forfeits.delete(task);
+    const soonest = this.site.bays.has(terms.from_station) ? deadline - window + 9_500 * MS + door : 0;
     const ready = parent?.ready_ms ? deadline + parent.ready_ms * MS : soonest;
+    const { wheelbase_mm: wheelbase, to_station: to } = load;
     const car = reference(load.car_origin, load.car_number);
-    const ends = { source: terms.from_station, to: load.to_station };
-    const call = { key, initiator, number, task: task(head), deadline, deadline_ms: terms.deadline_ms, ...ends, ready, car, wheelbase: load.wheelbase_mm, heard: this.now };
-    call.floor = floorOf(this.site, call);
+    const { from_station: source, deadline_ms } = terms;
+    const isTask = /PARK|RETRIEVE/.test(head.operation) && !head.depth;
+    const isKnown = isTask && head.criterion === "FINISH_TIME" && /ANY|ROBOT/.test(head.kind);
+    const isInTime = this.now < deadline - 2 * guard && deadline <= this.now + 60 * window;
+    const isFit = wheelbase === 1_500 || (wheelbase >= least && wheelbase <= most);
+    if (!isKnown || !isInTime || !isFit) return;
+    const call = { key, initiator, number, task, deadline, deadline_ms, source, to, ready, car, wheelbase };
+    Object.assign(call, { heard: this.now, floor: floorOf(this.site, call) });
     this.calls.set(key, call);
     this.#search(call);
   }
 
-  /** Where a further task begins: behind all work in hand and bid for. */
-  #free(without) {
-    const bids = [...this.calls.values()].filter((one) => one.isMine && one !== without && !this.tasks.has(one.task));
-    const kept = this.kept();
-    const ends = [endOf(kept) ?? [this.place.track, this.place.index, this.now]];
-    for (const one of bids) {
-      const work = one.steps.findLastIndex((step) => step.action === "WORK");
-      ends.push(endOf(one.steps.slice(0, work + 1)));
-    }
-    const last = ends.reduce((a, b) => (b[2] > a[2] ? b : a));
-    return [last[0], last[1], Math.max(last[2] + this.late, this.now)];
-  }
-
   /** What of the plan stays for a task behind it: all up to the last work, else the run in hand. */
-  kept() {
-    const work = this.steps.findLastIndex((one) => one.action === "WORK");
-    if (work >= 0) return this.steps.slice(0, work + 1);
-    return this.inHand();
+  #kept() {
+    const work = this.steps.findLastIndex((one) => one.action === WORK);
+    return work < 0 ? this.inHand() : this.steps.slice(0, work + 1);
   }
 
-  freePlaces(but) {
-    const taken = new Set([...this.cars.values()].map((one) => one.station));
-    for (const one of this.tasks.values()) if (one.call !== but && one.sink) taken.add(one.sink);
-    for (const one of this.robots) for (const step of one.plan?.steps ?? []) if (step.action === "WORK") taken.add(step.place);
+  /** These tasks, one behind the other, behind what is kept: { steps, over }, or undefined where there is no way. */
+  #arrange(kept, calls) {
+    const planner = this.planner();
+    const after = (steps) => {
+      const { us = 0, ...where } = endOf(steps) ?? this.place;
+      return { ...where, us: Math.max(us + this.late(), this.now) };
+    };
+    let found = { steps: kept };
+    for (const call of calls) {
+      const { steps } = found;
+      const done = steps.slice(0, Math.max(kept.length, steps.findLastIndex((one) => one.action === WORK) + 1));
+      const isAboard = call.phase === "LOADED" || kept.some((one) => one.call === call);
+      const plan = planner.task({ ...call, isAboard }, after(done), this.freePlaces(done));
+      if (!plan) return undefined;
+      for (const one of plan.steps) if (one.call) one.call = call;
+      found = { steps: [...done, ...plan.steps], over: plan.over };
+    }
+    const rest = calls.length ? [] : planner.rest(after(kept));
+    return rest && { ...found, steps: [...found.steps, ...rest] };
+  }
+
+  freePlaces(steps) {
+    const others = this.robots.flatMap((one) => one.plan?.steps ?? []);
+    const works = [...steps, ...others].filter((one) => one.action === WORK).map((one) => one.place);
+    const taken = new Set([...works, ...[...this.cars.values()].map((one) => one.station)]);
     return this.site.places.filter((one) => !taken.has(one) && !this.blocked.has(frontOf(one)));
   }
 
+  /** B7: behind all that I have won and bid for. */
   #search(call) {
-    const { min_wheelbase_mm: least, max_wheelbase_mm: most } = this.site.cars;
-    const fits = call.wheelbase === 1_500 || (call.wheelbase >= least && call.wheelbase <= most);
-    const found = fits && this.place && this.planner().task(call, this.#free(call), this.freePlaces());
+    const bids = [...this.calls.values()].filter((one) => one.isMine && one !== call && !this.tasks.has(one.task));
+    const found = this.place && this.#arrange(this.#kept(), [...bids, call]);
     call.due = undefined;
-    if (!found) return false;
-    Object.assign(call, { steps: found.steps, cost: found.over });
+    if (!found || found.steps.length + 4 > MOST_LEGS) return false;
+    call.cost = Math.ceil(found.over / MS);
     call.due = call.heard + this.site.delay(found.over - call.floor, this.node);
     return true;
   }
 
-  #onBid({ sender, initiator, call: number, cost }, peer) {
+  onBid({ sender, initiator, call: number, cost }, peer) {
     const call = this.calls.get(`${initiator} ${number}`);
-    if (!call || !peer || this.isObstacle(peer) || this.leftOut.get(call.key)?.includes(sender)) return;
+    if (!call || !peer || this.isObstacle(peer) || this.isOut(call, sender)) return;
     const us = this.near(cost);
-    if (us < call.floor - 500 * MS || this.now > call.deadline - this.site.us.deadline_guard) return;
-    if (call.best && (call.best[0] < us || (call.best[0] === us && call.best[1] < sender))) return;
-    call.best = [us, sender];
-    call.isMine = false;
+    const isVoid = us < call.floor - 500 * MS || this.now > call.deadline - this.site.us.deadline_guard;
+    if (!isVoid && !isBeaten(call, us, sender)) Object.assign(call, { best: [us, sender], isMine: false });
+  }
+
+  #bid(call) {
+    const { due } = call;
+    const isLate = this.now >= call.deadline - 2 * this.site.us.deadline_guard;
+    const isAble = this.mayGive() && this.plan && this.hasTime() && !this.isAway() && !this.isOut(call, this.node);
+    call.due = undefined;
+    if (isLate || !isAble || !this.#search(call)) return;
+    if (call.due > due + 5 * MS && !this.isDue(call.due)) return;
+    call.due = undefined;
+    if (isBeaten(call, call.cost * MS, this.node)) return;
+    Object.assign(call, { best: [call.cost * MS, this.node], isMine: true, hasBid: true });
+    this.say("Bid", { initiator: call.initiator, call: call.number, cost: call.cost % 2 ** 32 });
   }
 
   wakeCalls() {
@@ -316,110 +319,71 @@ export class Calls extends Fleet {
       if (this.now > call.deadline + 60 * S) this.calls.delete(call.key);
     }
     for (const [key, set] of this.sets) {
-      if (!this.isDue(set.said + S)) continue;
-      this.sets.delete(key);
-      this.drop("INCOMPLETE_SET");
+      if (this.isDue(set.said + S) && this.sets.delete(key)) this.drop("INCOMPLETE_SET");
     }
-    for (const [which, one] of this.forfeits) {
-      if (!this.isDue(one.due)) continue;
-      Object.assign(one, { times: one.times + 1, due: this.at(this.now + S) });
-      this.report(which, "FORFEITED", 0, one.reason);
-      if (one.times >= 20) this.forfeits.delete(which);
+    for (const [which, [reason, times]] of this.forfeits) {
+      if (!this.every(`forfeit ${which}`, S)) continue;
+      this.report(which, "FORFEITED", 0, reason);
+      this.forfeits.set(which, [reason, times + 1]);
+      if (times === 20) this.forfeits.delete(which);
     }
-  }
-
-  #bid(call) {
-    const { due } = call;
-    const late = this.now >= call.deadline - 2 * this.site.us.deadline_guard;
-    const able = this.mayGive && this.version && this.hasTime && !this.isAway && !this.leftOut.get(call.key)?.includes(this.node);
-    if (late || !able || !this.#search(call)) return (call.due = undefined);
-    if (call.due > due + 5 * MS && !this.isDue(call.due)) return undefined;
-    call.due = undefined;
-    const cost = Math.ceil(call.cost / MS);
-    const us = cost * MS;
-    if (call.best && (call.best[0] < us || (call.best[0] === us && call.best[1] < this.node))) return undefined;
-    if (this.steps.length + call.steps.length + 4 > MOST_LEGS) return undefined;
-    Object.assign(call, { best: [us, this.node], isMine: true, hasBid: true });
-    return this.say("Bid", { initiator: call.initiator, call: call.number, cost: cost % 2 ** 32, itinerary_version: 0 });
   }
 
   // --- awards and tasks
 
-  #onAward(word) {
-    const which = task(word);
+  /** Where the load of a task will be. */
+  #sink = (which) => this.steps.findLast((one) => one.call?.task === which)?.place ?? 0;
+
+  onAward(word) {
+    const which = taskOf(word);
     const call = this.calls.get(`${word.sender} ${word.call}`);
+    const one = this.tasks.get(which);
     this.forfeits.delete(which);
     if (word.winner !== this.node || word.result !== "AWARDED") return this.#isLost(word, which);
-    const one = this.tasks.get(which);
-    if (one) return this.report(which, one.phase === "LOADED" ? "LOADED" : "AWARDED", one.sink);
+    if (one) return this.report(which, one.phase === "LOADED" ? "LOADED" : "AWARDED", this.#sink(which));
     if (this.done.has(which)) return this.report(which, "DONE", this.done.get(which));
-    const begin = call?.hasBid && this.mayTake && this.#free(call);
-    const found = begin && this.planner().task(call, begin, this.freePlaces());
+    const found = call?.hasBid && this.mayTake() && this.#arrange(this.#kept(), [call]);
     if (!found) return this.forfeit(which, call?.hasBid ? "IMPOSSIBLE" : "JOURNAL_LOST");
-    call.isMine = false;
-    this.stamp = [call.deadline_ms, call.initiator, call.number & 0xff];
-    this.take(this.kept(), call, found);
-    this.publish();
-    return this.report(which, "AWARDED", this.tasks.get(which).sink);
+    Object.assign(call, { isMine: false, phase: "AWARDED" });
+    this.stamp = this.stampOf(call);
+    this.tasks.set(which, call);
+    this.publish(found.steps);
+    return this.report(which, "AWARDED", this.#sink(which));
   }
 
-  take(kept, { steps, ...call }, found) {
-    this.steps = [...kept, ...found.steps];
-    const { phase = "AWARDED" } = this.tasks.get(call.task) ?? {};
-    this.tasks.set(call.task, { call, phase, sink: found.steps.findLast((one) => one.action === "WORK").place });
-    this.save();
-  }
-
+  /** U5. */
   forfeit(which, reason) {
     this.report(which, "FORFEITED", 0, reason);
-    if (reason !== "JOURNAL_LOST") this.forfeits.set(which, { reason, times: 1, due: this.now + S });
+    this.every(`forfeit ${which}`, S);
+    if (reason !== "JOURNAL_LOST") this.forfeits.set(which, [reason, 1]);
   }
 
+  /** U6. */
   #isLost(word, which) {
     this.calls.delete(`${word.sender} ${word.call}`);
     const one = this.tasks.get(which);
-    const isOver = word.result === "AWARDED" ? newer(word.task_version, 1, 7) : ["REJECTED", "WITHDRAWN"].includes(word.result);
-    if (!one || one.phase !== "AWARDED" || one.call.initiator !== word.sender || !isOver) return;
+    const isOver = word.result === "AWARDED" ? newer(word.task_version, 1, 7) : /REJECTED|WITHDRAWN/.test(word.result);
+    if (!isOver || one?.phase !== "AWARDED" || one.initiator !== word.sender) return;
     this.tasks.delete(which);
     if (this.hand?.which === which) this.hand = undefined;
-    this.tokens.wanted.clear();
-    this.save();
-    const kept = this.inHand().filter((step) => step.call?.task !== which);
-    if (this.remake()) return;
-    this.steps = kept;
-    this.publish();
+    if (!this.remake()) this.publish(this.inHand().filter((step) => step.call?.task !== which));
   }
 
   /** All that is left is planned anew, behind the run or the work in hand; whether there is a way. */
   remake() {
-    const planner = this.planner();
-    const kept = this.cut(this.inHand());
-    let begin = endOf(kept) ?? [this.place.track, this.place.index, this.now];
-    let steps = kept;
-    const tasks = [...this.tasks.values()].filter((one) => one.phase !== "LOADED" || !kept.some((step) => step.call?.task === one.call.task));
-    const works = new Map();
-    for (const one of tasks.filter(({ call }) => !kept.some((step) => step.call?.task === call.task))) {
-      const found = planner.task({ ...one.call, isAboard: one.phase === "LOADED" }, begin, this.freePlaces(one.call));
-      if (!found) return false;
-      const last = found.steps.findLastIndex((step) => step.action === "WORK");
-      works.set(one.call.task, found.steps[last].place);
-      steps = [...steps, ...found.steps.slice(0, last + 1)];
-      begin = endOf(steps);
-    }
-    const rest = planner.rest([begin[0], begin[1], Math.max(begin[2], this.now)]);
-    if (!rest) return false;
-    this.steps = [...steps, ...rest];
-    for (const [which, sink] of works) this.tasks.get(which).sink = sink;
-    this.publish();
-    return true;
+    const kept = this.inHand();
+    const isLeft = (call) => !kept.some((one) => one.call === call && !one.takes);
+    const found = this.#arrange(kept, [...this.tasks.values()].filter(isLeft));
+    if (found) this.publish(found.steps);
+    return Boolean(found);
   }
 
-  #onCar({ sender, car_origin, car_number, station, version, wheelbase_mm: wheelbase }) {
+  onCarAt({ sender, car_origin, car_number, station, version, wheelbase_mm: wheelbase }) {
     const car = reference(car_origin, car_number);
     const known = this.cars.get(car);
-    if (this.tokens.held.has(carKey(car)) || (known && known.version !== version && !newer(version, known.version, 16))) return;
-    if (known && known.version === version && known.by !== sender) return;
-    if (known && known.by !== sender && this.tokens.belief(carKey(car))[1] !== sender) return;
+    const { holder } = this.tokens.get(carKey(car));
+    const isOld = known && (known.version === version ? known.by !== sender : !newer(version, known.version, 16));
+    if (isOld || holder === this.node || (known && known.by !== sender && holder !== sender)) return;
     this.cars.set(car, { station, by: sender, version, wheelbase });
     if (known?.station !== station) this.beatSoon();
   }
@@ -427,7 +391,7 @@ export class Calls extends Fleet {
   // --- words
 
   report(which, phase, station, reason = "NONE") {
-    this.say("TaskReport", { task_origin: Math.floor(which / 65_536), task_number: which % 65_536, phase, station, reason });
+    this.say("TaskReport", { task_origin: which >> 16, task_number: which & 0xffff, phase, station, reason });
   }
 
   sayCar(car, { station, version, wheelbase }) {
@@ -436,30 +400,36 @@ export class Calls extends Fleet {
     return signals;
   }
 
-  publish() {
-    this.version = (this.version % 255) + 1;
-    const steps = this.steps.length ? this.steps : [{ ...this.standing(), end: this.now + MS }];
-    if (!this.steps.length) this.stamp = [Math.ceil(this.now / MS) % 2 ** 32, this.node, 0];
-    const [award, initiator, call] = this.stamp;
-    const legs = legsOf(steps, this.near(award));
-    this.legs = legs;
-    const head = { version: this.version, grade: "FIRM", legs: legs.length, stamp_award_ms: award, stamp_initiator: initiator, stamp_call: call };
-    this.plan = [["ItineraryHead", head]];
-    legs.forEach((one, leg) => {
-      const [side, line] = [one.place >> 7 & 1 ? "FAR" : "NEAR", { track: one.track, from_index: one.from, to_index: one.to }];
-      const end_ms = Math.max(0, Math.ceil((one.end - this.near(award)) / MS));
-      this.plan.push(["ItineraryLeg", { version: this.version, action: one.action, leg, side, ...line, end_ms }]);
+  /** P1, J5. */
+  publish(steps) {
+    const version = next(this.version);
+    this.steps = steps;
+    this.save();
+    if (!this.steps.length) this.stamp = [this.nowMs(), this.node, 0];
+    const [stamp_award_ms, stamp_initiator, stamp_call] = this.stamp;
+    const award = this.near(stamp_award_ms);
+    const legs = legsOf(this.steps.length ? this.steps : [this.standing()], award);
+    const head = { version, grade: "FIRM", legs: legs.length, stamp_award_ms, stamp_initiator, stamp_call };
+    const lines = legs.map(({ action, track, from: from_index, to: to_index, place, end }, leg) => {
+      const end_ms = Math.max(0, Math.ceil((end - award) / MS));
+      return { version, action, leg, side: place & 0x80 ? "FAR" : "NEAR", track, from_index, to_index, end_ms };
     });
-    for (const [name, signals] of this.plan) this.say(name, signals);
+    this.plan = { version, legs, words: [["ItineraryHead", head], ...lines.map((one) => ["ItineraryLeg", one])] };
+    this.#sayPlan();
     this.compare();
+  }
+
+  #sayPlan() {
+    for (const [name, signals] of this.plan.words) this.say(name, signals);
   }
 
   /** R3: all that I vouch for. */
   stateAll() {
-    for (const [name, signals] of this.plan ?? []) this.say(name, signals);
-    if (this.version) this.sayPlace();
-    for (const [which, one] of this.tasks) this.report(which, "AWARDED", one.sink);
-    for (const [car, one] of this.cars) if (one.by === this.node && this.tokens.held.has(carKey(car))) this.sayCar(car, one);
+    if (this.plan) this.#sayPlan();
+    if (this.plan) this.sayPlace();
+    for (const which of this.tasks.keys()) this.report(which, "AWARDED", this.#sink(which));
+    const mine = [...this.cars].filter(([car, one]) => one.by === this.node && this.tokens.holds(carKey(car)));
+    for (const [car, one] of mine) this.sayCar(car, one);
     this.tokens.state();
   }
 }

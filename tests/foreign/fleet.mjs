@@ -1,50 +1,57 @@
 // What a machine is among the others: time, presence, holds, questions and answers (chapters 2, 3, 12, 13, 14).
 import { crc32 } from "node:zlib";
 import { OUTSIDE, Site } from "./site.mjs";
-import { Tokens, carKey } from "./tokens.mjs";
+import { Tokens, carKey, keyOf } from "./tokens.mjs";
 import { CONTRACT, crc16, decode, encode, joined, singles } from "./words.mjs";
 
-const [S, MS] = [1_000_000, 1_000];
+export const [S, MS] = [1_000_000, 1_000];
 const LETTING = ["STARTING", "IDLE", "WORKING", "WAITING"];
+const RIGHTS = ["TokenGrant", "TokenHeld", "CarAt", "Award"];
+const WAITING = ["Waiting", "TaskReport", "TokenRequest", "ItineraryHead"];
 export const newer = (a, b, bits) => a !== b && (a - b + 2 ** bits) % 2 ** bits < 2 ** (bits - 1);
-const next = (n) => (n % 255) + 1;
+export const next = (n) => (n % 255) + 1;
 
 export class Fleet {
-  constructor({ node, site, digest }, journal) {
-    Object.assign(this, { node, site: new Site(site, digest), frames: [], words: [], now: 0, local: 0, next: Infinity });
-    this.boot = journal.boot ? next(journal.boot) : 1;
-    this.isAgain = Boolean(journal.boot);
-    this.epoch = journal.epoch ?? 0;
-    this.person = journal.person; // H4: the reason for which a person is needed
-    this.frozen = journal.frozen; // a list of rights that was read back
-    this.tokens = new Tokens(this, journal);
-    this.peers = new Map(this.site.nodes.filter((one) => one !== node).map((one) => [one, { node: one, heard: -Infinity, apart: 0 }]));
-    this.cars = new Map(journal.cars); // origin << 16 | number: { station, by, version, wheelbase }
-    this.blocked = new Set();
-    this.stops = new Map();
-    this.ownUntil = 0;
-    this.listenUntil = 0;
-    this.asks = new Map(); // node: [when, boot_before]
-    this.askers = new Set();
-    this.drops = new Map(); // reason: { count, told, said }
-    this.digests = [];
-    this.beatAt = 0;
-    this.beatUs = -S;
-    this.others = [...this.peers.values()];
+  constructor({ node, site, digest }, kept) {
+    Object.assign(this, { node, site: new Site(site, digest), epoch: 0, ...kept });
+    Object.assign(this, { frames: [], words: [], digests: [], blocked: new Set(), askers: new Set() });
+    Object.assign(this, { now: 0, local: 0, next: Infinity, beatUs: -S, beatAt: 0, ownUntil: 0, listenUntil: 0 });
+    this.stops = new Map(); // who stopped me: until when
+    [this.drops, this.told] = [new Map(), new Map()]; // reason: how often, now and when it was told
+    this.marks = new Map(); // what is done at most so often: when it may be again
+    this.cars = new Map(kept.cars); // origin << 16 | number: { station, by, version, wheelbase }
+    this.boot = next(kept.boot ?? 0);
+    this.isAgain = Boolean(kept.boot);
     this.rank = this.site.nodes.indexOf(node);
+    this.others = this.site.nodes.filter((one) => one !== node).map((one) => ({ node: one, heard: -Infinity }));
+    this.peers = new Map(this.others.map((one) => [one.node, one]));
+    this.tokens = new Tokens(this, kept.tokens);
+  }
+
+  /** R1: what is kept before it is said. */
+  journal() {
+    const { boot, epoch, person, frozen } = this;
+    const cars = [...this.cars].filter(([car, one]) => one.by === this.node || this.tokens.holds(carKey(car)));
+    return { boot, epoch, person, frozen: frozen?.isRead ? frozen : undefined, cars, tokens: this.tokens.journal() };
   }
 
   // --- frames and times
 
+  save = () => (this.isDirty = true);
+  tell = (name, signals) => this.frames.push(["device", ...encode("device", this.node, name, signals)]);
+  drop = (reason) => this.drops.set(reason, (this.drops.get(reason) ?? 0) + 1);
+
+  /** Whether it is time; else it is woken then. */
   isDue(us) {
     if (us > this.now) this.next = Math.min(this.next, us);
     return us <= this.now;
   }
 
-  /** Be woken then. */
-  at(us) {
-    this.isDue(us);
-    return us;
+  /** Whether it was not done for so long; then it is done now. */
+  every(what, us) {
+    if (!this.isDue(this.marks.get(what) ?? -Infinity)) return false;
+    this.marks.set(what, this.now + us);
+    return this.isDue(this.now + us) || true;
   }
 
   say(name, signals) {
@@ -52,87 +59,72 @@ export class Fleet {
     if (name === "ItineraryHead" || name === "CarAt") this.beatSoon();
   }
 
-  tell(name, signals) {
-    this.frames.push(["device", ...encode("device", this.node, name, signals)]);
-  }
-
-  save() {
-    this.isDirty = true;
-  }
-
-  journal() {
-    const { boot, epoch, person, frozen } = this;
-    const cars = [...this.cars].filter(([car, one]) => one.by === this.node || this.tokens.held.has(carKey(car)));
-    return { boot, epoch, person, frozen: frozen?.isRead ? frozen : undefined, cars, ...this.tokens.journal() };
-  }
-
-  drop(reason) {
-    if (!this.drops.has(reason)) this.drops.set(reason, { count: 0, told: 0, said: -Infinity });
-    this.drops.get(reason).count += 1;
-  }
-
-  /** One frame (or none) at a time of the own clock; what is said, and when it wants to be woken. */
+  /** One frame (or none) at a time of the own clock: what is said, and by `next` when it wants to be woken. */
   step(local, bus, number, data) {
     const slept = this.offset !== undefined && local - this.local > 2 * this.site.us.heartbeat;
-    this.local = local;
-    this.now = local + (this.offset ?? 0);
-    this.next = Infinity;
+    Object.assign(this, { local, now: local + (this.offset ?? 0), next: Infinity });
     if (slept) this.sleep();
     if (bus === "device") this.onDevice(decode(bus, number, data));
     else if (bus) this.#onFrame(number, data);
     if (this.offset !== undefined) this.goOn();
-    for (const [name, signals] of joined(this.words)) this.frames.push(["fleet", ...encode("fleet", this.node, name, signals)]);
-    const found = this.frames;
+    const words = joined(this.words).map(([name, signals]) => ["fleet", ...encode("fleet", this.node, name, signals)]);
+    const found = [...words, ...this.frames];
     [this.words, this.frames] = [[], []];
     return found;
   }
 
+  /** F2, F3. */
   #onFrame(number, data) {
     const word = data ? decode("fleet", number, data) : { fault: "UNKNOWN_IDENTIFIER" };
     const kind = word.sender > 250 ? "Gateway" : this.site.kinds.get(word.sender);
+    const peer = this.peers.get(word.sender);
     const isStop = word.name === "EmergencyStop";
     if (word.fault) return this.drop(word.fault);
     if (word.sender === this.node) return this.#onOwn(word);
-    if (!isStop && !kind) return this.drop("NOT_OF_SITE");
-    if (!isStop && !word.senders.includes(kind)) return this.drop("NOT_OF_KIND");
-    if (word.name === "BusTime") this.#onTime(word.bus_time_us);
+    if (!isStop && !word.senders.includes(kind)) return this.drop(kind ? "NOT_OF_KIND" : "NOT_OF_SITE");
+    if (word.name === "BusTime") return this.#onTime(word.bus_time_us);
     if (this.offset === undefined) return undefined;
-    this.now = this.local + this.offset;
-    const peer = this.peers.get(word.sender);
-    if (peer && word.name !== "BusTime") this.#isHeard(peer);
+    if (peer) this.#isHeard(peer);
     if (isStop || word.name === "Go") return this.#onStop(word);
     if (peer?.beat && word.name !== "Heartbeat" && this.isStranger(peer.beat)) return undefined;
     return singles(word).forEach((one) => this.hear(one, peer));
   }
 
-  #onTime(told) {
-    const error = told - this.local - (this.offset ?? 0);
-    this.timeAt = this.local;
-    if (this.offset === undefined) {
-      this.offset = error;
-      this.now = told;
-      this.begin();
-    } else if (Math.abs(error) <= 100 * MS) {
-      this.far = undefined;
-      this.offset += Math.max(-2 * MS, Math.min(2 * MS, error));
-    } else if (this.far !== undefined && Math.abs(error - this.far) <= 20 * MS) {
-      [this.offset, this.far] = [this.offset + error, undefined];
-      this.now += error;
-      this.sleep();
-    } else this.far = error;
+  /** A word's name is that of its method, but for the frames of a set, and tokens. */
+  hear(word, peer) {
+    const { name } = word;
+    if (name === "TokenAssigned") this.#onAssigned(word);
+    else if (!name.startsWith("Token")) this[`on${/^(Call|Itinerary)/.exec(name)?.[0] ?? name}`]?.(word, peer);
+    else if (peer && !this.ownUntil) this.tokens.hear(word);
+    if (peer && WAITING.includes(name)) peer.waitsUs = this.now;
   }
 
-  get hasTime() {
-    return this.far === undefined && this.local - this.timeAt <= 4 * this.site.us.bus_time;
+  /** T2, T3. */
+  #onTime(told) {
+    const error = told - this.local - (this.offset ?? 0);
+    const isSame = Math.abs(error - this.far) <= 20 * MS;
+    const [isFirst, isNear] = [this.offset === undefined, Math.abs(error) <= 100 * MS];
+    this.timeAt = this.local;
+    this.far = isFirst || isNear || isSame ? undefined : error;
+    if (this.far !== undefined) return;
+    const step = isNear && !isFirst ? Math.max(-2 * MS, Math.min(2 * MS, error)) : error;
+    this.offset = (this.offset ?? 0) + step;
+    this.now = this.local + this.offset;
+    if (isFirst) this.begin();
+    else if (!isNear) this.sleep();
   }
+
+  /** T5. */
+  hasTime = () => this.far === undefined && this.local - this.timeAt <= 4 * this.site.us.bus_time;
 
   // --- presence
 
   /** J1, R1: a life begins, or a hold ends as one. */
   begin() {
-    Object.assign(this, { started: this.now, synced: false, answered: new Set(), asked: this.now, quietUntil: this.now + 250 * MS });
+    Object.assign(this, { started: this.now, synced: false, quietUntil: this.now + 250 * MS });
+    for (const one of this.others) Object.assign(one, { hasAnswered: false, isAsked: true });
+    this.every("ask who is missing", 500 * MS);
     this.save();
-    this.tokens.asked = new Set(this.peers.keys());
     this.beat();
     this.tokens.state();
     this.say("SyncRequest", { whom: 0, boot_before: 0 });
@@ -140,105 +132,101 @@ export class Fleet {
 
   /** J9. */
   sleep() {
-    this.listenUntil = this.now + 2 * S;
-    for (const one of this.others) {
-      if (one.heard > -Infinity) this.ask(one.node, 0, this.now);
-      one.heard = Math.max(one.heard, this.now - 1);
+    this.listen();
+    for (const one of this.others.filter(({ heard }) => heard > -Infinity)) {
+      this.ask(one, 0, this.now);
+      one.heard = this.now - 1;
     }
+  }
+
+  listen() {
+    this.listenUntil = this.now + 2 * S;
     this.beatAt = this.now;
   }
 
-  isStranger({ contract, site_digest, epoch }) {
-    return contract !== CONTRACT || site_digest !== this.site.digest || epoch !== this.epoch;
-  }
+  lives = (peer) => this.now - peer.heard <= 3 * this.site.us.heartbeat;
+  isRobot = ({ node }) => this.site.kinds.get(node) === "Robot";
+  isStranger = ({ contract, site_digest, epoch }) =>
+    contract !== CONTRACT || site_digest !== this.site.digest || epoch !== this.epoch;
 
-  /** J8. */
-  get isOutvoted() {
+  /** J8: of two halves that with the lowest node-ID counts. */
+  isOutvoted() {
     const live = this.others.filter((one) => one.beat && this.lives(one));
     const strangers = live.filter((one) => this.isStranger(one.beat));
-    const friends = live.length - strangers.length + 1;
-    const lowest = Math.min(...strangers.map((one) => one.node));
-    const mine = Math.min(this.node, ...live.filter((one) => !this.isStranger(one.beat)).map((one) => one.node));
-    return strangers.length > friends || (strangers.length === friends && lowest < mine);
-  }
-
-  lives(peer) {
-    return this.now - peer.heard <= 3 * this.site.us.heartbeat;
+    const lowest = Math.min(this.node, ...live.map((one) => one.node));
+    const excess = 2 * strangers.length - live.length - 1;
+    return excess > 0 || (excess === 0 && strangers.some((one) => one.node === lowest));
   }
 
   /** J6. */
   isObstacle(peer) {
-    if (!this.lives(peer) || !peer.beat || this.isStranger(peer.beat) || !LETTING.includes(peer.beat.state) || peer.halted) return true;
-    return this.site.kinds.get(peer.node) === "Robot" && (!peer.plan || this.hasLeft(peer));
+    if (!this.lives(peer) || !peer.beat || this.isStranger(peer.beat) || peer.halted) return true;
+    return !LETTING.includes(peer.beat.state) || (this.isRobot(peer) && (!peer.plan || this.hasLeft(peer)));
   }
 
-  get isHeld() {
-    return this.stops.size > 0 || this.ownUntil > 0 || Boolean(this.person);
+  /** Reason and cause of a hold (H1, H3, H4), and whether a person is needed. */
+  get hold() {
+    const [stopper] = this.stops.keys();
+    if (this.person) return [this.person, 0, 1];
+    if (this.ownUntil) return ["DUPLICATE_NODE_ID", this.node, 0];
+    return stopper !== undefined ? ["EMERGENCY_STOP", stopper, 0] : undefined;
   }
 
-  get isAway() {
-    return this.isHeld || this.now < this.listenUntil || this.isOutvoted;
-  }
+  isAway = () => Boolean(this.hold) || this.now < this.listenUntil || this.isOutvoted();
+  mayTake = () => this.synced && !this.frozen && !this.person && !this.ownUntil;
+  mayGive = () => this.synced && !this.frozen && !this.hold;
 
-  get mayTake() {
-    return this.synced && !this.frozen && !this.person && !this.ownUntil;
-  }
-
-  get mayGive() {
-    return this.synced && !this.frozen && !this.isHeld;
-  }
-
+  /** J4. */
   digest() {
-    const plans = this.others.filter((one) => one.plan).map((one) => [one.node, one.plan.version]);
-    if (this.version) plans.push([this.node, this.version]);
-    const words = plans.sort((a, b) => a[0] - b[0]).map(([node, version]) => (node << 8) | version);
-    for (const [car, { station }] of [...this.cars].sort((a, b) => a[0] - b[0])) if (station !== OUTSIDE) words.push(car, station);
-    for (const key of [...this.blocked].sort((a, b) => a - b)) words.push((1 << 31) | key);
-    return crc16(words);
+    const plans = [...this.others, this].filter((one) => one.plan).sort((a, b) => a.node - b.node);
+    const cars = [...this.cars].filter(([, one]) => one.station !== OUTSIDE).sort((a, b) => a[0] - b[0]);
+    const blocked = [...this.blocked].sort((a, b) => a - b).map((key) => (1 << 31) | key);
+    const words = plans.map(({ node, plan }) => (node << 8) | plan.version);
+    return crc16([...words, ...cars.flatMap(([car, { station }]) => [car, station]), ...blocked]);
   }
 
-  beatSoon() {
-    this.beatAt = Math.min(this.beatAt, Math.max(this.now + 100 * MS, this.beatUs + 300 * MS));
-  }
+  /** J2: after a word that changes digests. */
+  beatSoon = () => (this.beatAt = Math.min(this.beatAt, Math.max(this.now + 100 * MS, this.beatUs + 300 * MS)));
 
   beat() {
     const { heartbeat } = this.site.us;
     const mine = { contract: CONTRACT, site_digest: this.site.digest, mirror_digest: this.digest() };
     this.say("Heartbeat", { ...mine, boot: this.boot, kind: "ROBOT", state: this.state, epoch: this.epoch });
-    const [stopper] = this.stops.keys();
-    const [reason, cause] = this.person ? [this.person, 0] : this.ownUntil ? ["DUPLICATE_NODE_ID", this.node] : ["EMERGENCY_STOP", stopper];
-    const needs_person = Number(Boolean(this.person));
-    if (this.isHeld) this.say("Halted", { machine: this.node, reason, cause, needs_person, boot: this.boot });
     const phase = Math.floor((this.rank * heartbeat) / this.site.nodes.length);
     this.beatUs = this.now;
-    this.beatAt = this.now + heartbeat - ((((this.now - phase) % heartbeat) + heartbeat) % heartbeat);
-    const lowest = this.others.every((one) => one.node > this.node || this.isObstacle(one));
-    for (const one of lowest && !this.isAway ? this.others : []) {
-      if (one.heard > -Infinity && !this.lives(one)) this.say("Halted", { machine: one.node, reason: one.reason ?? "NODE_SILENT", cause: 0, needs_person: 0, boot: one.boot ?? 0 });
+    this.beatAt = (Math.floor((this.now - phase) / heartbeat) + 1) * heartbeat + phase;
+    const [awaited] = this.isNew() ? this.missing() : [];
+    const [reason, cause, needs_person] = this.hold ?? (awaited ? ["JOURNAL_LOST", awaited.node, 0] : []);
+    if (reason) this.say("Halted", { machine: this.node, reason, cause, needs_person, boot: this.boot });
+    const isLowest = !this.isAway() && this.others.every((one) => one.node > this.node || this.isObstacle(one));
+    for (const one of this.others.filter((other) => isLowest && other.heard > -Infinity && !this.lives(other))) {
+      this.say("Halted", { machine: one.node, reason: one.reason ?? "NODE_SILENT", boot: one.boot });
     }
+  }
+
+  onHalted({ machine, sender, reason }, peer) {
+    if (machine === sender) Object.assign(peer, { halted: true, reason });
   }
 
   // --- holds
 
   #onStop({ name, sender, stopper }) {
-    if (name === "EmergencyStop") this.stops.set(sender, this.now + 30 * S);
-    else {
-      for (const one of this.stops.keys()) if (stopper === 0 || stopper === one) this.stops.delete(one);
-      if (stopper === this.node && this.person && !/JOURNAL/.test(this.person)) this.#comeBack();
-      else if (!this.stops.size) this.listenUntil = this.now + 2 * S;
-    }
     this.beatAt = this.now;
+    if (name === "EmergencyStop") return this.stops.set(sender, this.now + 30 * S);
+    for (const one of this.stops.keys()) if (stopper === 0 || stopper === one) this.stops.delete(one);
+    if (stopper === this.node && this.person && !/JOURNAL/.test(this.person)) return this.#comeBack();
+    return this.stops.size || this.listen();
   }
 
   /** H3. */
   #onOwn({ name }) {
-    const isNew = !this.ownUntil;
     if (this.offset === undefined) return;
+    if (!this.ownUntil) this.beatAt = this.now;
     this.ownUntil = this.now + 3 * this.site.us.heartbeat;
-    if (["TokenGrant", "TokenHeld", "CarAt", "Award"].includes(name)) this.holdFor("DUPLICATE_NODE_ID");
-    if (isNew) this.beatAt = this.now;
+    if (RIGHTS.includes(name)) this.holdFor("DUPLICATE_NODE_ID");
   }
 
+  /** H4. */
   holdFor(reason) {
     if (this.person !== reason) this.beatAt = this.now;
     this.person = reason;
@@ -246,98 +234,90 @@ export class Fleet {
   }
 
   #comeBack() {
-    Object.assign(this, { ownUntil: 0, person: undefined, boot: next(this.boot), isAgain: true, version: 0, listenUntil: this.now + 2 * S });
+    Object.assign(this, { ownUntil: 0, person: undefined, boot: next(this.boot), isAgain: true, plan: undefined });
+    this.listen();
     this.begin();
-  }
-
-  /** R7. */
-  isComparing(node) {
-    return !this.synced && !this.answered.has(node);
-  }
-
-  isOutdated() {
-    this.holdFor(this.isAgain ? "JOURNAL_SHORT" : "JOURNAL_LOST");
   }
 
   #wakeHolds() {
     for (const [sender, us] of this.stops) {
-      if (!this.isDue(us)) continue;
-      this.stops.delete(sender);
-      if (!this.stops.size) this.listenUntil = this.now + 2 * S;
+      if (this.isDue(us) && this.stops.delete(sender) && !this.stops.size) this.listen();
     }
     if (this.ownUntil && !this.person && this.isDue(this.ownUntil)) this.#comeBack();
     if (this.frozen && !this.frozen.isRead && this.isDue(this.frozen.said + 10 * S)) this.frozen = undefined;
-    if (this.listenUntil && this.isDue(this.listenUntil)) [this.listenUntil, this.beatAt] = [0, this.now];
-    if (this.wasAway !== this.isAway) [this.wasAway, this.beatAt] = [this.isAway, this.now];
+    this.isDue(this.listenUntil);
+    if (this.wasAway !== this.isAway()) [this.wasAway, this.beatAt] = [this.isAway(), this.now];
   }
 
   // --- questions and answers
 
-  ask(node, before, at) {
-    const known = this.asks.get(node);
-    if (!known || known[0] > at) this.asks.set(node, [at, before]);
+  /** A question to a peer is put off until then, the soonest counts. */
+  ask(peer, before, at) {
+    if (!(peer.question?.at <= at)) peer.question = { at, before };
   }
 
   #isHeard(peer) {
-    if (peer.heard === -Infinity) this.ask(peer.node, 0, this.now + 400 * MS + 5 * MS * this.rank);
+    if (peer.heard === -Infinity) this.ask(peer, 0, this.now + 400 * MS + 5 * MS * this.rank);
     peer.heard = this.now;
   }
 
   onHeartbeat(word, peer) {
-    const again = peer.boot !== undefined && (peer.boot !== word.boot || (word.state === "STARTING" && peer.beat.state !== "STARTING"));
-    if (again) {
-      Object.assign(peer, { plan: undefined, open: undefined, isStarted: true });
-      this.tokens.startsAnew(peer.node);
-      this.ask(peer.node, peer.boot, this.now);
-    }
-    if (word.state !== "OBSTACLE" && word.state !== "STOPPED") peer.halted = false;
-    Object.assign(peer, { beat: word, boot: word.boot });
-    if (word.state !== "STARTING") peer.known = word.boot;
+    const { boot, state, mirror_digest } = word;
+    const isOther = peer.boot !== boot || (state === "STARTING" && peer.beat.state !== state);
+    const isAnew = peer.boot !== undefined && isOther;
+    if (isAnew) this.ask(peer, peer.boot, this.now);
+    if (isAnew) Object.assign(peer, { plan: undefined, isStarted: true });
+    if (state !== "OBSTACLE" && state !== "STOPPED") peer.halted = false;
+    Object.assign(peer, { beat: word, boot, known: state === "STARTING" ? peer.known : boot });
     if (this.isStranger(word)) return;
-    const isSame = [this.digest(), ...this.digests.map(([, one]) => one)].includes(word.mirror_digest);
-    peer.apart = isSame || !this.version ? 0 : peer.apart + 1;
-    if (peer.apart && (peer.apart <= 3 || peer.apart % 8 === 0)) this.ask(peer.node, 0, this.now + 20 * MS + 5 * MS * this.rank);
+    const isSame = [this.digest(), ...this.digests.map(([, one]) => one)].includes(mirror_digest);
+    peer.apart = isSame || !this.plan ? 0 : peer.apart + 1;
+    const isTurn = peer.apart && (peer.apart <= 3 || peer.apart % 8 === 0);
+    if (isTurn) this.ask(peer, 0, this.now + 20 * MS + 5 * MS * this.rank);
   }
 
-  onSync({ name, sender, whom, boot_before }, peer) {
-    if (name === "SyncDone") {
-      this.asks.delete(sender);
-      if (whom !== 0 && whom !== this.node) return;
-      this.answered.add(sender);
-      this.tokens.asked.delete(sender);
-    } else if (whom === 0 || whom === this.node) {
-      if (boot_before > this.boot && !this.isAgain && this.now < this.started + 8 * S) this.isOutdated();
-      this.askers.add(sender);
-      if (whom === 0 && peer?.known && !(this.now < peer.asked + 250 * MS)) this.ask(sender, peer.known, this.now);
-    }
+  onSyncDone({ whom }, peer) {
+    peer.question = undefined;
+    if (whom === 0 || whom === this.node) Object.assign(peer, { hasAnswered: true, isAsked: false });
   }
+
+  onSyncRequest({ sender, whom, boot_before }, peer) {
+    if (whom !== 0 && whom !== this.node) return;
+    const isForgotten = boot_before && newer(boot_before, this.boot, 8) && this.now < this.started + 8 * S;
+    if (isForgotten) this.holdFor("JOURNAL_LOST");
+    this.askers.add(sender);
+    if (whom === 0 && peer?.known && !(this.now < peer.askedUs + 250 * MS)) this.ask(peer, peer.known, this.now);
+  }
+
+  /** R7: somebody who has not answered yet knows more of my rights than my journal. */
+  isComparing = (node) => !this.synced && !this.peers.get(node).hasAnswered;
+  isOutdated = () => this.holdFor(this.isAgain ? "JOURNAL_SHORT" : "JOURNAL_LOST");
+  /** R8: a first life in a fleet that has a past waits for all, else (R2) for whoever lives. */
+  isNew = () => !this.synced && !this.isAgain && this.others.some((one) => one.boot > 1);
+  mayLive = (one) => !one.halted && (this.lives(one) || this.now < this.started + 6 * S);
+  missing = () => this.others.filter((one) => !one.hasAnswered && (this.isNew() || this.mayLive(one)));
 
   #wakeSync() {
-    for (const [node, [at, boot_before]] of this.asks) {
-      const peer = this.peers.get(node);
-      if (!this.isDue(at)) continue;
-      this.asks.delete(node);
-      if (peer.apart && !boot_before && peer.beat?.mirror_digest === this.digest()) continue;
-      this.tokens.asked.add(node);
-      peer.asked = this.now;
-      this.say("SyncRequest", { whom: node, boot_before });
+    for (const one of this.others.filter(({ question }) => question && this.isDue(question.at))) {
+      const { before } = one.question;
+      one.question = undefined;
+      if (one.apart && !before && one.beat?.mirror_digest === this.digest()) continue;
+      Object.assign(one, { isAsked: true, askedUs: this.now });
+      this.say("SyncRequest", { whom: one.node, boot_before: before });
     }
-    if (this.synced) return;
-    const missing = this.others.filter((one) => !this.answered.has(one.node) && !one.halted && (this.lives(one) || this.now < this.started + 6 * S));
-    if (!missing.length && this.isDue(this.started + this.site.us.heartbeat)) this.synced = true;
-    else if (this.isDue(Math.max(this.started + this.site.us.heartbeat, this.asked + 500 * MS))) {
-      this.asked = this.now;
-      this.isDue(this.now + 500 * MS);
-      for (const one of missing) this.say("SyncRequest", { whom: one.node, boot_before: 0 });
-    }
+    if (this.synced || !this.isDue(this.started + this.site.us.heartbeat)) return;
+    this.synced = !this.missing().length;
+    if (this.synced || !this.every("ask who is missing", 500 * MS)) return;
+    for (const one of this.missing()) this.say("SyncRequest", { whom: one.node, boot_before: 0 });
   }
 
   /** R3, R4. */
   #answer() {
     if (!this.askers.size || !this.isDue(this.quietUntil)) return;
     this.stateAll();
-    for (const node of this.askers) if (this.peers.get(node)?.isStarted) this.tokens.remind(node);
-    this.tokens.seenOf((holder) => this.peers.has(holder) && !this.lives(this.peers.get(holder)));
+    const isAnew = (peer, { life }) => peer?.isStarted && this.askers.has(peer.node) && life !== peer.boot;
+    const isSilent = (peer) => peer && !this.lives(peer);
+    this.tokens.tellSeen((one) => isAnew(this.peers.get(one.by), one) || isSilent(this.peers.get(one.holder)));
     this.say("SyncDone", { whom: this.askers.size === 1 ? [...this.askers][0] : 0, boot: this.boot });
     this.askers.clear();
     this.quietUntil = this.now + 250 * MS;
@@ -345,40 +325,43 @@ export class Fleet {
 
   // --- rights made anew
 
+  #onAssigned(word) {
+    const isNew = this.frozen && !this.frozen.list.some(([key]) => key === keyOf(word));
+    if (isNew) this.frozen.list.push([keyOf(word), word.version, word.holder]);
+  }
+
   onRegeneration({ regeneration_phase: phase, epoch, lost, absent, tokens, digest }) {
-    const answer = (state, reason = "NONE", of = this.frozen?.list ?? []) => {
-      const rows = of.map(([key, version, holder]) => [key >> 24, key & 0xffffff, version, holder]).sort((a, b) => a[0] - b[0] || a[1] - b[1]);
-      const bytes = Buffer.alloc(16 * rows.length);
-      rows.flat().forEach((one, n) => bytes.writeUInt32BE(one, 4 * n));
-      const sum = rows.length ? crc32(bytes) & 0xffff : 0;
-      this.say("RegenerationState", { regeneration_phase: state, epoch, tokens: rows.length, digest: sum, reason });
-      return rows.length === tokens && sum === digest;
+    const frozen = this.frozen?.epoch === epoch && phase !== "FREEZE" ? this.frozen : undefined;
+    const list = (frozen?.list ?? []).toSorted((a, b) => a[0] - b[0]);
+    const rows = list.flatMap(([key, ...row]) => [key >> 24, key & 0xffffff, ...row]);
+    const sum = crc32(Buffer.from(Uint32Array.from(rows).buffer).swap32()) & 0xffff;
+    const isMine = absent === this.node || (lost === this.node && !/JOURNAL/.test(this.person));
+    const answer = (state, reason = "NONE") => {
+      this.say("RegenerationState", { regeneration_phase: state, epoch, tokens: list.length, digest: sum, reason });
     };
-    if (phase === "FREEZE") {
-      if (epoch !== next(this.epoch)) return answer("REFUSED", "OTHER_EPOCH", []);
-      const isHelpless = /JOURNAL/.test(this.person);
-      if (absent === this.node || (lost === this.node && !isHelpless)) return answer("REFUSED", "NOT_AUTHORISED", []);
-      if (!this.frozen) this.frozen = { epoch, lost, list: [], told: -Infinity };
-      this.frozen.said = this.now;
-      answer("FREEZE", "NONE", []);
-      if (this.now >= this.frozen.told + 4 * S) {
-        this.frozen.told = this.now;
-        this.tokens.state();
-        for (const [car, one] of this.cars) if (one.by === lost && one.station !== OUTSIDE) this.sayCar(car, one);
-        this.tokens.seenOf(() => true);
-      }
-    } else if (this.frozen?.epoch === epoch && phase === "READ_BACK") {
-      this.frozen.said = this.now;
-      this.frozen.isRead = answer("READ_BACK");
+    if (phase === "ABORT") this.frozen = undefined;
+    else if (phase === "FREEZE" && epoch !== next(this.epoch)) answer("REFUSED", "OTHER_EPOCH");
+    else if (phase === "FREEZE" && isMine) answer("REFUSED", "NOT_AUTHORISED");
+    else if (phase === "FREEZE") {
+      answer("FREEZE");
+      this.frozen = { epoch, list: [], ...this.frozen, said: this.now };
+      if (this.every("say all that is frozen", 4 * S)) this.#sayAllOf(lost);
+    } else if (phase === "READ_BACK" && frozen) {
+      answer("READ_BACK");
+      Object.assign(frozen, { said: this.now, isRead: list.length === tokens && sum === digest });
       this.save();
-    } else if (this.frozen?.epoch === epoch && phase === "COMMIT" && this.frozen.isRead) {
-      const { list } = this.frozen;
-      Object.assign(this, { epoch, frozen: undefined, beatAt: this.now, person: undefined });
+    } else if (phase === "COMMIT" && (frozen?.isRead || epoch === this.epoch)) {
+      answer("COMMIT");
       this.tokens.assign(list);
-      answer("COMMIT", "NONE", list);
-    } else if (phase === "COMMIT" && epoch === this.epoch) answer("COMMIT", "NONE", []);
-    else if (phase === "ABORT") this.frozen = undefined;
-    return undefined;
+      if (frozen) Object.assign(this, { epoch, frozen: undefined, beatAt: this.now, person: undefined });
+    }
+  }
+
+  /** G2. */
+  #sayAllOf(lost) {
+    this.tokens.state();
+    for (const [car, one] of this.cars) if (one.by === lost && one.station !== OUTSIDE) this.sayCar(car, one);
+    this.tokens.tellSeen(() => true);
   }
 
   // --- all that is due
@@ -386,18 +369,16 @@ export class Fleet {
   wakeFleet() {
     this.#wakeHolds();
     this.#wakeSync();
-    this.tokens.wake();
-    for (const [reason, one] of this.drops) {
-      if (one.count === one.told || !this.isDue(one.said + this.site.us.heartbeat)) continue;
-      Object.assign(one, { told: one.count, said: this.now });
-      this.say("Diagnostic", { reason, count: one.count });
+    for (const [reason, count] of this.drops) {
+      const isTold = this.told.get(reason) === count || !this.every(reason, this.site.us.heartbeat);
+      if (!isTold) this.say("Diagnostic", { reason, count });
+      if (!isTold) this.told.set(reason, count);
     }
     this.#answer();
     if (this.isDue(this.beatAt)) this.beat();
     this.isDue(this.beatAt);
-    const digest = this.digest();
-    if (digest !== this.lastDigest) this.digests.push([this.now + 300 * MS, this.lastDigest]);
     this.digests = this.digests.filter(([us]) => us > this.now);
-    this.lastDigest = digest;
+    if (this.digest() !== this.lastDigest) this.digests.push([this.now + 300 * MS, this.lastDigest]);
+    this.lastDigest = this.digest();
   }
 }

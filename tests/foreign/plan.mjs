@@ -1,213 +1,173 @@
-// Ways in space and time (chapter 7): legs, the windows in which they need segments, and the soonest plan around others.
-import { ANY, frontOf, reachUs } from "./site.mjs";
+// Ways in space and time (chapter 7): legs, the windows in which they need segments, and plans around others.
+import { ANY, frontOf, isSpur, reachUs } from "./site.mjs";
 
-const ROUND = 10_000;
-const MOST_GAPS = 12;
-export const endOf = (steps) => steps.at(-1) && [steps.at(-1).track, steps.at(-1).to, steps.at(-1).end];
-const isLink = (leg) => leg.action === "TRAVEL" && leg.from === leg.to;
+export const ROUND = 10_000; // T_round
+export const WORK = "WORK";
+const MOST_DELAYS = 200;
+const overlap = (a, b, other) => a < other.b - ROUND && other.a < b - ROUND;
+/** Where a thing at a station's or segment's number is. */
+export const spotOf = (key) => ({ track: key >> 8, index: key & 0x7f });
+/** Where and when a robot is behind these steps: { track, index, us }. */
+export const endOf = (steps) => steps.slice(-1).map(({ track, to, end }) => ({ track, index: to, us: end }))[0];
+export const workAt = (place, more) => {
+  return { action: WORK, track: place >> 8, from: place & 0x7f, to: place & 0x7f, place, ...more };
+};
 
-/** P4: [{ key, a, b, leg, from, to }] of legs with begin and end; the last place is kept without end. */
+/** P4: [key, from when, until when] of what a leg needs. */
+function passed(site, { action, track, from, to, begin, end, mouth }) {
+  if (action === "RIDE") return [[track << 8, begin, end]];
+  const here = [[site.at(track, to), begin, end]];
+  if (action !== "TRAVEL" || from === to) return mouth === undefined ? here : [[mouth, begin, end], ...here];
+  const [count, way] = [Math.abs(to - from), Math.sign(to - from)];
+  const [mm, half] = [count * site.pitch, (site.pitch + site.carrier.length_mm) / 2 + site.carrier.clearance_mm];
+  return Array.from({ length: count + 1 }, (_, k) => {
+    const enter = begin + reachUs(k * site.pitch - half, mm, site.carrier);
+    const leave = end - site.run(mm) + reachUs(Math.min(mm, k * site.pitch + half), mm, site.carrier);
+    return [site.at(track, from + k * way), enter, k === count ? end : Math.max(enter, leave)];
+  });
+}
+
+/** [{ key, a, b, leg, from, to }] of legs with begin and end; the last place is kept without end. */
 export function windowsOf(site, legs, isOpen = true) {
   const last = new Map();
   const found = [];
-  const add = (key, a, b, leg, ride = {}) => {
-    const before = last.get(key);
-    if (before && before.b >= a - ROUND) return Object.assign(before, { b: Math.max(before.b, b), leg, to: ride.to ?? before.to });
-    last.set(key, { key, a, b, leg, ...ride });
-    return found.push(last.get(key));
-  };
-  const { length_mm, clearance_mm } = site.carrier;
-  legs.forEach(({ action, track, from, to, begin, end, mouth }, n) => {
-    if (action === "RIDE") return add(track << 8, begin, end, n, { from, to });
-    if (action !== "TRAVEL" || from === to) {
-      if (mouth !== undefined) add(mouth, begin, end, n);
-      return add(site.at(track, to), begin, end, n);
+  legs.forEach((one, leg) => {
+    const stops = one.action === "RIDE" ? { from: one.from, to: one.to } : {};
+    for (const [key, a, b] of passed(site, one)) {
+      const before = last.get(key);
+      const isOn = before?.b >= a - ROUND;
+      if (!isOn) found.push({ key, a, b, leg, ...stops });
+      else Object.assign(before, { b: Math.max(before.b, b), leg, ...stops, from: before.from ?? stops.from });
+      if (!isOn) last.set(key, found.at(-1));
     }
-    const [step, count] = [Math.sign(to - from), Math.abs(to - from)];
-    const [mm, half] = [count * site.pitch, (site.pitch + length_mm) / 2 + clearance_mm];
-    const whole = site.run(mm);
-    for (let k = 0; k <= count; k++) {
-      const enter = begin + reachUs(k * site.pitch - half, mm, site.carrier);
-      const leave = end - whole + reachUs(Math.min(mm, k * site.pitch + half), mm, site.carrier);
-      add(site.at(track, from + k * step), enter, k === count ? end : Math.max(enter, leave), n);
-    }
-    return undefined;
   });
-  if (isOpen && found.length) last.get(site.at(legs.at(-1).track, legs.at(-1).to)).b = Infinity;
+  if (isOpen) last.get(site.at(legs.at(-1).track, legs.at(-1).to)).b = Infinity;
   return found;
 }
 
 /** Whether windows of two need the same at the same time: the first such pair. */
 export function meeting(mine, theirs) {
-  for (const one of mine) {
-    for (const other of theirs) {
-      if (one.key === other.key && one.a < other.b - ROUND && other.a < one.b - ROUND) return [one, other];
-    }
-  }
-  return undefined;
+  const pairs = mine.flatMap((one) => theirs.map((other) => [one, other]));
+  return pairs.find(([one, other]) => one.key === other.key && overlap(one.a, one.b, other));
 }
 
+/** Puts whole ways off until nobody is in the way: it waits where it stands, and then goes through. */
 export class Planner {
-  /** `busy`: key: [{ a, b, from, to }], what others need; `ends`: where they rest. */
-  constructor(site, busy, ends) {
-    Object.assign(this, { site, busy, ends });
-    this.refuges = site.refuges(ends);
+  /** `busy`: key: [{ a, b, from, to }], what others need; `refuges`: where it may rest, or nothing for no rest. */
+  constructor(site, busy, refuges) {
+    Object.assign(this, { site, busy, refuges });
   }
 
-  /** The soonest way to do a task: { steps, over } or undefined. `free` are places for its car. */
-  task(call, begin, free) {
-    const sinks = call.to === ANY ? free : [call.to];
-    const start = this.#start(begin, Math.max(begin[2], call.deadline + 150_000));
-    const taken = call.isAboard ? start : this.#work(this.#go(start, frontOf(call.source)), call.source, true, call);
-    const left = sinks.map((sink) => this.#work(this.#go(taken, frontOf(sink)), sink, false, call)).flat();
-    for (const one of left.sort((a, b) => a.us - b.us)) {
-      const rested = this.#rest([one]);
-      if (rested) return { steps: stepsOf(rested), over: one.us };
+  /** The soonest way to do a task from `start`: { steps, over } with the rest behind it, or undefined. */
+  task(call, start, free) {
+    const { source, to } = call;
+    const on = (way, from, place, takes) => {
+      return ways(this.site, from, frontOf(place)).map((more) => [...way, ...more, workAt(place, { takes, call })]);
+    };
+    const taken = call.isAboard ? [[]] : on([], start, source, true);
+    const from = call.isAboard ? start : spotOf(source);
+    const all = (to === ANY ? free : [to]).flatMap((sink) => taken.flatMap((way) => on(way, from, sink, false)));
+    return this.#soonest(start, all, Math.max(start.us, call.deadline + 150_000), call.ready);
+  }
+
+  /** The way to a refuge from standing somewhere: steps, none where it is in one. */
+  rest(start) {
+    const key = this.site.at(start.track, start.index);
+    const us = this.refuges.includes(key) ? this.#begin([{ key, a: 0, b: Infinity }], start, start.us) : undefined;
+    const all = this.refuges.flatMap((one) => ways(this.site, start, one)).filter((way) => way.length);
+    return us === undefined ? this.#soonest(start, all, start.us)?.steps : [];
+  }
+
+  #soonest(start, all, least, ready = 0) {
+    let best;
+    for (const [steps, over] of all.map((way) => timed(this.site, way)).sort((a, b) => a[1] - b[1])) {
+      if (best && least + over >= best.over) break;
+      const isWork = steps.at(-1).action === WORK;
+      const atBay = steps.find((one) => this.site.bays.has(one.place));
+      const windows = windowsOf(this.site, steps, !isWork);
+      const us = this.#begin(windows, start, Math.max(least, atBay ? ready - atBay.begin : 0));
+      if (us === undefined || best?.over <= us + over) continue;
+      const found = steps.map((one) => ({ ...one, begin: one.begin + us, end: one.end + us }));
+      const rest = isWork && this.refuges ? this.rest(endOf(found)) : [];
+      if (rest) best = { steps: [...found, ...rest], over: us + over };
+    }
+    return best;
+  }
+
+  /** The least time to begin, no sooner than `us`; where it stands until then it stands from the start. */
+  #begin(windows, start, us) {
+    const here = windows.find(({ key }, n) => n === 0 && key === this.site.at(start.track, start.index));
+    const later = (one) => {
+      const inWay = this.#needs(one).find((other) => overlap(one === here ? start.us : us + one.a, us + one.b, other));
+      return inWay && (one === here ? Infinity : inWay.b - one.a);
+    };
+    for (let n = 0; n < MOST_DELAYS && us < Infinity; n++) {
+      const found = windows.map(later).find((one) => one !== undefined);
+      if (found === undefined) return us;
+      us = found;
     }
     return undefined;
   }
 
-  /** The way to a refuge from standing somewhere. */
-  rest(begin) {
-    const rested = this.#rest(this.#start(begin, begin[2]));
-    return rested && stepsOf(rested);
-  }
-
-  #start([track, index, us], begin) {
-    const key = this.site.at(track, index);
-    return [{ us: begin, limit: this.#free(this.busy.get(key) ?? [], us), track, index, key }];
-  }
-
-  #rest(states) {
-    const here = states.filter((one) => one.limit === Infinity && this.refuges.includes(one.key));
-    if (here.length) return here[0];
-    const found = this.refuges.flatMap((key) => this.#go(states, key)).filter((one) => one.limit === Infinity);
-    return found.sort((a, b) => a.us - b.us)[0];
-  }
-
-  #go(states, key) {
-    const found = states.flatMap((state) =>
-      ways(this.site, state, key).flatMap((way) => way.reduce((now, hop) => now.flatMap((one) => this.#hop(one, hop)), [state])),
-    );
-    const best = new Map();
-    for (const one of found) if (!(best.get(one.limit)?.us <= one.us)) best.set(one.limit, one);
-    return [...best.values()];
-  }
-
-  /** All gaps that a hop can end in, each as soon as it can. */
-  #hop(state, hop) {
-    const { site } = this;
-    const still = { ...hop, begin: 0, end: hopUs(site, hop) };
-    const windows = windowsOf(site, [still], false);
-    const key = hop.action === "RIDE" ? hop.track << 8 : site.at(hop.track, hop.to);
-    const leave = windows[0].key === state.key ? windows[0].b : still.end;
-    const found = [];
-    let us = state.us;
-    for (let n = 0; n < MOST_GAPS; n++) {
-      us = this.#soonest(windows, us, hop.ride, state);
-      if (us + leave > state.limit + ROUND) break;
-      const limit = this.#free(this.#needs(key, hop.ride), us + still.end);
-      const step = { ...hop, begin: us, end: us + still.end };
-      found.push({ us: us + still.end, limit, track: hop.track, index: hop.to, key, step, before: state });
-      if (limit === Infinity || hop.action === "RIDE") break;
-      us = Math.max(us + 1, ...this.#needs(key, hop.ride).filter((one) => one.a === limit).map((one) => one.b - windows.at(-1).a));
-    }
-    return found;
-  }
-
-  #soonest(windows, begin, ride, state) {
-    let us = begin;
-    for (let again = true, n = 0; again && us < Infinity && n < 200; n++) {
-      again = false;
-      for (const one of windows) {
-        if (one.key === state.key) continue;
-        for (const { a, b } of this.#needs(one.key, ride)) {
-          if (us + one.a < b - ROUND && us + one.b > a + ROUND) [us, again] = [b - one.a, true];
-        }
-      }
-    }
-    return us;
-  }
-
   /** P6: a lift is free in the gaps between rides, less its own run to where this one begins and theirs. */
-  #needs(key, ride) {
-    const busy = this.busy.get(key) ?? [];
-    if (!ride || !this.site.liftOf(key)) return busy;
-    const run = (from, to) => (from === undefined || to === undefined ? 0 : this.site.ride(from, to));
-    return busy.map((one) => ({ a: one.a - run(ride[1], one.from), b: one.b + run(one.to, ride[0]) }));
-  }
-
-  #free(busy, us) {
-    return Math.min(Infinity, ...busy.filter((one) => one.b > us + ROUND).map((one) => Math.max(one.a, us - ROUND)));
-  }
-
-  #work(states, place, takes, call) {
-    return states.flatMap((one) => {
-      const begin = Math.max(one.us, call.ready && this.site.bays.has(place) ? call.ready : 0);
-      const end = begin + this.site.handling(place);
-      if (end > one.limit + ROUND) return [];
-      const index = place & 0x7f;
-      const step = { action: "WORK", track: place >> 8, from: index, to: index, begin, end, place, takes, call };
-      return [{ ...one, us: end, step, before: one }];
-    });
+  #needs({ key, from: first, to: last }) {
+    const run = (from, to) => from && to && this.site.ride(from, to);
+    const padded = ({ a, b, from, to }) => ({ a: a - (run(last, from) || 0), b: b + (run(to, first) || 0) });
+    return (this.busy.get(key) ?? []).map(padded);
   }
 }
 
 /** B3: the least end of a task, of a robot before the car when the call ends, all ways free. */
 export function floorOf(site, call) {
-  const free = new Planner(site, new Map(), []);
-  free.refuges = [...site.length].flatMap(([track, length]) => Array.from({ length }, (_, n) => (track << 8) | (n + 1)));
-  const before = [call.source >> 8, call.source & 0x7f, call.deadline];
-  return free.task(call, before, site.places).over;
+  return new Planner(site, new Map()).task(call, { ...spotOf(call.source), us: call.deadline }, site.places).over;
 }
 
-export function hopUs(site, hop) {
-  if (hop.action === "RIDE") return site.ride(hop.from, hop.to);
-  return isLink(hop) ? site.run(site.pitch) + site.carrier.turn_ms * 1_000 : site.run(Math.abs(hop.to - hop.from) * site.pitch);
+export function hopUs(site, { action, from, to, place }) {
+  if (action === WORK) return site.handling(place);
+  if (action === "RIDE") return site.ride(from, to);
+  return from === to ? site.run(site.pitch) + site.carrier.turn_ms * 1_000 : site.run(Math.abs(to - from) * site.pitch);
 }
 
-/** All ways from where a state is to a segment, as hops. */
+/** Steps without a pause, from 0 on, and how long they last. */
+function timed(site, way) {
+  let us = 0;
+  const steps = way.map((hop) => {
+    const begin = us;
+    us += hopUs(site, hop);
+    return { ...hop, begin, end: us };
+  });
+  return [steps, us];
+}
+
+/** All ways from where something is to a segment, as hops. */
 function ways(site, { track, index }, key) {
   const [goal, end] = [key >> 8, key & 0xff];
   const travel = (on, from, to) => (from === to ? [] : [{ action: "TRAVEL", track: on, from, to }]);
+  const link = (into, mouth) => ({ action: "TRAVEL", track: into >> 8, from: into & 0xff, to: into & 0xff, mouth });
   if (track === goal) return [travel(track, index, end)];
-  const [here, there] = [track, goal].map((one) => site.spurs.find((spur) => spur.track === one));
-  if (here) {
-    const link = { action: "TRAVEL", track: here.mouth >> 8, from: here.mouth & 0xff, to: here.mouth & 0xff, mouth: (track << 8) | 1 };
-    const out = [...travel(track, index, 1), link];
-    return ways(site, { track: here.mouth >> 8, index: here.mouth & 0xff }, key).map((one) => [...out, ...one]);
+  if (isSpur(track)) {
+    const { mouth } = site.spurOf(track);
+    const out = [...travel(track, index, 1), link(mouth, (track << 8) | 1)];
+    return ways(site, spotOf(mouth), key).map((on) => [...out, ...on]);
   }
-  if (there) {
-    const link = { action: "TRAVEL", track: goal, from: 1, to: 1, mouth: there.mouth };
-    return ways(site, { track, index }, there.mouth).map((one) => [...one, link, ...travel(goal, 1, end)]);
+  if (isSpur(goal)) {
+    const { mouth } = site.spurOf(goal);
+    const into = [link((goal << 8) | 1, mouth), ...travel(goal, 1, end)];
+    return ways(site, { track, index }, mouth).map((on) => [...on, ...into]);
   }
   return site.lifts.filter((one) => one.floors.includes(track) && one.floors.includes(goal)).map((lift) => {
-    const ride = [lift.floors.indexOf(track) + 1, lift.floors.indexOf(goal) + 1];
-    const hop = (one) => ({ ...one, ride });
-    const on = travel(track, index, site.sill(lift, track));
-    return [...on, { action: "RIDE", track: lift.track, from: ride[0], to: ride[1] }, ...travel(goal, site.sill(lift, goal), end)].map(hop);
+    const [from, to] = [track, goal].map((floor) => lift.floors.indexOf(floor) + 1);
+    const ride = { action: "RIDE", track: lift.track, from, to };
+    return [...travel(track, index, site.sill(lift, track)), ride, ...travel(goal, site.sill(lift, goal), end)];
   });
-}
-
-function stepsOf(state) {
-  const steps = [];
-  for (let one = state; one.step; one = one.before) steps.unshift(one.step);
-  return steps;
 }
 
 /** P1, P2: steps as told: what waits between them, and where the first begins. */
 export function legsOf(steps, awardUs) {
-  const legs = [];
-  let us = awardUs;
-  for (const one of steps) {
-    const isLater = one.begin > us + ROUND;
-    if (isLater && (legs.length || one.action === "TRAVEL")) {
-      const [track, index] = one.mouth !== undefined ? [one.mouth >> 8, one.mouth & 0xff] : [one.track, one.from];
-      legs.push({ action: "STAND", track, from: index, to: index, begin: us, end: one.begin });
-    }
-    legs.push(one);
-    us = one.end;
-  }
-  return legs;
+  return steps.flatMap((one, n) => {
+    const begin = n ? steps[n - 1].end : awardUs;
+    const { track, index } = one.mouth === undefined ? { track: one.track, index: one.from } : spotOf(one.mouth);
+    const stand = { action: "STAND", track, from: index, to: index, begin, end: one.begin };
+    return one.begin > begin + ROUND && (n || one.action === "TRAVEL") ? [stand, one] : [one];
+  });
 }
-

@@ -1,258 +1,193 @@
-// The tokens of one machine (chapter 8), kept and told as a journal has them. A key is kind << 24 | number.
+// The tokens of one machine (chapter 8): all that it knows of one stands in one record, by kind << 24 | number.
 const KINDS = ["SEGMENT", "STATION", "CAR", "TASK"];
+const LOW = 0xfffff;
 export const stationKey = (place) => (1 << 24) | place;
 export const carKey = (car) => (2 << 24) | car;
-const of = (key) => ({ token_kind: KINDS[key >> 24], token: key & 0xffffff });
-const isSegment = (key) => key >> 24 === 0;
-const LOW = 0xfffff;
+export const keyOf = ({ token_kind, token }) => (KINDS.indexOf(token_kind) << 24) | token;
+export const isSegment = (key) => key < 1 << 24;
 
 export class Tokens {
-  constructor(robot, journal) {
-    this.robot = robot;
-    this.held = new Map(journal.held);
-    this.seen = new Map(journal.seen); // the newest version that I did anything with
-    this.given = new Map(journal.given); // key: [version, new holder], the last give of each
-    this.leaving = new Map(); // key: { version, to, times, due }
-    for (const [key, version, to] of journal.leaving ?? []) this.leaving.set(key, { version, to, times: 0, due: 0 });
-    this.believed = new Map(journal.believed); // key: [version, holder]
-    this.wanted = new Map(); // key: { times, due, since, isTold }
-    this.disputed = new Map(); // key: the grant that waits for a chain
-    this.unproved = new Map(); // key: [giver, version, holder], given away by word and not confirmed
-    this.stated = new Map(); // node: key: version, what it said itself that it holds
-    this.before = new Map(); // the same, in its life before
-    this.asked = new Set(); // whom I asked for all
-    this.carAt = new Map(); // C3: what goes before each repeat of a car's grant
-    this.requests = new Map(); // key: node: { us, plan, predecessor }
-    this.paceUs = 0;
+  constructor(robot, kept = []) {
+    Object.assign(this, { robot, node: robot.node, all: new Map() });
+    this.repeatUs = robot.site.us.token_repeat;
+    for (const one of kept) Object.assign(this.get(one.key), one);
   }
 
+  /** Of each: the newest version and its holder, as a chain tells (K6); the last give; the grant under way. */
   journal() {
-    const leaving = [...this.leaving].map(([key, one]) => [key, one.version, one.to]);
-    return { held: [...this.held], seen: [...this.seen], given: [...this.given], believed: [...this.believed], leaving };
+    return [...this.all.values()].map(({ key, version, holder, given, leaving }) => {
+      return { key, version, holder, given, leaving: leaving && { ...leaving, times: 0, due: 0 } };
+    });
+  }
+
+  get(key) {
+    if (!this.all.has(key)) this.all.set(key, { key, version: 0, holder: this.#firstHolder(key), open: new Map() });
+    return this.all.get(key);
   }
 
   /** K1. */
-  firstHolder(key) {
-    const { site } = this.robot;
-    if (key >> 24 >= 2) return (key >> 16) & 0xff;
-    if (key >> 24 === 1 && site.bays.has(key & 0xffff)) return site.bays.get(key & 0xffff);
-    return (isSegment(key) && site.homes.get(key)) || site.stewards.get((key >> 8) & 0xff);
+  #firstHolder(key) {
+    const { keeper, homes, stewards } = this.robot.site;
+    if (isSegment(key)) return homes.get(key) ?? stewards.get(key >> 8);
+    return key >> 24 === 1 ? keeper(key & 0xffff) : (key >> 16) & 0xff;
   }
 
-  /** C1: who keeps a station, and so the car in it. */
-  keeper(place) {
-    return this.robot.site.bays.get(place) ?? this.robot.site.stewards.get(place >> 8);
+  holds = (key) => this.get(key).holder === this.node;
+  /** Those that I hold, but for what was never given. */
+  mine = () => [...this.all.values()].filter((one) => one.holder === this.node && one.version);
+  /** Of those the ones in line with a segment, 15 to either side. */
+  inLine(key) {
+    return this.mine().filter((one) => isSegment(key) && one.key >> 8 === key >> 8 && Math.abs(one.key - key) < 16);
   }
 
-  holds(key) {
-    return this.held.has(key) || (!this.seen.has(key) && this.firstHolder(key) === this.robot.node);
-  }
+  #say = (name, { key, version }, signals = {}) =>
+    this.robot.say(name, { token_kind: KINDS[key >> 24], token: key & 0xffffff, version, ...signals });
 
-  version(key) {
-    return this.held.get(key) ?? this.seen.get(key) ?? 0;
-  }
+  // --- what is said by itself
 
-  belief(key) {
-    return this.believed.get(key) ?? [0, this.firstHolder(key)];
-  }
-
-  /** K9. */
-  want(key) {
-    if (!this.holds(key) && !this.wanted.has(key)) this.wanted.set(key, { times: 0, due: 0, since: this.robot.now });
-  }
-
-  wake() {
+  /** K3, K9: what the robot needs now is asked for, what is under way is granted again. */
+  wake(needed) {
     const { robot } = this;
-    const pause = (times) => (times <= 3 ? robot.site.us.token_repeat : Math.min(25 * robot.site.us.token_repeat, robot.site.us.token_repeat << Math.min(times - 3, 10)));
-    for (const [key, one] of this.wanted) {
-      if (!robot.isDue(one.due) || (one.times > 3 && !robot.isDue(this.paceUs))) continue;
-      Object.assign(one, { times: one.times + 1, due: robot.at(robot.now + pause(one.times + 1)) });
-      if (one.times > 3) this.paceUs = robot.now + 100_000;
-      const claim = isSegment(key) ? robot.claim(key) : { itinerary_version: robot.version, predecessor: 0 };
-      robot.say("TokenRequest", { ...of(key), version_seen: Math.max(this.version(key), this.belief(key)[0]) & LOW, ...claim });
-    }
-    for (const [key, one] of robot.synced ? this.leaving : []) {
-      if (!robot.isDue(one.due)) continue;
-      Object.assign(one, { times: one.times + 1, due: robot.at(robot.now + pause(one.times + 1)) });
-      this.#grant(key, one);
+    for (const key of needed) if (!this.holds(key)) this.get(key).want ??= { times: 0, due: 0 };
+    for (const one of this.all.values()) {
+      if (!needed.has(one.key)) one.want = undefined;
+      const isAsked = one.want && this.#isAgain(one.want);
+      if (isAsked) this.#say("TokenRequest", one, { version_seen: one.version & LOW, ...robot.claim(one.key) });
+      if (robot.synced && one.leaving && this.#isAgain(one.leaving)) this.#grant(one);
     }
   }
 
-  #grant(key, one) {
-    one.said = this.robot.now;
-    if (this.carAt.has(key)) this.robot.say("CarAt", this.carAt.get(key));
-    this.robot.say("TokenGrant", { ...of(key), version: one.version, holder: one.to });
+  #isAgain(one) {
+    if (!this.robot.isDue(one.due)) return false;
+    one.times += 1;
+    one.due = this.robot.now + Math.min(25, 2 ** Math.max(0, one.times - 3)) * this.repeatUs;
+    return this.robot.isDue(one.due) || true;
+  }
+
+  #grant(one) {
+    const [version, holder] = one.given;
+    one.leaving.said = this.robot.now;
+    if (one.leaving.carAt) this.robot.say("CarAt", one.leaving.carAt);
+    this.#say("TokenGrant", one, { version, holder });
   }
 
   /** K3, K4: several at once, so that what goes together has one version. */
-  give(keys, to) {
-    const version = Math.max(...keys.map((key) => Math.max(this.version(key), ...this.#inLine(key)))) + 1;
-    for (const key of keys) {
-      const due = this.robot.now + this.robot.site.us.token_repeat;
-      this.held.delete(key);
-      this.seen.set(key, version);
-      this.given.set(key, [version, to]);
-      this.believed.set(key, [version, to]);
-      this.leaving.set(key, { version, to, times: 1, due, said: this.robot.now });
-      this.requests.get(key)?.delete(to);
-    }
-    for (const key of keys) this.robot.say("TokenGrant", { ...of(key), version, holder: to });
+  give(keys, to, carAt = undefined) {
+    const versions = keys.flatMap((key) => [this.get(key), ...this.inLine(key)]).map((one) => one.version);
+    const version = Math.max(...versions) + 1;
     this.robot.save();
-  }
-
-  #inLine(key) {
-    const found = [];
-    for (const step of isSegment(key) ? [1, -1] : []) {
-      for (let one = key + step; this.held.has(one) && one >> 8 === key >> 8 && Math.abs(one - key) < 16; one += step) found.push(this.held.get(one));
-    }
-    return found;
-  }
-
-  #hold(key, version) {
-    if (isSegment(key)) this.robot.seesOrder(true);
-    this.held.set(key, version);
-    this.seen.set(key, version);
-    this.believed.set(key, [version, this.robot.node]);
-    for (const table of [this.leaving, this.wanted, this.disputed]) table.delete(key);
-    this.robot.save();
-  }
-
-  // --- what is heard
-
-  hear(word) {
-    const key = (KINDS.indexOf(word.token_kind) << 24) | word.token;
-    const { robot } = this;
-    const { sender, version } = word;
-    if (this.robot.isComparing(sender) && this.holds(key) && /Held|Given|Seen/.test(word.name) && version > this.version(key)) this.robot.isOutdated();
-    if (word.name === "TokenGrant" && word.holder === robot.node) this.#offered(key, word);
-    else if (word.name === "TokenGrant" || word.name === "TokenGiven") this.#passed(key, sender, version, word.holder);
-    else if (word.name === "TokenHeld") this.#stated(key, sender, version);
-    else if (word.name === "TokenDispute" && word.believed === robot.node) this.#answer(key);
-    else if (word.name === "TokenRequest") this.#requested(key, word);
-    else if (word.name === "TokenRefusal" && word.requester === robot.node && this.wanted.has(key)) this.#refused(key, word);
-  }
-
-  #offered(key, { sender, version, ...word }) {
-    const { robot } = this;
-    if (!robot.mayTake) return;
-    const [known, holder] = this.belief(key);
-    if (version <= this.version(key) || this.holds(key)) this.#answer(key);
-    else if (sender === holder && version > known) {
-      this.#hold(key, version);
-      robot.say("TokenHeld", { ...of(key), version });
-    } else if (sender !== holder) {
-      this.disputed.set(key, { sender, version, ...word });
-      robot.say("TokenDispute", { ...of(key), version, believed: holder });
+    for (const one of keys.map((key) => this.get(key))) {
+      const leaving = { times: 1, due: this.robot.now + this.repeatUs, carAt };
+      Object.assign(one, { version, holder: to, given: [version, to], leaving, by: 0 });
+      one.open.delete(to);
+      this.#grant(one);
     }
   }
-
-  #passed(key, giver, version, to) {
-    this.stated.get(giver)?.delete(key);
-    if (this.holds(key)) {
-      if (giver !== this.robot.node) this.#claimed(key);
-    } else if (to !== this.robot.node && giver === this.belief(key)[1] && version > this.belief(key)[0]) {
-      this.unproved.set(key, [giver, version, to]);
-      this.#verified(key, version, to);
-    }
-  }
-
-  #stated(key, holder, version) {
-    if (this.holds(key)) return this.#claimed(key);
-    const [known, believed] = this.belief(key);
-    if (version < known) return this.robot.say("TokenSeen", { ...of(key), version: known, holder: believed });
-    if (holder !== believed && !this.asked.has(holder)) return undefined;
-    if (!this.stated.has(holder)) this.stated.set(holder, new Map());
-    this.stated.get(holder).set(key, version);
-    this.unproved.delete(key);
-    return this.#verified(key, version, holder);
-  }
-
-  #claimed(key) {
-    this.robot.drop("RIGHT_CLAIMED");
-    this.#answer(key);
-  }
-
-  #verified(key, version, holder) {
-    this.believed.set(key, [version, holder]);
-    if (this.leaving.get(key)?.version <= version) {
-      this.leaving.delete(key);
-      this.carAt.delete(key);
-      this.robot.save();
-    }
-    const waiting = this.disputed.get(key);
-    this.disputed.delete(key);
-    if (waiting) this.#offered(key, waiting);
-  }
-
-  #answer(key) {
-    if (this.holds(key)) this.robot.say("TokenHeld", { ...of(key), version: this.version(key) });
-    else if (this.given.has(key)) this.robot.say("TokenGiven", { ...of(key), version: this.given.get(key)[0], holder: this.given.get(key)[1] });
-  }
-
-  /** K10, K11: every request is remembered, whoever holds the token. */
-  #requested(key, { sender, itinerary_version: plan, predecessor }) {
-    const leaving = this.leaving.get(key);
-    if (leaving?.to === sender && this.robot.now > leaving.said + 20_000) this.#grant(key, leaving);
-    if (!this.requests.has(key)) this.requests.set(key, new Map());
-    this.requests.get(key).set(sender, { us: this.robot.now, plan, predecessor });
-    if (!this.holds(key) || !this.robot.mayGive) return;
-    const reason = this.robot.objection(key, sender, this.requests.get(key).get(sender));
-    if (!reason) this.give([key], sender);
-    else this.robot.say("TokenRefusal", { ...of(key), version: this.version(key) & LOW, requester: sender, reason });
-  }
-
-  /** Whose turn it is by its request, the oldest first; 0 for nobody's. */
-  nextOf(key) {
-    const lapsed = this.robot.now - 62.5 * this.robot.site.us.token_repeat;
-    const open = [...(this.requests.get(key) ?? [])].filter(([, one]) => one.us > lapsed);
-    return open.find(([node, one]) => !this.robot.objection(key, node, one))?.[0] ?? 0;
-  }
-
-  #refused(key, { sender, reason }) {
-    const one = this.wanted.get(key);
-    if (sender !== this.belief(key)[1]) return;
-    const isSoon = reason === "MIRROR_BEHIND" || !isSegment(key);
-    one.due = this.robot.now + this.robot.site.us.token_repeat * (isSoon ? 5 : 25);
-    if (isSegment(key)) this.robot.seesOrder(reason !== "MIRROR_BEHIND");
-    if (isSegment(key) && !one.isTold) this.robot.waits(key, sender, reason);
-    one.isTold = true;
-  }
-
-  // --- what is told
 
   /** R1, R3. */
   state() {
-    for (const [key, version] of this.held) this.robot.say("TokenHeld", { ...of(key), version });
-    for (const [key, { version, to }] of this.leaving) this.robot.say("TokenGiven", { ...of(key), version, holder: to });
+    for (const one of this.mine()) this.#say("TokenHeld", one);
+    for (const one of this.all.values()) if (one.leaving) this.#answer(one);
   }
 
-  /** R4: to who was restarted, and said itself what it held and gave. */
-  startsAnew(node) {
-    this.before.set(node, this.stated.get(node) ?? new Map());
-    this.stated.delete(node);
-  }
-
-  remind(node) {
-    for (const [key, version] of this.before.get(node) ?? []) {
-      if (this.belief(key)[1] === node && !this.stated.get(node)?.has(key)) this.robot.say("TokenSeen", { ...of(key), version, holder: node });
-    }
-    for (const [key, [giver, version, holder]] of this.unproved) {
-      if (giver === node) this.robot.say("TokenSeen", { ...of(key), version, holder });
-    }
-  }
-
-  /** R3: what is held by who does not live; G2: all that I saw. */
-  seenOf(isWanted) {
-    for (const [key, [version, holder]] of this.believed) {
-      if (holder !== this.robot.node && isWanted(holder)) this.robot.say("TokenSeen", { ...of(key), version, holder });
+  /** R3: what is held by who does not live; R4: what who was restarted said in its life before; G2: all. */
+  tellSeen(isWanted) {
+    for (const one of this.all.values()) {
+      if (!this.holds(one.key) && one.version && isWanted(one)) this.#say("TokenSeen", one, { holder: one.holder });
     }
   }
 
   /** G3, G4: a list of rights counts. */
   assign(list) {
-    for (const [key, version, holder] of list) {
-      if (holder === this.robot.node) this.#hold(key, version);
-      else this.believed.set(key, [version, holder]);
+    for (const [key, version, holder] of list) this.#know(this.get(key), version, holder, 0);
+  }
+
+  // --- what is heard
+
+  hear(word) {
+    const { robot } = this;
+    const { name, sender, version } = word;
+    const one = this.get(keyOf(word));
+    const [isMine, isToMe] = [this.holds(one.key), word.holder === this.node];
+    const isStated = /Held|Given|Seen/.test(name) && robot.isComparing(sender);
+    if (isStated && isMine && version > one.version) robot.isOutdated();
+    if (name === "TokenRequest") this.#requested(one, word);
+    else if (name === "TokenRefusal" && word.requester === this.node) this.#refused(one, word);
+    else if (name === "TokenDispute" && word.believed === this.node) this.#answer(one);
+    else if (name === "TokenGrant" && isToMe) this.#offered(one, word);
+    else if (isMine && /Grant|Held|Given/.test(name)) {
+      if (!isToMe) robot.drop("RIGHT_CLAIMED");
+      this.#answer(one);
+    } else if (name === "TokenHeld") this.#stated(one, sender, version);
+    else if (/Grant|Given/.test(name) && !isToMe && sender === one.holder && version > one.version) {
+      this.#know(one, version, word.holder, sender);
     }
+  }
+
+  /** K5, K7. */
+  #offered(one, word) {
+    const { sender, version } = word;
+    if (!this.robot.mayTake()) return;
+    if (this.holds(one.key) || version <= one.given?.[0]) this.#answer(one);
+    else if (sender !== one.holder) {
+      one.disputed = word;
+      this.#say("TokenDispute", one, { version, believed: one.holder });
+    } else if (version > one.version) {
+      if (isSegment(one.key)) this.robot.seesOrder(true);
+      this.#know(one, version, this.node, 0);
+      this.#answer(one);
+    }
+  }
+
+  /** K6, K8: who says that it holds it, whom I believe to, or whom I asked for all. */
+  #stated(one, sender, version) {
+    const isKnown = sender === one.holder || this.robot.peers.get(sender).isAsked;
+    if (version < one.version) this.#say("TokenSeen", one, { holder: one.holder });
+    else if (isKnown) this.#know(one, version, sender, sender);
+  }
+
+  #know(one, version, holder, by) {
+    const { disputed } = one;
+    Object.assign(one, { version, holder, by, life: this.robot.peers.get(by)?.boot, disputed: undefined });
+    if (version >= one.given?.[0]) one.leaving = undefined;
+    if (holder === this.node) one.want = undefined;
+    this.robot.save();
+    if (disputed && holder !== this.node) this.#offered(one, disputed);
+  }
+
+  #answer(one) {
+    const [version, holder] = one.given ?? [];
+    if (this.holds(one.key)) this.#say("TokenHeld", one);
+    else if (version) this.#say("TokenGiven", one, { version, holder });
+  }
+
+  /** K10, K11: every request is remembered, whoever holds the token. */
+  #requested(one, { sender, itinerary_version: plan, predecessor }) {
+    const { robot } = this;
+    const isUnheard = one.leaving && one.holder === sender && robot.now > one.leaving.said + 20_000;
+    if (isUnheard) this.#grant(one);
+    one.open.delete(sender);
+    one.open.set(sender, { us: robot.now, plan, predecessor });
+    if (!this.holds(one.key) || !robot.mayGive()) return;
+    const reason = robot.objection(one.key, sender, one.open.get(sender));
+    if (!reason) this.give([one.key], sender);
+    else this.#say("TokenRefusal", one, { version: one.version & LOW, requester: sender, reason });
+  }
+
+  /** Whose turn it is by its request, the oldest first; 0 for nobody's. */
+  nextOf(key) {
+    const open = [...this.get(key).open].filter(([, one]) => one.us > this.robot.now - 62.5 * this.repeatUs);
+    return open.find(([node, one]) => !this.robot.objection(key, node, one))?.[0] ?? 0;
+  }
+
+  #refused(one, { sender, reason }) {
+    const { robot } = this;
+    if (sender !== one.holder || !one.want) return;
+    const isSoon = reason === "MIRROR_BEHIND" || !isSegment(one.key);
+    one.want.due = robot.now + this.repeatUs * (isSoon ? 5 : 25);
+    if (!isSegment(one.key)) return;
+    robot.seesOrder(reason !== "MIRROR_BEHIND");
+    if (!one.want.isTold) robot.waits(one.key, sender, reason);
+    one.want.isTold = true;
   }
 }

@@ -1,4 +1,4 @@
-// Frames by the table that is generated from the DBC files (python -m tests.foreign.table), and what F1 to F8 ask of them.
+// Frames by the table that is generated from the DBC files (python -m tests.foreign.table), and what F1 to F8 ask.
 import { readFileSync } from "node:fs";
 
 const TABLE = JSON.parse(readFileSync(new URL("contract.json", import.meta.url), "utf8"));
@@ -77,7 +77,8 @@ export function joined(words) {
 
 function goesOn(run, [name, signals]) {
   const [last, one] = run.at(-1);
-  if (name !== last || !(name in RUNS) || one.token_kind !== "SEGMENT" || signals.token_kind !== "SEGMENT") return false;
+  const isSegments = [one, signals].every(({ token_kind }) => token_kind === "SEGMENT");
+  if (name !== last || !(name in RUNS) || !isSegments) return false;
   const step = signals.token - one.token;
   const inLine = Math.abs(step) === 1 && (run.length === 1 || step === one.token - run.at(-2)[1].token);
   const same = Object.keys(one).every((key) => key === "token" || key === RUNS[name] || one[key] === signals[key]);
