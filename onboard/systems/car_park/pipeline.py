@@ -2,9 +2,8 @@
 
 With drivers one behind the other outside, cars go in and out by turns: the robot that brings one finds the bay locked
 and empty behind the robot that took the other. Without a queue the next car is called for while a driver still gets
-into his own, at a bay that is an exit alone while the car before it is still fetched; drivers, who cannot be seen
-outside, are invited after ``MOST_OUT`` cars at the latest. With ``call_at = "key"`` in the site file nothing is called
-for ahead (row P50's order), and they take turns in any case.
+into his own; drivers, who cannot be seen outside, are invited after ``MOST_OUT`` cars at the latest. With ``call_at =
+"key"`` in the site file nothing is called for ahead (row P50's order), and they take turns in any case.
 """
 
 from collections import deque
@@ -97,13 +96,9 @@ class Pipeline:
         return due_us if due_us > self._looked_us else None
 
     @property
-    def _is_exit(self) -> bool:
-        return self.park.bay_uses.get(self.fleet.node_id) is BayUse.EXIT
-
-    @property
     def _is_drivers_turn(self) -> bool:
         """Drivers come one behind the other, or might: nobody has looked for long. Where the key calls: by turns."""
-        if self._is_exit:
+        if self.park.bay_uses.get(self.fleet.node_id) is BayUse.EXIT:
             return self.is_queued
         return self.is_queued or self.outs >= MOST_OUT if self.is_on else self.outs >= MOST_OUT_BY_KEY
 
@@ -191,15 +186,11 @@ class Pipeline:
         if job is None or self.calls.ahead is not None or not self.tickets or not self.is_on:
             return []
         door_us = self.park.timing.door_us
-        taken_us = self.calls.taken_at_us(now_us) if job.winner and not job.is_given_back else None
         if job.operation is Operation.PARK:
+            taken_us = self.calls.taken_at_us(now_us) if job.winner and not job.is_given_back else None
             return [] if taken_us is None else self.call(max(taken_us, now_us) + door_us, now_us)
-        if phase is BayPhase.HANDOVER:
-            return [] if self._is_drivers_turn else self.call(now_us + DRIVER_US + door_us, now_us)
-        if taken_us is None or not self._is_exit:
-            return []
-        # Nobody comes in between: another robot fetches the next one while that of the job is on its way.
-        return self.call(max(taken_us, now_us) + DRIVER_US + 2 * door_us, now_us)
+        is_over_soon = phase is BayPhase.HANDOVER and not self._is_drivers_turn
+        return self.call(now_us + DRIVER_US + door_us, now_us) if is_over_soon else []
 
     def call(self, ready_us: int, now_us: int) -> list[Effect]:
         """Call for the first car that is asked for; the bay can take it from ``ready_us`` on."""
