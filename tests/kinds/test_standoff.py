@@ -68,8 +68,10 @@ def test_who_stands_aboard_rides_on_where_nobody_before_the_sill_can_let_it_out(
     assert (moves[0].action, moves[0].track) == (LegAction.RIDE, PLATFORM.track)
 
 
-def standing(holon: Holon, here: Segment, way: list[CarStep]) -> ParkingRobot:
-    """A robot that takes part and stands ``here``, before what it wants to do."""
+def standing(here: Segment, way: list[CarStep]) -> ParkingRobot:
+    """A robot on one floor that takes part and stands ``here``, before what it wants to do."""
+    site = one_floor(robots=2)
+    holon = Holon(site, site.machines[ME], factory_for(site, site.machines[ME].kind), boot=1)
     holon.start(0)
     holon.tokens.trust()
     robot = holon.behaviour
@@ -115,10 +117,8 @@ WORKING = (
 
 def test_who_can_only_go_back_makes_room_for_who_works() -> None:
     """On a drawn site both stood for ever, one on its way to a bay, the other on its way out of the alley's end."""
-    site = one_floor(robots=2)
-    holon = Holon(site, site.machines[ME], factory_for(site, site.machines[ME].kind), boot=1)
     here = Segment(1, 2)
-    robot = standing(holon, here, [CarStep(LegAction.TRAVEL, 1, 2, 8, NOW_US, NOW_US + 15_000_000)])
+    robot = standing(here, [CarStep(LegAction.TRAVEL, 1, 2, 8, NOW_US, NOW_US + 15_000_000)])
     facing(robot, here, WORKING, Segment(1, 3))
     plans = plans_of(robot, here)
     assert plans, "both stand for ever"
@@ -127,10 +127,8 @@ def test_who_can_only_go_back_makes_room_for_who_works() -> None:
 
 def test_who_faces_another_that_still_wants_its_place_does_not_come_behind_it() -> None:
     """On a drawn site the other had no way around me and came behind me; each told later times for the other's."""
-    site = one_floor(robots=2)
-    holon = Holon(site, site.machines[ME], factory_for(site, site.machines[ME].kind), boot=1)
     here = Segment(1, 2)
-    robot = standing(holon, here, [CarStep(LegAction.TRAVEL, 1, 2, 8, NOW_US, NOW_US + 15_000_000)])
+    robot = standing(here, [CarStep(LegAction.TRAVEL, 1, 2, 8, NOW_US, NOW_US + 15_000_000)])
     facing(robot, here, WORKING, Segment(1, 3))
     fleet = robot.fleet
     asks = TokenRequest(OTHER, TokenKind.SEGMENT, segment_token(here).number, 0, 1, 0)
