@@ -15,7 +15,7 @@ from onboard.core.site import Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.program import CarHandling, HandlingPhase, Program, StationWork
-from onboard.ways.mirror import WayFleet
+from onboard.ways.mirror import WayFleet, WayMirror
 
 #: So long it stands where another robot is to take the car away, us, and so long where a driver is to go with it.
 ROBOT_PATIENCE_US = 10_000_000
@@ -65,15 +65,16 @@ class KeptOut:
         return work
 
     def _is_wanted(self, bay: Station) -> bool:
-        """Whether another robot plans to take the car out of the bay."""
-        plans = self.fleet.mirror.itineraries.values()
-        return any(works_at(plan, bay) for plan in plans if plan.sender != self.fleet.node_id)
+        """Whether another robot plans to take the car out of the bay; whoever brought it there has done so already."""
+        mirror = self.fleet.mirror
+        others = [plan for plan in mirror.itineraries.values() if plan.sender != self.fleet.node_id]
+        return any(will_work(mirror, plan, bay) for plan in others)
 
 
-def works_at(itinerary: Itinerary, station: Station) -> bool:
-    """Whether a plan has work at a station."""
-    return any(
-        leg.action is LegAction.WORK
-        and (leg.track, leg.to_index, leg.side) == (station.track, station.index, station.side)
-        for leg in itinerary.legs
-    )
+def will_work(mirror: WayMirror, plan: Itinerary, station: Station) -> bool:
+    """Whether a plan has work at a station that is not behind its machine by that one's own word."""
+    told = mirror.progress.get(plan.sender)
+    behind = told.leg if told is not None and told.itinerary_version == plan.version else 0
+    place = station.track, station.index, station.side
+    works = [leg for leg in plan.legs[behind:] if leg.action is LegAction.WORK]
+    return any((leg.track, leg.to_index, leg.side) == place for leg in works)

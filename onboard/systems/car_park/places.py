@@ -6,16 +6,15 @@ lower stamp; the other leaves its car elsewhere. A place in which a car stands i
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from onboard.contract.messages import Itinerary
 from onboard.core.authority import station_token
 from onboard.core.serial import ranks_before
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
-from onboard.systems.car_park.kept_out import works_at
+from onboard.systems.car_park.kept_out import will_work
 from onboard.systems.car_park.program import CarHandling, HandlingPhase, StationWork
 from onboard.systems.car_park.site import ANY_CLASS, car_park, class_of_end
 from onboard.ways.mirror import WayFleet
@@ -74,11 +73,5 @@ class PlaceChoice:
         holder = self.fleet.tokens.holder_of(station_token(station))
         if holder == me or mine is None:
             return False
-        rivals = [one for one in mirror.itineraries.values() if one.sender != me and self._will_work(one, station)]
+        rivals = [one for one in mirror.itineraries.values() if one.sender != me and will_work(mirror, one, station)]
         return any(one.sender == holder or ranks_before(one.stamp, mine.stamp) for one in rivals)
-
-    def _will_work(self, plan: Itinerary, station: Station) -> bool:
-        """Whether a plan has work there that is not behind its machine by that one's own word."""
-        told = self.fleet.mirror.progress.get(plan.sender)
-        behind = told.leg if told is not None and told.itinerary_version == plan.version else 0
-        return works_at(replace(plan, legs=plan.legs[behind:]), station)
