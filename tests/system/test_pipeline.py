@@ -1,6 +1,7 @@
 """Compartments as pipelines: who comes in is called for while he drives, and the next car while the bay still works."""
 
 import asyncio
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -20,7 +21,7 @@ from onboard.contract.messages import (
     TaskReport,
 )
 from onboard.systems.car_park.pipeline import MOST_OUT
-from onboard.ways.site import way_site
+from onboard.ways.site import BayUse, way_site
 from tests.sites import at_arrival, at_the_key, one_floor
 from tests.system.scene import Scene, play, stays
 from tests.thinned import some
@@ -66,6 +67,17 @@ def test_a_ticket_is_called_for_at_once_with_the_time_from_which_the_bay_can_tak
     done_us = max(time_us for time_us, one in two.all(TaskReport, "fleet") if one.phase is TaskPhase.DONE)
     doors = [one for time_us, one in two.all(DoorState) if begun_us < time_us < done_us]
     assert doors and all(one.input_door is DoorPosition.LOCKED and one.light is LightColour.RED for one in doors)
+
+
+def test_two_robots_fetch_at_the_same_time_for_one_bay() -> None:
+    """On a drawn site four robots had nothing to do while cars came out one by one, a customer each 150 s."""
+    uses = {1: BayUse.ENTRY, 2: BayUse.ENTRY, 3: BayUse.EXIT}
+    scene = play(replace(at_arrival(find_site("standard")), bay_uses=uses), stays((0, 300), (1, 300)))
+    assert_served(scene, 2, 2)
+    first, second = (call.task for _, call in calls(scene, Operation.RETRIEVE))
+    loaded_us, _ = scene.first(TaskReport, lambda one: (one.task, one.phase) == (second, TaskPhase.LOADED))
+    done_us, _ = scene.first(TaskReport, lambda one: (one.task, one.phase) == (first, TaskPhase.DONE))
+    assert loaded_us < done_us, "the second car is aboard before the first is in the bay"
 
 
 def test_with_the_key_nothing_is_called_for_before_it_and_nobody_is_fetched_while_the_bay_works() -> None:

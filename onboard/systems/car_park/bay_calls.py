@@ -313,6 +313,20 @@ class BayCalls:
             return False
         return record.custodian not in (robot, self.fleet.node_id) or custody.place_of(self.fleet, job.car) is not None
 
+    def swap(self, robot: int) -> list[Effect]:
+        """The car of the next task comes before that of the job, for which nothing is in the bay: it goes out first.
+
+        One record says both, so that no crash comes between. No effect where ``robot`` does not have it aboard.
+        """
+        job, ahead = self.job, self.ahead
+        if job is None or ahead is None or job.operation is Operation.PARK or ahead.winner != robot:
+            return []
+        record = self.fleet.mirror.cars.get(ahead.car)
+        if record is None or (record.custodian, record.station) != (robot, ANY_STATION):
+            return []
+        self.job, self.ahead = ahead, job
+        return [job_record(ahead.task, Operation.RETRIEVE, ahead.car, ahead.wheelbase_mm)]
+
     def settle(self, task: BayTask, now_us: int) -> list[Effect]:
         """Taken up from the journal without a winner: whoever has it says so first.
 

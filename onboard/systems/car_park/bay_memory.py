@@ -181,13 +181,8 @@ class BayMemory:
 
     def _take_task(self, record: JournalRecord) -> None:
         match record:
-            case BayJobRecord(operation=operation, car=car):
-                self.job, self.was_granted = (record.task, operation, car, record.wheelbase_mm), False
-                self.car_class = record.car_class
-                if operation is Operation.RETRIEVE and car in self.tickets:
-                    self.tickets.remove(car)
-                if self.ahead is not None and self.ahead[0] == record.task:
-                    self.ahead = None
+            case BayJobRecord():
+                self._take_job(record)
             case AheadRecord(car=car):
                 self.ahead = record.task, car, record.wheelbase_mm
                 if car in self.tickets:
@@ -200,6 +195,17 @@ class BayMemory:
                 self.job = None
             case TokenGivenRecord() if self.bay == (record.kind, record.number):
                 self.was_granted = True
+
+    def _take_job(self, record: BayJobRecord) -> None:
+        """The task in hand; the next one that comes before a fetch in hand has changed places with it."""
+        before, car = self.job, record.car
+        self.job, self.was_granted = (record.task, record.operation, car, record.wheelbase_mm), False
+        self.car_class = record.car_class
+        if record.operation is Operation.RETRIEVE and car in self.tickets:
+            self.tickets.remove(car)
+        if self.ahead is not None and self.ahead[0] == record.task:
+            is_fetch = before is not None and before[1] is Operation.RETRIEVE
+            self.ahead = (before[0], before[2], before[3]) if before is not None and is_fetch else None
 
     def next_reference(self, fleet: WayFleet) -> tuple[Reference, Record]:
         """The name of the next car or task of this node, and what is to be written before it is used."""

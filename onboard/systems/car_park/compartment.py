@@ -25,7 +25,7 @@ from onboard.contract.codes import (
     Reason,
     TokenKind,
 )
-from onboard.contract.constants import OUTSIDE
+from onboard.contract.constants import NOBODY, OUTSIDE
 from onboard.contract.messages import (
     BayState,
     CarAt,
@@ -87,6 +87,8 @@ class Compartment:
     promises: Promises = field(init=False)
     _key: DeskInput | None = None
     _robot_waits: bool = False
+    #: Who last asked for the bay while it waited for another.
+    _other_waits: int = NOBODY
 
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
@@ -210,6 +212,7 @@ class Compartment:
             if key.kind is TokenKind.CAR and self.fleet.mirror.car_station(self.job.car) != self.station:
                 return self.stewardship.may_grant(key, requester, now_us)
             if requester != self.job.winner or self.calls.has_another(requester):
+                self._other_waits = requester
                 return Reason.TOKEN_NOT_GRANTABLE_YET
             self._robot_waits = True
             is_open = self._is(DoorName.OUTPUT, DoorPosition.OPEN) and self._is(DoorName.INPUT, DoorPosition.LOCKED)
@@ -342,10 +345,8 @@ class Compartment:
         found = bay_task.admitted(bay, self._park, self.fleet.mirror, charging=key is DeskInput.CHARGING_KEY)
         if isinstance(found, DeskText):
             return [self.outputs.show(found, Reference(0, 0))]
-        effects: list[Effect] = []
-        is_called = self.job is not None and found == ANY_CLASS
-        if self.job is not None and not is_called:
-            effects += self.calls.not_come(now_us)
+        effects = [] if self.job is None or found == ANY_CLASS else self.calls.not_come(now_us)
+        is_called = self.job is not None
         if self.job is None:
             car, number = self.memory.next_reference(self.fleet)
             self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm, car_class=found)
@@ -367,18 +368,14 @@ class Compartment:
     def _when_entering(self, now_us: int) -> list[Effect]:
         """Somebody drives in, and a robot is called for: until the key is pressed, or nobody is there any more."""
         assert self.bay is not None and self.job is not None
-        if self._key is not None:
-            key, self._key = self._key, None
-            admitted = self._admit(key, now_us)
-            if self.phase is BayPhase.LOCKING:
-                return admitted
-            self._go(BayPhase.FREE)
-            return [*self.calls.not_come(now_us), *admitted]
-        is_gone = not self.bay.person_inside and not self.bay.load_kg
-        if is_gone or now_us >= self.pipeline.entering_until_us:
-            self._go(BayPhase.FREE)
-            return self.calls.not_come(now_us)
-        return []
+        key, self._key = self._key, None
+        admitted = [] if key is None else self._admit(key, now_us)
+        is_there = self.bay.person_inside or self.bay.load_kg
+        comes = key is None and is_there and now_us < self.pipeline.entering_until_us
+        if comes or self.phase is BayPhase.LOCKING:
+            return admitted
+        self._go(BayPhase.FREE)
+        return [*self.calls.not_come(now_us), *admitted]
 
     def _when_locking(self, now_us: int) -> list[Effect]:
         assert self.bay is not None and self.job is not None
@@ -415,11 +412,13 @@ class Compartment:
         if self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
             has_left = self.job.has_left(self.bay, self.fleet.mirror)
             return self._left(self.job) if has_left else self.calls.call_for(self.job, now_us)
+        swapped = [] if self._robot_waits else self.calls.swap(self._other_waits)
+        self._robot_waits |= bool(swapped)
         is_locked = self._is(DoorName.INPUT, DoorPosition.LOCKED) and not self.bay.person_inside
         if not self._robot_waits or not self.job.winner or not is_locked:
-            return []
+            return swapped
         self._go(BayPhase.OPENING)
-        return self.outputs.door(DoorName.OUTPUT, DoorAction.OPEN)
+        return swapped + self.outputs.door(DoorName.OUTPUT, DoorAction.OPEN)
 
     def _when_opening(self, now_us: int) -> list[Effect]:
         self._go(BayPhase.SERVING if self._is(DoorName.OUTPUT, DoorPosition.OPEN) else BayPhase.OPENING)

@@ -1,9 +1,10 @@
 """What a compartment does before its bay is free for it: who comes in next, who goes out, and what is called for.
 
 With drivers one behind the other outside, cars go in and out by turns: the robot that brings one finds the bay locked
-and empty behind the robot that took the other. Without a queue the next car is called for while a driver still gets
-into his own; drivers, who cannot be seen outside, are invited after ``MOST_OUT`` cars at the latest. With ``call_at =
-"key"`` in the site file nothing is called for ahead (row P50's order), and they take turns in any case.
+and empty behind the robot that took the other. Without a queue the next car is called for while another robot still
+brings the one before; whichever is there first goes out first. Drivers, who cannot be seen outside, are invited after
+``MOST_OUT`` cars at the latest. With ``call_at = "key"`` in the site file nothing is called for ahead (row P50's order),
+and they take turns in any case.
 """
 
 from collections import deque
@@ -185,12 +186,15 @@ class Pipeline:
         job = self.calls.job
         if job is None or self.calls.ahead is not None or not self.tickets or not self.is_on:
             return []
-        door_us = self.park.timing.door_us
-        if job.operation is Operation.PARK:
-            taken_us = self.calls.taken_at_us(now_us) if job.winner and not job.is_given_back else None
-            return [] if taken_us is None else self.call(max(taken_us, now_us) + door_us, now_us)
-        is_over_soon = phase is BayPhase.HANDOVER and not self._is_drivers_turn
-        return self.call(now_us + DRIVER_US + door_us, now_us) if is_over_soon else []
+        door_us, is_parked = self.park.timing.door_us, job.operation is Operation.PARK
+        if self._is_drivers_turn and not is_parked:
+            return []
+        if phase is BayPhase.HANDOVER and not is_parked:
+            return self.call(now_us + DRIVER_US + door_us, now_us)
+        # Another robot fetches the next one while that of the job is on its way.
+        taken_us = self.calls.taken_at_us(now_us) if job.winner and not job.is_given_back else None
+        driver_us = 0 if is_parked else DRIVER_US + door_us
+        return [] if taken_us is None else self.call(max(taken_us, now_us) + driver_us + door_us, now_us)
 
     def call(self, ready_us: int, now_us: int) -> list[Effect]:
         """Call for the first car that is asked for; the bay can take it from ``ready_us`` on."""

@@ -293,16 +293,18 @@ class DayModel:
 
     def _begin_out(self, bay: _BayModel, now_us: int, locked_us: int, since_us: int) -> None:
         bay.is_free = False
+        known_us = now_us + (0 if bay.ahead else self._site.timing.call_window_us + KNOWN_AFTER_US)
         person, served = bay.ahead or self._fetch(bay, now_us, locked_us)
         bay.ahead, bay.ahead_ready_us = None, None
         handed_us = max(served.at_bay_us, locked_us) + self._close_us
         gone_us = handed_us + self._open_us + REACTION_US + person.acts.drive_out_us
         bay.busy_us += gone_us - since_us
         self._found.ready_us.append(handed_us - person.asked_us)
-        self._at(handed_us, lambda then_us: self._hand_over(bay, gone_us + self._close_us, then_us))
+        self._at(known_us, lambda then_us: self._brings(bay, gone_us + self._close_us, then_us))
         self._at(gone_us, lambda then_us: self._drive_away(bay, person, then_us))
 
-    def _hand_over(self, bay: _BayModel, ready_us: int, now_us: int) -> None:
+    def _brings(self, bay: _BayModel, ready_us: int, now_us: int) -> None:
+        """It is known when a robot comes with a car; another may fetch the next one meanwhile."""
         if not self._is_drivers_turn(bay):
             self._may_call_ahead(bay, ready_us, now_us)
 
