@@ -3,8 +3,8 @@
 With drivers one behind the other outside, cars go in and out by turns: the robot that brings one finds the bay locked
 and empty behind the robot that took the other. Without a queue the next car is called for while another robot still
 brings the one before; whichever is there first goes out first. Drivers, who cannot be seen outside, are invited after
-``MOST_OUT`` cars at the latest. With ``call_at = "key"`` in the site file nothing is called for ahead (row P50's order),
-and they take turns in any case.
+``MOST_OUT`` cars at the latest. With ``call_at = "key"`` in the site file nothing is called for ahead (row P50's
+order), and they take turns in any case.
 """
 
 from collections import deque
