@@ -18,11 +18,11 @@ from onboard.contract.messages import (
     TokenRefusal,
     TokenRequest,
 )
-from onboard.core.authority import TokenKey
+from onboard.core.authority import TokenKey, segment_token
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.negotiation import EVENT_TYPES
 from onboard.core.serial import from_bus_ms, successor
-from onboard.core.site import Station
+from onboard.core.site import Segment, Station
 from onboard.systems.car_park import bay_task, custody
 from onboard.systems.car_park.bay_memory import BayMemory, ahead_over_record, ahead_record, job_over_record, job_record
 from onboard.systems.car_park.bay_task import REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask
@@ -53,6 +53,8 @@ class BayCalls:
     on_won: Callable[[BayTask], None]
     job: BayTask | None = None
     ahead: BayTask | None = None
+    #: Who has asked for the bay just now though another is to come.
+    asks_too: int = NOBODY
     #: A car that is moved while nobody waits (``quiet_moves.py``): it needs no bay, and is never called anew.
     move: BayTask | None = None
     #: Whether rights were made anew and customers are to hear that no ticket is known any more; None: they never were.
@@ -313,16 +315,19 @@ class BayCalls:
             return False
         return record.custodian not in (robot, self.fleet.node_id) or custody.place_of(self.fleet, job.car) is not None
 
-    def swap(self, robot: int) -> list[Effect]:
+    def swap(self) -> list[Effect]:
         """The car of the next task comes before that of the job, for which nothing is in the bay: it goes out first.
 
-        One record says both, so that no crash comes between. No effect where ``robot`` does not have it aboard.
+        One record says both, so that no crash comes between. No effect where the robot that has asked for the bay has
+        no right to the slot in front of it, which one has at a time, or has another car aboard, or none.
         """
-        job, ahead = self.job, self.ahead
+        robot, self.asks_too = self.asks_too, NOBODY
+        job, ahead, slot = self.job, self.ahead, Segment(self.station.track, self.station.index)
         if job is None or ahead is None or job.operation is Operation.PARK or ahead.winner != robot:
             return []
         record = self.fleet.mirror.cars.get(ahead.car)
-        if record is None or (record.custodian, record.station) != (robot, ANY_STATION):
+        is_there = self.fleet.tokens.holder_of(segment_token(slot)) == robot
+        if not is_there or record is None or (record.custodian, record.station) != (robot, ANY_STATION):
             return []
         self.job, self.ahead = ahead, job
         return [job_record(ahead.task, Operation.RETRIEVE, ahead.car, ahead.wheelbase_mm)]

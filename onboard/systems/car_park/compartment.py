@@ -25,7 +25,7 @@ from onboard.contract.codes import (
     Reason,
     TokenKind,
 )
-from onboard.contract.constants import NOBODY, OUTSIDE
+from onboard.contract.constants import OUTSIDE
 from onboard.contract.messages import (
     BayState,
     CarAt,
@@ -87,8 +87,6 @@ class Compartment:
     promises: Promises = field(init=False)
     _key: DeskInput | None = None
     _robot_waits: bool = False
-    #: Who last asked for the bay while it waited for another.
-    _other_waits: int = NOBODY
 
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
@@ -212,7 +210,7 @@ class Compartment:
             if key.kind is TokenKind.CAR and self.fleet.mirror.car_station(self.job.car) != self.station:
                 return self.stewardship.may_grant(key, requester, now_us)
             if requester != self.job.winner or self.calls.has_another(requester):
-                self._other_waits = requester
+                self.calls.asks_too = requester
                 return Reason.TOKEN_NOT_GRANTABLE_YET
             self._robot_waits = True
             is_open = self._is(DoorName.OUTPUT, DoorPosition.OPEN) and self._is(DoorName.INPUT, DoorPosition.LOCKED)
@@ -412,7 +410,7 @@ class Compartment:
         if self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
             has_left = self.job.has_left(self.bay, self.fleet.mirror)
             return self._left(self.job) if has_left else self.calls.call_for(self.job, now_us)
-        swapped = [] if self._robot_waits else self.calls.swap(self._other_waits)
+        swapped = self.calls.swap()
         self._robot_waits |= bool(swapped)
         is_locked = self._is(DoorName.INPUT, DoorPosition.LOCKED) and not self.bay.person_inside
         if not self._robot_waits or not self.job.winner or not is_locked:
@@ -428,7 +426,7 @@ class Compartment:
         """The robot has had the bay and gave it back: steps 13 and 14."""
         assert self.job is not None and self.bay is not None
         if not self.job.was_granted or not self.fleet.tokens.holds(station_token(self.station)):
-            return []
+            return [] if self.job.was_granted else self.calls.swap()
         phase, effects = self.calls.bay_came_back(now_us, is_loaded=bool(self.bay.load_kg))
         if phase is None:
             return []
