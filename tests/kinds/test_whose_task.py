@@ -1,5 +1,7 @@
 """Compartment and robot come to agree whose a task is, whatever either of them missed, forgot or believed too late."""
 
+import pytest
+
 from onboard.contract.codes import CallResult, Grade, LegAction, Reason, TaskPhase
 from onboard.contract.constants import ANY_STATION, NOBODY
 from onboard.contract.messages import (
@@ -107,14 +109,19 @@ def test_a_bay_that_a_robot_had_and_did_nothing_in_waits_for_whoever_has_the_tas
     assert called(after_a_while(bay)[1]) == [TASK], "nobody has it: it is called for"
 
 
-def test_what_nobody_could_do_is_called_for_as_soon_as_a_robot_is_back() -> None:
+@pytest.mark.parametrize(
+    "word",
+    [SyncRequest(CHEAP, BAY, 0), TaskReport(CHEAP, Reference(BAY, 9), TaskPhase.DONE, PLACE.number, Reason.NONE)],
+    ids=["it has come back", "it is through with a task"],
+)
+def test_what_nobody_could_do_is_called_for_as_soon_as_a_robot_may(word: SyncRequest | TaskReport) -> None:
     bay = waiting()
     bay.hears(GIVEN_BACK)
     deeds: list[Deed] = []
     while not any(isinstance(word, Award) and word.result is CallResult.REFUSED for word in deeds):
         bay, deeds = after_a_while(bay)
     assert called(after_a_while(bay)[1]) == [], "that waits for half a minute"
-    bay.hears(SyncRequest(CHEAP, BAY, 0))
+    bay.hears(word)
     assert called(after_a_while(bay)[1]) == [TASK]
 
 

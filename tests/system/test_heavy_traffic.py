@@ -10,13 +10,13 @@ from onboard.contract.codes import Grade, TaskPhase
 from onboard.contract.messages import Bid, Itinerary, Stamp, TaskReport
 from tests.system.scene import Scene, play
 
-CARS = 14
+CARS = 16
 
 
 @pytest.fixture(scope="module")
 def rush() -> Scene:
-    """A car every 25 s, fetched soon after; so dense that robots met head-on before plans kept their order."""
-    return play(find_site("standard"), Demand.by_mean(25, 10, 3, count=CARS), limit_s=2_400)
+    """A car every 20 s, fetched soon after; so dense that robots met head-on before plans kept their order."""
+    return play(find_site("standard"), Demand.by_mean(20, 10, 3, count=CARS), limit_s=2_400)
 
 
 def test_p44_everybody_is_served_and_the_machines_never_stand_still(rush: Scene) -> None:

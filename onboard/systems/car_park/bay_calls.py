@@ -39,6 +39,9 @@ ASK_AGAIN_US = 10_000_000
 #: A winner whose plan has no work at all, and whose car is another's, has lost the task after this, us: one that finds
 #: no way gives it back sooner (``going_around.KEEP_US``), and one that has not heard of it has been told meanwhile.
 NOTHING_SHOWN_US = 13_000_000
+#: So often nobody can take a car to be parked while robots are at work before its driver is told to take it back: after
+#: some two minutes (``bay_task.RETRY_US``), in which a robot is through with a task.
+MOST_PUT_OFF = 2
 
 
 @dataclass
@@ -92,12 +95,16 @@ class BayCalls:
         """
         if isinstance(request, SyncRequest):
             machine = self.fleet.site.machines.get(request.sender)
-            for task in self.in_hand() if machine is not None and machine.kind is KindCode.ROBOT else ():
-                task.may_be_served(now_us)
+            if machine is not None and machine.kind is KindCode.ROBOT:
+                self._may_be_served(now_us)
             return []
         wanted = TokenKey(request.token_kind, request.token)
         found = (task for task in self.in_hand() if wanted == car_token(*task.car))
         return [effect for task in found for effect in task.remind(self.fleet.node_id, request.sender)]
+
+    def _may_be_served(self, now_us: int) -> None:
+        for task in self.in_hand():
+            task.may_be_served(now_us)
 
     def refused_to_winner(self, refusal: TokenRefusal, now_us: int) -> list[Effect] | None:
         """The car's custodian knows of no winner; None where the word is about nothing of mine."""
@@ -129,8 +136,14 @@ class BayCalls:
             return self.stewardship.claimed(report, self.memory) if is_robot else []
         if not is_robot:
             return []
+        if report.phase is TaskPhase.DONE:
+            # Its plan has room again.
+            self._may_be_served(now_us)
+        return self._of_robot(report, task, now_us)
+
+    def _of_robot(self, report: TaskReport, task: BayTask | None, now_us: int) -> list[Effect]:
         if task is None:
-            is_moved = self.move is not None and self.move.task == name
+            is_moved = self.move is not None and self.move.task == report.task
             return [] if is_moved else bay_task.withdrawal(self.fleet.node_id, report)
         if report.phase is TaskPhase.DONE and task.operation is Operation.RETRIEVE and report.sender == task.winner:
             return self._fetch_anew(task, now_us) if report.station != self.station.number else []
@@ -253,6 +266,12 @@ class BayCalls:
                 self._drop_ahead() if bay_task.is_gone(ahead.car, self.fleet.mirror) else self.call_for(ahead, now_us)
             )
         return effects
+
+    def is_put_off(self, task: BayTask) -> bool:
+        """Whether nobody could take a task though robots are at work: their plans may be full, and have room soon."""
+        mirror = self.fleet.mirror
+        plans = (plan for node, plan in mirror.itineraries.items() if node not in mirror.obstacles.machines)
+        return task.refusals <= MOST_PUT_OFF and any(has_work(plan) for plan in plans)
 
     @property
     def _is_full(self) -> bool:

@@ -119,7 +119,7 @@ class BayTask:
         self.retry_at_us = now_us + min(LONGEST_RETRY_US, RETRY_US << min(self.refusals - 1, 10))
 
     def may_be_served(self, now_us: int) -> None:
-        """A robot has come back: where nobody could before, this is called for as soon as it may bid."""
+        """A robot has come back, or is done: where nobody could before, this is called for as soon as it may bid."""
         if self.refusals and self.retry_at_us is not None:
             self.retry_at_us = min(self.retry_at_us, now_us + SETTLING_US)
 

@@ -478,8 +478,9 @@ class Compartment:
             self._go(BayPhase.FREE)
             return self.calls.not_come(now_us)
         job.refused(reason, now_us)
+        is_over = job.operation is Operation.PARK and not self.calls.is_put_off(job)
         said = f"nobody can {job.operation.name.lower()} car {job.car.number}: {reason.name}; called again later"
-        return [Report(said), *(self._give_back(job) if job.operation is Operation.PARK else [])]
+        return [Report(said), *(self._give_back(job) if is_over else [])]
 
     def _give_back(self, job: BayTask) -> list[Effect]:
         if self.phase is BayPhase.HANDOVER:

@@ -7,7 +7,7 @@ from onboard.contract.codes import DeskText, KindCode, Operation
 from onboard.contract.messages import Reference
 from onboard.core.effects import Effect
 from onboard.systems.car_park.bay_calls import BayCalls
-from onboard.systems.car_park.bay_task import BayPhase
+from onboard.systems.car_park.bay_task import BayPhase, BayTask
 from onboard.systems.car_park.outputs import BayOutputs
 from onboard.ways.mirror import WayFleet
 
@@ -29,40 +29,46 @@ class Outage:
 
     def review(self, phase: BayPhase, now_us: int) -> list[Effect]:
         """Tell each who waits once that nobody comes, and again that it is to be waited for once somebody may."""
-        waiting = self._waiting()
-        due_us = self._due_us(phase)
-        if due_us is None or now_us < due_us:
-            again = [car for car in waiting if car in self._told and not self._is_being_served(car)]
-            self._told.clear()
-            return [self.outputs.show(DeskText.PLEASE_WAIT, car) for car in again]
+        due = self._due_us(phase)
+        is_out = {car: due_us is not None and now_us >= due_us for car, due_us in due.items()}
+        again = [car for car, out in is_out.items() if car in self._told and not out and not self._is_being_served(car)]
+        self._told = {car for car in self._told if is_out.get(car)}
         # Who puts the ticket in again reads first that it was taken.
         asks = self.outputs.shown
-        untold = [car for car in waiting if car not in self._told or asks == (DeskText.PLEASE_WAIT, car)]
+        untold = [
+            car for car, out in is_out.items() if out and (car not in self._told or asks == (DeskText.PLEASE_WAIT, car))
+        ]
         self._told.update(untold)
-        return [self.outputs.show(DeskText.OUT_OF_ORDER, car) for car in untold]
+        told = [self.outputs.show(DeskText.PLEASE_WAIT, car) for car in again]
+        return told + [self.outputs.show(DeskText.OUT_OF_ORDER, car) for car in untold]
 
     def next_wake(self, phase: BayPhase) -> int | None:
         """When those who wait are to be told, bus us; None where they were, or none waits, or a robot may come."""
-        due_us = self._due_us(phase)
-        return due_us if due_us is not None and any(car not in self._told for car in self._waiting()) else None
-
-    def _waiting(self) -> list[Reference]:
-        job = self.calls.job
-        asked = [] if job is None or job.operation is not Operation.RETRIEVE else [job.car]
-        return [*asked, *self.tickets]
+        due = (due_us for car, due_us in self._due_us(phase).items() if car not in self._told)
+        return min((one for one in due if one is not None), default=None)
 
     def _is_being_served(self, car: Reference) -> bool:
         """Whether its robot has had the bay: the next that its customer reads is that it is ready."""
         job = self.calls.job
         return job is not None and job.car == car and job.was_granted
 
-    def _due_us(self, phase: BayPhase) -> int | None:
-        """From when on nobody comes: the robot that has the task stands, or where none has it, all of the site."""
-        job, obstacles = self.calls.job, self.fleet.mirror.obstacles.machines
+    def _due_us(self, phase: BayPhase) -> dict[Reference, int | None]:
+        """From when on nobody comes to each who waits, as the robot stands that has the bay's task, or his own."""
+        job = self.calls.job
+        fetched = [task for task in self.calls.in_hand() if task.operation is Operation.RETRIEVE]
         if job is None or phase not in _WAITS:
-            return None
-        machines = self.fleet.site.machines.values()
-        robots = [job.winner] if job.winner else [one.node_id for one in machines if one.kind is KindCode.ROBOT]
+            return dict.fromkeys([*(task.car for task in fetched), *self.tickets])
+        bay_us = self._out_from_us(job)
+        due: dict[Reference, int | None] = dict.fromkeys(self.tickets, bay_us)
+        for task in fetched:
+            times = (bay_us, self._out_from_us(task))
+            due[task.car] = min((one for one in times if one is not None), default=None)
+        return due
+
+    def _out_from_us(self, task: BayTask) -> int | None:
+        """When whoever has a task, or all of the site where nobody has it, is known not to come soon."""
+        obstacles, machines = self.fleet.mirror.obstacles.machines, self.fleet.site.machines.values()
+        robots = [task.winner] if task.winner else [one.node_id for one in machines if one.kind is KindCode.ROBOT]
         if not all(node in obstacles for node in robots):
             return None
         return max((obstacles[node].since_us for node in robots), default=0) + OUT_AFTER_US

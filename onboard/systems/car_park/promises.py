@@ -104,7 +104,14 @@ class Promises:
         job = self.calls.job
         if phase is BayPhase.HANDOVER and job is not None and job.car in self.waiting:
             self._is_there(self.waiting[job.car], now_us)
-        return [effect for car, one in self.waiting.items() for effect in self._tell(car, one, now_us)]
+        is_after_driver = phase is not BayPhase.HANDOVER and job is not None and job.operation is Operation.RETRIEVE
+        # When its robot may come to the bay is a guess while a driver is yet to come to his car before.
+        guessed = self.calls.ahead.car if is_after_driver and self.calls.ahead is not None else None
+        return [
+            effect
+            for car, one in self.waiting.items()
+            for effect in self._tell(car, one, now_us, is_guessed=car == guessed)
+        ]
 
     def next_wake(self) -> int | None:
         """When somebody has waited long enough to be told what can be told."""
@@ -126,11 +133,11 @@ class Promises:
             self._learned[one.said.case].learn(one.said.each_us(now_us), is_kept=one.said.is_kept(now_us))
         one.is_over = True
 
-    def _tell(self, car: Reference, one: AskedCar, now_us: int) -> list[Effect]:
+    def _tell(self, car: Reference, one: AskedCar, now_us: int, *, is_guessed: bool) -> list[Effect]:
         if one.said is not None or one.is_over:
             return []
         mine = next((task for task in self._fetched() if task.car == car), None)
-        done_us = self.calls.done_at_us(mine, now_us)
+        done_us = None if is_guessed else self.calls.done_at_us(mine, now_us)
         if mine is not None and done_us is not None:
             case = PromiseCase.AMONG_OTHERS if self._is_work_of_others(mine.winner, now_us) else PromiseCase.ALONE
             constants = WaitInterval(0, MOST_DOORS * self.park.timing.door_us)
