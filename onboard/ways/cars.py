@@ -30,15 +30,24 @@ MAX_GONE_CARS = 64
 class _StandingCars:
     """Cars that have not left, as the digest takes them: number and station, in the order of the numbers.
 
-    With hundreds of cars each word about one would otherwise go through all of them. So what one origin's cars come to
-    is kept until one of them moves.
+    With hundreds of cars each word about one would otherwise go through all of them, and each look at a place. So what
+    one origin's cars come to is kept until one of them moves, and which stand in a station.
     """
 
     words: dict[int, dict[int, bytes]] = field(default_factory=dict)
+    #: Cars by the station in which they stand, and the other way round.
+    at: dict[int, set[Reference]] = field(default_factory=dict)
+    _stations: dict[Reference, int] = field(default_factory=dict)
     _joined: dict[int, bytes] = field(default_factory=dict)
 
     def put(self, car: Reference, station: int) -> None:
         """A car stands there, or has left."""
+        before = self._stations.pop(car, OUTSIDE)
+        if before != OUTSIDE:
+            self.at[before].discard(car)
+        if station != OUTSIDE:
+            self._stations[car] = station
+            self.at.setdefault(station, set()).add(car)
         self._joined.pop(car.origin, None)
         numbers = self.words.setdefault(car.origin, {})
         if station == OUTSIDE:
@@ -136,6 +145,11 @@ class CarMirror(Mirror):
         if record is None or record.station in (ANY_STATION, OUTSIDE):
             return None
         return Station.from_number(record.station)
+
+    def cars_in(self, station: Station) -> list[Reference]:
+        """Cars that stand in a station, in the order in which they were first heard of."""
+        found = self._standing.at.get(station.number, set())
+        return [car for car in self.cars if car in found] if len(found) > 1 else list(found)
 
     def _believed(self) -> bytes:
         """Cars (number, station) that have not left."""

@@ -13,7 +13,7 @@ at whole only where its bound promises an earlier arrival, or an equal one with 
 evaluation of edges; Cohen, Phillips and Likhachev 2014); states and edges are kept for the next search.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from heapq import heappop, heappush
 from typing import NamedTuple
 
@@ -92,6 +92,19 @@ def free_flow_us(site: WaySite, start: Segment, start_us: int, visits: tuple[Vis
         time_us = max(time_us + way_us, ceil_ms(visit.not_before_us)) + ceil_ms(visit.dwell_us)
         here = visit.segment
     return time_us
+
+
+def free_flow_ends(
+    site: WaySite, start: Segment, start_us: int, visit: Visit, goals: Iterable[Segment]
+) -> dict[Segment, int]:
+    """What ``free_flow_us`` is for a visit alone, at each of ``goals`` in the stead of its own segment."""
+    roads = roads_of(site)
+    begun_us, least_us, dwell_us = ceil_ms(start_us), ceil_ms(visit.not_before_us), ceil_ms(visit.dwell_us)
+    ways = {goal: roads.shortest_us(start, goal) if roads.knows(goal) else FOREVER for goal in goals}
+    return {
+        goal: FOREVER if way_us >= FOREVER else max(begun_us + way_us, least_us) + dwell_us
+        for goal, way_us in ways.items()
+    }
 
 
 def planning(

@@ -7,7 +7,7 @@ its robot is on its way, or there, when the bay is empty; what it is and who won
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import KindCode, LegAction, Operation, Reason, TaskPhase
+from onboard.contract.codes import KindCode, LegAction, Operation, Reason, TaskPhase, TokenKind
 from onboard.contract.constants import ANY_STATION, NOBODY, TASK_VERSION_BITS
 from onboard.contract.messages import (
     CallForProposals,
@@ -18,7 +18,7 @@ from onboard.contract.messages import (
     TokenRefusal,
     TokenRequest,
 )
-from onboard.core.authority import TokenKey, segment_token
+from onboard.core.authority import segment_token
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.negotiation import EVENT_TYPES
 from onboard.core.serial import from_bus_ms, successor
@@ -98,8 +98,9 @@ class BayCalls:
             if machine is not None and machine.kind is KindCode.ROBOT:
                 self._may_be_served(now_us)
             return []
-        wanted = TokenKey(request.token_kind, request.token)
-        found = (task for task in self.in_hand() if wanted == car_token(*task.car))
+        if request.token_kind is not TokenKind.CAR:
+            return []
+        found = (task for task in self.in_hand() if request.token == car_token(*task.car).number)
         return [effect for task in found for effect in task.remind(self.fleet.node_id, request.sender)]
 
     def _may_be_served(self, now_us: int) -> None:

@@ -56,7 +56,7 @@ def place_of(fleet: WayFleet, car: Reference) -> Station | None:
 
 def others_in(mirror: WayMirror, station: Station, car: Reference | None = None) -> list[Reference]:
     """Cars that stand in a station by their custodians' word, other than ``car``."""
-    return [one for one, record in mirror.cars.items() if record.station == station.number and one != car]
+    return [one for one in mirror.cars_in(station) if one != car]
 
 
 def replay(fleet: WayFleet, statements: Iterable[CarAt]) -> None:

@@ -37,7 +37,7 @@ from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayMirror
 from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import FOREVER, Reservations
-from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, planning
+from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_ends, free_flow_us, planning
 from onboard.ways.told_way import BegunItinerary
 
 #: From the deadline to the first motion: award frame, journal writes and the first tokens (measured in tests).
@@ -423,18 +423,16 @@ class CarParkGeneration:
 
         Without ``origin`` from where the car is taken; ``taken_us`` is when it is taken, by default as early as can be.
         """
+        is_open = class_of_end(call.from_station) is not None
         bounds: dict[Segment, int] = {}
-        begun: tuple[int, Visit, Visit] | None = None
-        for place in one_a_segment(places):
-            if begun is None or class_of_end(call.from_station) is not None:
-                # Otherwise the car is taken at the same time and left in as long a time at whatever place.
-                take, leave = self._visits(call, place, start_us)
-                here = take.segment if origin is None else origin
-                least_us = free_flow_us(self.site, here, start_us, (take,)) if taken_us is None else taken_us
-                begun = least_us, take, leave
-            begun_us, take, leave = begun
-            leave = leave._replace(segment=self.ends(call, place)[1].segment)
-            bounds[place.segment] = free_flow_us(self.site, take.segment, begun_us, (leave,))
+        # A car from a known place is taken at the same time, and left in as long a time, wherever it goes.
+        for place in one_a_segment(places if is_open else places[:1]):
+            take, leave = self._visits(call, place, start_us)
+            here = take.segment if origin is None else origin
+            least_us = free_flow_us(self.site, here, start_us, (take,)) if taken_us is None else taken_us
+            goals = (leave.segment,) if is_open else {one.segment for one in places}
+            ends = free_flow_ends(self.site, take.segment, least_us, leave, goals)
+            bounds |= {place.segment: ends[leave.segment]} if is_open else ends
         return bounds
 
     def _visits(self, call: CallForProposals, place: Station, near_us: int) -> tuple[Visit, Visit]:

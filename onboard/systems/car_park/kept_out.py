@@ -75,6 +75,8 @@ def will_work(mirror: WayMirror, plan: Itinerary, station: Station) -> bool:
     """Whether a plan has work at a station that is not behind its machine by that one's own word."""
     told = mirror.progress.get(plan.sender)
     behind = told.leg if told is not None and told.itinerary_version == plan.version else 0
-    place = station.track, station.index, station.side
-    works = [leg for leg in plan.legs[behind:] if leg.action is LegAction.WORK]
-    return any((leg.track, leg.to_index, leg.side) == place for leg in works)
+    return any(
+        leg.action is LegAction.WORK
+        and (leg.track, leg.to_index, leg.side) == (station.track, station.index, station.side)
+        for leg in plan.legs[behind:]
+    )
