@@ -148,6 +148,15 @@ def test_where_the_key_calls_cars_go_in_and_out_by_turns() -> None:
     assert all(one is not other for one, other in pairwise(order[2:]))
 
 
+def test_with_a_queue_outside_two_cars_come_in_and_up_to_three_go_out_by_turns() -> None:
+    """Robots of those that go out fetch at the same time: by single turns the empty bay waited for each."""
+    parked, comes = [(75 * number, 650) for number in range(4)], [(560 + number, None) for number in range(6)]
+    scene = play(at_arrival(one_floor()), stays(*parked, *comes), limit_s=3_000, extra_s=30)
+    assert_served(scene, 10, 4)
+    order = [one.operation.name[0] for _, one in scene.all(CallForProposals, "fleet") if one.attempt == 1]
+    assert "".join(order) == "PPPP" + "PP" + "RRR" + "PP" + "R" + "PP"
+
+
 def restarted(at_s: float, demand: Demand, name: str = "IOC1") -> Scene:
     """A machine loses its controller at ``at_s`` and gets it back with the same journal 3 s later."""
 

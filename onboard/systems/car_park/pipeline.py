@@ -1,9 +1,9 @@
 """What a compartment does before its bay is free for it: who comes in next, who goes out, and what is called for.
 
-With drivers one behind the other outside, cars go in and out by turns: the robot that brings one finds the bay locked
-and empty behind the robot that took the other. Without a queue the next car is called for while another robot still
-brings the one before; whichever is there first goes out first. Drivers, who cannot be seen outside, are invited after
-``MOST_OUT`` cars at the latest. With ``call_at = "key"`` in the site file nothing is called for ahead (row P50's
+With drivers one behind the other outside, two come in and up to three cars go out by turns: the robot that brings one
+finds the bay locked and empty behind the robot that took the other. The next car is called for while another robot
+still brings the one before; whichever is there first goes out first. Drivers, who cannot be seen outside, are invited
+after ``MOST_OUT`` cars at the latest. With ``call_at = "key"`` in the site file nothing is called for ahead (row P50's
 order), and they take turns in any case.
 """
 
@@ -33,6 +33,9 @@ QUEUED_US = 2_500_000
 #: So many cars go out one behind the other while nobody looked for drivers: a look costs ``QUEUED_US`` and the lead of
 #: the next car's robot, some 25 s, a tenth of three of the 53 to 99 s that a car takes a bay (docs/decisions.md).
 MOST_OUT = 3
+#: With a queue outside so many cars come in, then so many go out and the one behind the last that was taken away:
+#: robots of those that go out fetch at the same time, and an empty bay waits less often (docs/figures.md).
+BY_TURNS = 2
 #: And where the key calls, so that a look costs no more than ``QUEUED_US`` (docs/decisions.md).
 MOST_OUT_BY_KEY = 1
 #: From driving in until the input door begins to lock, us: a drive of 10 to 30 s and a walk of 4 to 8 s on average.
@@ -56,8 +59,9 @@ class Pipeline:
     is_queued: bool = False
     #: Who comes in has until then to press the key; 0 while the bay is empty.
     entering_until_us: int = 0
-    #: Cars that have gone out since drivers were last invited.
+    #: Cars that have gone out since drivers were last invited, and come in since one last went out.
     outs: int = 0
+    ins: int = 0
     _looked_us: int = 0
     #: Who asked for the bay though nothing is known of a task for it.
     _wanted_by: int = NOBODY
@@ -98,10 +102,12 @@ class Pipeline:
 
     @property
     def _is_drivers_turn(self) -> bool:
-        """Drivers come one behind the other, or might: nobody has looked for long. Where the key calls: by turns."""
+        """Drivers queue and are let in, or might: nobody has looked for long. Where the key calls, by single turns."""
         if self.park.bay_uses.get(self.fleet.node_id) is BayUse.EXIT:
             return self.is_queued
-        return self.is_queued or self.outs >= MOST_OUT if self.is_on else self.outs >= MOST_OUT_BY_KEY
+        if self.is_on and self.is_queued:
+            return self.outs >= BY_TURNS or 0 < self.ins < BY_TURNS
+        return self.outs >= (MOST_OUT if self.is_on else MOST_OUT_BY_KEY)
 
     def void(self) -> list[Effect]:
         """After a restart: who was driving in was called for without a record, and is called for anew by the key.
@@ -122,7 +128,7 @@ class Pipeline:
         """Somebody is in the free bay: call for a robot before the car is measured, where any place will do."""
         if self.free_from_us is not None:
             self.is_queued, self.free_from_us = now_us - self.free_from_us <= QUEUED_US, None
-            self.outs, self._wanted_by = 0, NOBODY
+            self.outs, self.ins, self._wanted_by = 0, self.ins + 1, NOBODY
         if not self.is_on or not self.fleet.tokens.is_synced:
             # Who does not know yet whether its journal is whole gives no number away.
             return []
@@ -145,12 +151,14 @@ class Pipeline:
         brought = self._take_up_brought()
         if self._is_drivers_turn and not was_open_for_all:
             return False, brought
-        self.is_queued, self.outs = False, 0 if was_open_for_all else self.outs
+        if was_open_for_all:
+            self.is_queued, self.outs = False, 0
         # After a restart the journal may know of a task whose bay was not noted yet.
         called = self.call(now_us, now_us) if self.is_on and self.calls.ahead is None else []
         is_asked_for = bool(self.tickets) and custody.place_of(self.fleet, self.tickets[0]) is not None
         is_out = self.calls.ahead is not None or (is_asked_for and not self.is_on)
         self.outs += is_out
+        self.ins = 0 if is_out else self.ins
         return is_out, brought + called
 
     def wants(self, robot: int) -> Reason:
@@ -187,7 +195,7 @@ class Pipeline:
         if job is None or self.calls.ahead is not None or not self.tickets or not self.is_on:
             return []
         door_us, is_parked = self.park.timing.door_us, job.operation is Operation.PARK
-        if self._is_drivers_turn and not is_parked:
+        if self._is_drivers_turn:
             return []
         if phase is BayPhase.HANDOVER and not is_parked:
             return self.call(now_us + DRIVER_US + door_us, now_us)

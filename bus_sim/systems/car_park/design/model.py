@@ -18,7 +18,7 @@ from bus_sim.systems.car_park.plant.customer import REACTION_US
 from onboard.contract.messages import Reference
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.bay_generation import BEFORE_US, MOST_TAKEN
-from onboard.systems.car_park.pipeline import MOST_OUT, MOST_OUT_BY_KEY, QUEUED_US
+from onboard.systems.car_park.pipeline import BY_TURNS, MOST_OUT, MOST_OUT_BY_KEY, QUEUED_US
 from onboard.systems.car_park.site import CallAt, CarPark, DeskPolicy
 from onboard.ways.roads import roads_of
 from onboard.ways.site import BayUse
@@ -69,6 +69,7 @@ class _BayModel:
     open_us: int = 0
     free_from_us: int = 0
     outs: int = 0
+    ins: int = 0
     is_queued: bool = False
     enters_at_us: int | None = None
     #: Next car to go out, called for already, and when it is set down.
@@ -203,7 +204,9 @@ class DayModel:
             return False
         if self._site.call_at is CallAt.KEY:
             return bay.outs >= MOST_OUT_BY_KEY
-        return bay.is_queued or bay.outs >= MOST_OUT
+        if bay.is_queued:
+            return bay.outs >= BY_TURNS or 0 < bay.ins < BY_TURNS
+        return bay.outs >= MOST_OUT
 
     def _look(self, bay: _BayModel, now_us: int) -> None:
         """Something has changed: whoever is next for a free bay, or whose car can be called for."""
@@ -213,9 +216,9 @@ class DayModel:
         is_out = bay.ahead is not None or self._is_asked_for(bay, now_us)
         was_open = now_us >= bay.free_from_us + QUEUED_US
         if is_out and (was_open or not self._is_drivers_turn(bay)):
-            bay.outs = 0 if was_open else bay.outs
-            bay.is_queued = False
-            bay.outs += 1
+            if was_open:
+                bay.outs, bay.is_queued = 0, False
+            bay.outs, bay.ins = bay.outs + 1, 0
             self._begin_out(bay, now_us, now_us + self._close_us, now_us)
             return
         if bay.drivers:
@@ -236,7 +239,7 @@ class DayModel:
         if not bay.is_free or not bay.drivers:
             return
         person = bay.drivers.popleft()
-        bay.is_free, bay.outs = False, 0
+        bay.is_free, bay.outs, bay.ins = False, 0, bay.ins + 1
         bay.is_queued = now_us - bay.free_from_us <= QUEUED_US
         keyed_us = now_us + person.acts.drive_in_us
         parked_us = keyed_us + STEP_US + person.acts.walk_us
@@ -253,7 +256,7 @@ class DayModel:
         bay.busy_us += served.at_bay_us + self._close_us + self._open_us - now_us
         locked_us = served.at_bay_us + self._close_us
         known_us = call_us + self._site.timing.call_window_us + KNOWN_AFTER_US
-        self._at(known_us, lambda then_us: self._may_call_ahead(bay, locked_us, then_us))
+        self._at(known_us, lambda then_us: self._brings(bay, locked_us, then_us))
         self._at(locked_us, lambda then_us: self._taken(bay, then_us))
 
     def _walk_away(self, bay: _BayModel, person: _Person, now_us: int) -> None:
@@ -304,7 +307,7 @@ class DayModel:
         self._at(gone_us, lambda then_us: self._drive_away(bay, person, then_us))
 
     def _brings(self, bay: _BayModel, ready_us: int, now_us: int) -> None:
-        """It is known when a robot comes with a car; another may fetch the next one meanwhile."""
+        """It is known when a robot comes, with a car or for one; another may fetch the next one meanwhile."""
         if not self._is_drivers_turn(bay):
             self._may_call_ahead(bay, ready_us, now_us)
 
