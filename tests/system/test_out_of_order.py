@@ -61,15 +61,16 @@ def test_a_robot_that_is_off_is_told_to_those_who_wait(at_s: int) -> None:
     assert all(texts(off, number)[-1] is DeskText.OUT_OF_ORDER for number in (FIRST, SECOND))
 
 
-def test_whom_a_robot_with_a_fault_keeps_waiting_is_told_why() -> None:
-    """Found by a campaign (small, all faults, 30126): MR1 was pushed at the bay and failed at its next place."""
+@pytest.mark.parametrize(("at_s", "limit_s"), [(845, 1_000), (865, 1_300)], ids=["it has the task", "it is in the way"])
+def test_whom_a_robot_with_a_fault_keeps_waiting_is_told_why(at_s: int, limit_s: int) -> None:
+    """Found by a campaign (small, all faults, 30126), in which MR1 failed at its next place; here it is stuck there."""
     report = played(
         "small",
         30126,
         Arrivals(6, 120, 60, 200),
         "sensor_off:at_s=681.147476,target=MR2",
-        "moved:at_s=812.92938,target=MR1,by_mm=-40",
-        limit_s=1_000,
+        f"actuator_stuck:at_s={at_s},target=MR1,for_s=600",
+        limit_s=limit_s,
     )
     assert (report.verdict, report.waiting, report.told) == (RunVerdict.TOLD, 0, 4)
     assert (report.violations, report.stalls) == ((), ())

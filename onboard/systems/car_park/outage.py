@@ -1,13 +1,16 @@
 """Who waits at the desk for a robot that does not come hears so: it stands, and a person may need hours to mend it."""
 
 from collections import deque
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import DeskText, KindCode, Operation
 from onboard.contract.messages import Reference
+from onboard.core.authority import segment_token
 from onboard.core.effects import Effect
+from onboard.core.site import Segment
 from onboard.systems.car_park.bay_calls import BayCalls
-from onboard.systems.car_park.bay_task import BayPhase, BayTask
+from onboard.systems.car_park.bay_task import BayPhase
 from onboard.systems.car_park.outputs import BayOutputs
 from onboard.ways.mirror import WayFleet
 
@@ -53,22 +56,28 @@ class Outage:
         return job is not None and job.car == car and job.was_granted
 
     def _due_us(self, phase: BayPhase) -> dict[Reference, int | None]:
-        """From when on nobody comes to each who waits, as the robot stands that has the bay's task, or his own."""
+        """From when on nobody comes to each who waits: who has the bay's task stands, or has his, or is in front of it."""
         job = self.calls.job
         fetched = [task for task in self.calls.in_hand() if task.operation is Operation.RETRIEVE]
         if job is None or phase not in _WAITS:
             return dict.fromkeys([*(task.car for task in fetched), *self.tickets])
-        bay_us = self._out_from_us(job)
+        robots = [one.node_id for one in self.fleet.site.machines.values() if one.kind is KindCode.ROBOT]
+        times = (self._out_from_us([job.winner] if job.winner else robots), self._out_from_us([self._in_front()]))
+        bay_us = min((one for one in times if one is not None), default=None)
         due: dict[Reference, int | None] = dict.fromkeys(self.tickets, bay_us)
         for task in fetched:
-            times = (bay_us, self._out_from_us(task))
+            times = (bay_us, self._out_from_us([task.winner] if task.winner else robots))
             due[task.car] = min((one for one in times if one is not None), default=None)
         return due
 
-    def _out_from_us(self, task: BayTask) -> int | None:
-        """When whoever has a task, or all of the site where nobody has it, is known not to come soon."""
-        obstacles, machines = self.fleet.mirror.obstacles.machines, self.fleet.site.machines.values()
-        robots = [task.winner] if task.winner else [one.node_id for one in machines if one.kind is KindCode.ROBOT]
-        if not all(node in obstacles for node in robots):
+    def _in_front(self) -> int:
+        """Who has the right to the slot in front of the bay: while it stands there nobody else comes."""
+        station = self.calls.station
+        return self.fleet.tokens.holder_of(segment_token(Segment(station.track, station.index)))
+
+    def _out_from_us(self, nodes: Collection[int]) -> int | None:
+        """When all of these are known not to come, or go, soon; None where one of them may."""
+        obstacles = self.fleet.mirror.obstacles.machines
+        if not all(node in obstacles for node in nodes):
             return None
-        return max((obstacles[node].since_us for node in robots), default=0) + OUT_AFTER_US
+        return max((obstacles[node].since_us for node in nodes), default=0) + OUT_AFTER_US
