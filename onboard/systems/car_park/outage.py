@@ -56,7 +56,7 @@ class Outage:
         return job is not None and job.car == car and job.was_granted
 
     def _due_us(self, phase: BayPhase) -> dict[Reference, int | None]:
-        """From when on nobody comes to each who waits: who has the bay's task stands, or has his, or is in front of it."""
+        """From when on nobody comes to each who waits: who has the bay's task stands, or has his, or is before it."""
         job = self.calls.job
         fetched = [task for task in self.calls.in_hand() if task.operation is Operation.RETRIEVE]
         if job is None or phase not in _WAITS:
