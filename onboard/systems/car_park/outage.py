@@ -47,8 +47,7 @@ class Outage:
 
     def next_wake(self, phase: BayPhase) -> int | None:
         """When those who wait are to be told, bus us; None where they were, or none waits, or a robot may come."""
-        due = (due_us for car, due_us in self._due_us(phase).items() if car not in self._told)
-        return min((one for one in due if one is not None), default=None)
+        return _first(*(due_us for car, due_us in self._due_us(phase).items() if car not in self._told))
 
     def _is_being_served(self, car: Reference) -> bool:
         """Whether its robot has had the bay: the next that its customer reads is that it is ready."""
@@ -62,12 +61,12 @@ class Outage:
         if job is None or phase not in _WAITS:
             return dict.fromkeys([*(task.car for task in fetched), *self.tickets])
         robots = [one.node_id for one in self.fleet.site.machines.values() if one.kind is KindCode.ROBOT]
-        times = (self._out_from_us([job.winner] if job.winner else robots), self._out_from_us([self._in_front()]))
-        bay_us = min((one for one in times if one is not None), default=None)
+        bay_us = _first(
+            self._out_from_us([job.winner] if job.winner else robots), self._out_from_us([self._in_front()])
+        )
         due: dict[Reference, int | None] = dict.fromkeys(self.tickets, bay_us)
         for task in fetched:
-            times = (bay_us, self._out_from_us([task.winner] if task.winner else robots))
-            due[task.car] = min((one for one in times if one is not None), default=None)
+            due[task.car] = _first(bay_us, self._out_from_us([task.winner] if task.winner else robots))
         return due
 
     def _in_front(self) -> int:
@@ -81,3 +80,7 @@ class Outage:
         if not all(node in obstacles for node in nodes):
             return None
         return max((obstacles[node].since_us for node in nodes), default=0) + OUT_AFTER_US
+
+
+def _first(*times_us: int | None) -> int | None:
+    return min((one for one in times_us if one is not None), default=None)

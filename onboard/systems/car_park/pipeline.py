@@ -33,11 +33,11 @@ QUEUED_US = 2_500_000
 #: So many cars go out one behind the other while nobody looked for drivers: a look costs ``QUEUED_US`` and the lead of
 #: the next car's robot, some 25 s, a tenth of three of the 53 to 99 s that a car takes a bay (docs/decisions.md).
 MOST_OUT = 3
+#: And where the key calls, so that a look costs no more than ``QUEUED_US`` (docs/decisions.md).
+MOST_OUT_BY_KEY = 1
 #: With a queue outside so many cars come in, then so many go out and the one behind the last that was taken away:
 #: robots of those that go out fetch at the same time, and an empty bay waits less often (docs/figures.md).
 BY_TURNS = 2
-#: And where the key calls, so that a look costs no more than ``QUEUED_US`` (docs/decisions.md).
-MOST_OUT_BY_KEY = 1
 #: From driving in until the input door begins to lock, us: a drive of 10 to 30 s and a walk of 4 to 8 s on average.
 ENTERED_US = 26_000_000
 #: Who drives in has pressed the key within this, us: the longest drive, and a person's patience once.
@@ -59,8 +59,9 @@ class Pipeline:
     is_queued: bool = False
     #: Who comes in has until then to press the key; 0 while the bay is empty.
     entering_until_us: int = 0
-    #: Cars that have gone out since drivers were last invited, and come in since one last went out.
+    #: Cars that have gone out since drivers were last invited.
     outs: int = 0
+    #: Drivers who have come in since a car last went out.
     ins: int = 0
     _looked_us: int = 0
     #: Who asked for the bay though nothing is known of a task for it.
