@@ -169,7 +169,12 @@ async def one_way(park: Park, what: str, hours: float) -> None:
         for at, one in enumerate(moved):
             park.stage.plant.timers.call_at(begin_us + at * SECOND_US, one.leave_now)
     end = CustomerState.PARKED if what == "in" else CustomerState.GONE
-    await park.until(lambda: all(one.state is end for one in moved), begin_us + round(hours * HOUR_US))
+    limit_us, next_us = begin_us + round(hours * HOUR_US), begin_us
+    while next_us < limit_us and any(one.state is not end for one in moved):
+        next_us = min(next_us + TOLD_US, limit_us)
+        await park.until(lambda: all(one.state is end for one in moved), next_us)
+        done, cpu_so_far_s = sum(one.state is end for one in moved), time.process_time() - cpu_s
+        _say(f"{what}: {(park.now_us - begin_us) / HOUR_US:.1f} h: {done} cars; processor {cpu_so_far_s:.0f} s")
     found, passed = park.summary(begin_us, time.monotonic() - wall_s), (park.now_us - begin_us) / HOUR_US
     through = found.cars_in + found.cars_out
     _say(

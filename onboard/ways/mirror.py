@@ -16,6 +16,7 @@ from onboard.core.petitions import UNORDERED
 from onboard.core.site import Machine, Segment, Station
 from onboard.core.token_keys import TokenKey, segment_token
 from onboard.ways.blocked_words import BlockedWords
+from onboard.ways.bodies import Bodies
 from onboard.ways.cars import CarFleet, CarMirror
 from onboard.ways.lift_uses import standing_after
 from onboard.ways.lifts import lift_tracks
@@ -44,6 +45,7 @@ class WayMirror(CarMirror):
     order: PassingOrder = field(init=False)
     obstacles: Obstacles = field(init=False)
     standing: Standing = field(init=False)
+    bodies: Bodies = field(init=False)
     blocked_words: BlockedWords = field(init=False)
     #: Whose plan is thought of for a while (``as_told``): what it really told hinders no run of mine.
     _as_told: int = NOBODY
@@ -52,6 +54,7 @@ class WayMirror(CarMirror):
         self.order = PassingOrder(self.site)
         self.obstacles = Obstacles(self.site, lambda: self.reservations, self.aside)
         self.standing = Standing(self.site, self.itineraries)
+        self.bodies = Bodies(self.site)
         self.blocked_words = BlockedWords(self.site, self.node_id, self.obstacles)
 
     # --- what is heard -----------------------------------------------------------------------------------------
@@ -115,6 +118,7 @@ class WayMirror(CarMirror):
     def on_progress(self, progress: Progress) -> None:
         """Last known position of a machine, and how far it has come on its way."""
         super().on_progress(progress)
+        self.bodies.hear(progress)
         self.order.on_progress(progress)
 
     def retime(self, now_us: int) -> None:
@@ -200,6 +204,7 @@ class WayMirror(CarMirror):
         """A machine gave a slot back."""
         if key.kind is TokenKind.SEGMENT:
             self.order.on_return(node, slot_of(key))
+            self.bodies.left(node, slot_of(key))
 
     # --- what plans need ---------------------------------------------------------------------------------------
 
@@ -276,10 +281,15 @@ class WayFleet(CarFleet):
     def passing_verdict(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Whether ``requester`` may have a slot now: in the plans' order, as its holder and the requester both see it.
 
-        Without an agreed order it goes to whoever has asked for longest.
+        Without an agreed order it goes to whoever has asked for longest. Whose body stands in it comes before all that:
+        it was pushed there by hand, and nobody else can come there.
         """
-        claim = self.petitions.claim(key, requester)
+        claim, bodies = self.petitions.claim(key, requester), self.mirror.bodies
         if claim is None:
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        if bodies.is_in(requester, slot_of(key)):
+            return Reason.NONE
+        if bodies.is_another_in(slot_of(key), requester):
             return Reason.TOKEN_NOT_GRANTABLE_YET
         if claim.itinerary_version == UNORDERED:
             oldest = self.petitions.is_oldest_unordered(key, requester, now_us)

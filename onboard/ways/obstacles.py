@@ -13,6 +13,7 @@ from onboard.contract.constants import MOBILE_KINDS
 from onboard.contract.messages import Blocked, Clear, Progress
 from onboard.core.mirror import Obstacle
 from onboard.core.site import Machine, Segment
+from onboard.ways.bodies import slots_of_body
 from onboard.ways.lifts import PLATFORM_INDEX, lift_at, platform
 from onboard.ways.occupancy import standing_segments
 from onboard.ways.reservations import FOREVER, Reservations, SlotWindow, Use
@@ -99,6 +100,8 @@ class Obstacles:
             if here.track in self.site.tracks:
                 aboard = lift_at(self.site, here)
                 found.update([platform(aboard)] if aboard is not None else standing_segments(self.site, here))
+            if seen is not None:
+                found.update(slots_of_body(self.site, seen))
         return frozenset(found)
 
     def _all_slots(self) -> tuple[Segment, ...]:

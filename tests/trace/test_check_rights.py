@@ -1,5 +1,7 @@
 """Rules of authority: tokens, motion, bodies, lifts."""
 
+from dataclasses import replace
+
 import pytest
 
 from onboard.config.site import parse_site
@@ -177,6 +179,14 @@ def test_a_drive_is_sent_no_farther_than_the_machine_may_go() -> None:
     tape = Tape(one_alley()).say(1, at(MR1, 1, 12), DriveState(MR1, 0, 26400, 0, DriveMode.STANDING, at_mark=True))
     tape.say(2, DriveOrder(MR1, 1, 26400, 1500))
     assert tape.say(3, DriveOrder(MR1, 2, 24000, 1500)).broken() == {"inside-authority": 1}
+
+
+def test_an_order_that_crosses_the_push_by_hand_is_excused_and_none_after_it() -> None:
+    stood = DriveState(MR1, 0, 26400, 0, DriveMode.STANDING, at_mark=True)
+    tape = Tape(one_alley()).say(1, at(MR1, 1, 12), stood).say(2, replace(stood, position_mm=25800, at_mark=False))
+    tape.say(2.02, DriveOrder(MR1, 1, 26400, 1500))
+    assert tape.broken() == {}, "it waited for the journal when the drive was pushed (campaign standard, seed 50041)"
+    assert tape.say(2.2, DriveOrder(MR1, 2, 26400, 1500)).broken() == {"inside-authority": 1}
 
 
 def test_where_nobody_knows_the_holder_nothing_is_judged_but_counted() -> None:

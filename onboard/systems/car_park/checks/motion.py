@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Sequence
 
-from onboard.contract.codes import KindCode
-from onboard.contract.messages import DriveOrder, Progress
+from onboard.contract.codes import DriveMode, KindCode
+from onboard.contract.messages import DriveOrder, DriveState, Progress
 from onboard.core.site import Segment
 from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.geometry import (
@@ -22,6 +22,9 @@ from onboard.ways.site import TrackKind, way_site
 #: Who was pushed by hand has so long to get the rights to where it is, us: it may have to start first, and to listen
 #: until it is admitted (seen: 30 s).
 PUSHED_US = 60_000_000
+#: An order to a drive waits so long at most for the journal of the rights that permit it, us (seen: 20 ms for five): it
+#: crosses the word of the drive that it was pushed meanwhile.
+ORDER_CROSSES_US = 100_000
 
 
 class InsideAuthority(Rule):
@@ -40,10 +43,20 @@ class InsideAuthority(Rule):
         super().__init__(picture, report)
         self._told: set[tuple[int, Segment]] = set()
         self._pushed: dict[int, tuple[LogEvent[Progress], ReportedPosition, int]] = {}
+        self._stood: dict[int, DriveState] = {}
+        self._drive_pushed_us: dict[int, int] = {}
 
     def handlers(self) -> Handlers:
         """Where bodies are, and with device buses where drives are sent."""
-        return {Progress: self._on_progress, DriveOrder: self._on_order}
+        return {Progress: self._on_progress, DriveState: self._on_drive, DriveOrder: self._on_order}
+
+    def _on_drive(self, event: LogEvent[DriveState]) -> None:
+        state, before = event.message, self._stood.pop(event.message.sender, None)
+        if state.mode is not DriveMode.STANDING:
+            return
+        self._stood[state.sender] = state
+        if before is not None and abs(before.position_mm - state.position_mm) > TOLERANCE_MM:
+            self._drive_pushed_us[state.sender] = event.time_us
 
     def _on_progress(self, event: LogEvent[Progress]) -> None:
         body = self.picture.body_told(event.message, event.time_us)
@@ -80,6 +93,8 @@ class InsideAuthority(Rule):
     def _on_order(self, event: LogEvent[DriveOrder]) -> None:
         body = self.picture.bodies.get(event.message.sender)
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
+            return
+        if event.time_us - self._drive_pushed_us.get(body.node, -ORDER_CROSSES_US) < ORDER_CROSSES_US:
             return
         site, body = self.picture.site, self.picture.on_floor(body)
         sensed = self.picture.sensed(body)
