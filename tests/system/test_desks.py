@@ -10,6 +10,7 @@ from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
 from onboard.contract.codes import CallResult, DeskInput, DeskText, Operation, TaskPhase
 from onboard.contract.messages import Award, Bid, CallForProposals, DeskEvent, DeskOrder, TaskReport
+from onboard.systems.car_park.bay_generation import MOST_TAKEN
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.trace.story.why import WaitingStory, task_lines
 from onboard.trace.words import Words
@@ -125,10 +126,20 @@ def test_own_it_comes_out_there_whoever_asks_before_it_stands_at_a_place() -> No
     assert ready_at(scene)[0] == 2
 
 
-def test_two_customers_at_one_desk_are_sent_to_both_when_the_suited_one_has_two() -> None:
-    scene = play(two("nearest"), stays((0, 400), (60, 401), (120, 402)))
-    assert_served(scene, 3)
-    assert sorted(ready_at(scene)) == [1, 2, 2]
+def test_who_asks_when_the_suited_compartment_has_as_many_as_it_takes_is_sent_to_the_other() -> None:
+    scene = play(two("nearest"), stays(*((60 * number, 600 + number) for number in range(MOST_TAKEN + 1))))
+    assert_served(scene, MOST_TAKEN + 1)
+    assert sorted(ready_at(scene)) == [1, *[2] * MOST_TAKEN]
+
+
+def test_a_car_that_is_asked_for_on_its_way_to_its_place_comes_to_the_compartment_beside_that() -> None:
+    """In a rush drivers are back before their cars stand: these came to whichever desk read the ticket."""
+    scene = play(two("nearest"), stays((0, 52)))
+    asked_us, asked = scene.first(DeskEvent, lambda one: one.event is DeskInput.TICKET)
+    parked_us, _ = scene.first(TaskReport, lambda one: one.phase is TaskPhase.DONE and one.task == asked.car)
+    assert asked.sender == 1 and asked_us < parked_us
+    assert_served(scene, 1)
+    assert ready_at(scene) == [2]
 
 
 #: Around the moment at which the first desk's customer is told, s; the last when a robot has won the car.

@@ -19,7 +19,7 @@ RUNS = {
     "level1 --random 40 15 --cars 3": "ee0308c1f884f5a4",
     "small --random 40 15 --cars 3 --fault crash:target=MR1,at_s=80,restart_s=5": "4d0a57f691ad636f",
     "standard --random 30 15 --cars 3": "261f63eae6dce974",
-    "large --random 30 15 --cars 2": "d521a221e7410b48",
+    "large --random 30 15 --cars 2": "7e632badcedc6abc",
     "graph --for 150": "4949031e170ebb8e",
     "terminal --for 150": "99cccf65bcc7a6c0",
 }

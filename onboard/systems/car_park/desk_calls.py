@@ -1,11 +1,11 @@
 """At which compartment a car is handed out, where the site does not leave that to the desk that reads the ticket.
 
 That desk calls for its car to be received (operation RECEIVE): each compartment that gives cars out bids by the site's
-policy (``BayGeneration``), the desk too, and the winner queues the ticket like one of its own. A bay has at most
-``MOST_TAKEN`` of them, so that a car goes to whoever can have it first, not to where the queue was short when its
-customer came: with more customers than that a desk calls when by what is told somebody has room, who waits longest
-first. The desk answers for the ticket, in its journal, until the car has left: where whoever took it is lost, and no
-robot is at the car, it calls anew under a raised version.
+policy (``BayGeneration``), the desk too, and the winner queues the ticket like one of its own. A car that is aboard a
+robot still is called for once it stands: which bay suits it depends on where. A bay has at most ``MOST_TAKEN`` of them:
+with more customers than that a desk calls when by what is told somebody has room, who waits longest first. The desk
+answers for the ticket, in its journal, until the car has left: where whoever took it is lost, and no robot is at the
+car, it calls anew under a raised version.
 """
 
 from collections import Counter, deque
@@ -139,9 +139,9 @@ class DeskCalls:
         place = custody.place_of(self.fleet, car)
         obstacles = self.fleet.mirror.obstacles.machines
         others = [node for node in self.generation.exits() if node != self.fleet.node_id and node not in obstacles]
-        # Of a car without a place no way tells which suits: whose it is by the site's word is known all the same.
-        is_known = place is not None or (self.park.desk is DeskPolicy.OWN and car.origin != self.fleet.node_id)
-        if not is_known or not others:
+        # A car that is aboard still is called for from its place; where it is this bay's by the site's word, by none.
+        is_own = place is None and self.park.desk is DeskPolicy.OWN and car.origin == self.fleet.node_id
+        if is_own or not others:
             return None
         task, number = self.memory.next_reference(self.fleet)
         self.asked[car] = AskedTicket(task, since_us=now_us)
@@ -177,8 +177,8 @@ class DeskCalls:
             effects += self._hear_myself(one, now_us)
             if self._is_lost(car, one, now_us):
                 effects += self._free(car, one, Reason.NODE_SILENT, now_us)
-            elif one.winner and self._is_off(one, now_us) and not one.is_told_off:
-                # A robot has it in hand, and waits for that bay as its customer does.
+            elif self._is_off(car, one, now_us) and not one.is_told_off:
+                # A robot has it in hand, and waits for that bay as its customer does; or it is off with the car aboard.
                 one.is_told_off = True
                 effects.append(self.outputs.show(DeskText.OUT_OF_ORDER, car))
             due_us = self._call_at_us(one)
@@ -266,7 +266,7 @@ class DeskCalls:
         if not one.winner:
             return self.fleet.negotiation.silent_winner(one.task, now_us) != NOBODY
         place = custody.place_of(self.fleet, car)
-        if place is None or not self._is_off(one, now_us):
+        if place is None or not self._is_off(car, one, now_us):
             return False
         plans = self.fleet.mirror.itineraries.values()
         works = [leg for plan in plans for leg in plan.legs if leg.action is LegAction.WORK]
@@ -274,18 +274,21 @@ class DeskCalls:
         # Of who brought it there the plan may stand still.
         return all(from_bus_ms(leg.end_ms, now_us) < one.since_us for leg in there)
 
-    def _is_off(self, one: AskedTicket, now_us: int) -> bool:
-        due_us = self._lost_at_us(one)
+    def _is_off(self, car: Reference, one: AskedTicket, now_us: int) -> bool:
+        due_us = self._lost_at_us(car, one)
         return due_us is not None and now_us >= due_us
 
-    def _lost_at_us(self, one: AskedTicket) -> int | None:
-        obstacle = self.fleet.mirror.obstacles.machines.get(one.winner)
+    def _lost_at_us(self, car: Reference, one: AskedTicket) -> int | None:
+        """When the bay that has taken it, or else the robot that the car is aboard of, counts as lost, bus us."""
+        record = self.fleet.mirror.cars.get(car)
+        carrier = record.custodian if record is not None and record.station == ANY_STATION else NOBODY
+        obstacle = self.fleet.mirror.obstacles.machines.get(one.winner or carrier)
         return None if obstacle is None else max(obstacle.since_us, one.since_us) + patience_us(obstacle)
 
     def next_wake(self) -> int | None:
         """When one is called for, or its winner may count as lost: looked at again and again from then on, bus us."""
         waiting = [self._call_at_us(one) for one in self.asked.values()]
-        lost = [self._lost_at_us(one) for one in self.asked.values() if one.winner]
+        lost = [self._lost_at_us(car, one) for car, one in self.asked.items() if not one.is_told_off or one.winner]
         times = [max(due_us, self._looked_us + LOOK_AGAIN_US) for due_us in lost if due_us is not None]
         times += [due_us for due_us in waiting if due_us is not None]
         if self._room_us is None and any(not (one.winner or one.is_open) for one in self.asked.values()):

@@ -85,10 +85,7 @@ class Stewardship:
         """Learn from calls and awards, and who acts on them; state a car anew when its token has come to me."""
         match message:
             case TaskReport() | Itinerary():
-                for won in [won for won in self._unheard_us if self.winners.get(won) == message.sender]:
-                    # Of a task that its winner has, or had; its plan is told anew with each that it takes on.
-                    if isinstance(message, Itinerary) or self.tasks[won][0] == message.task:
-                        del self._unheard_us[won]
+                self._acts(message)
             case CallForProposals() if self._is_for_a_car(message):
                 self._cars_of_calls[message.sender, message.call] = message.car
                 while len(self._cars_of_calls) > MAX_CALLS:
@@ -103,6 +100,19 @@ class Stewardship:
             case TokenGrant() if message.token_kind is TokenKind.CAR and message.holder == self.fleet.node_id:
                 return self._state_anew(custody.car_of(message), message.version)
         return []
+
+    def _acts(self, word: TaskReport | Itinerary) -> None:
+        """A winner knows of its award; or it has done what it had won, by which it may fetch nothing any more."""
+        for won in [won for won in self._unheard_us if self.winners.get(won) == word.sender]:
+            # Of a task that its winner has, or had; its plan is told anew with each that it takes on.
+            if isinstance(word, Itinerary) or self.tasks[won][0] == word.task:
+                del self._unheard_us[won]
+        if isinstance(word, TaskReport) and word.phase is TaskPhase.DONE:
+            done = (car for car, (task, _) in self.tasks.items() if task == word.task)
+            # In my custody that ends with the car's own right.
+            for car in [one for one in done if self.winners.get(one) == word.sender]:
+                if not self.fleet.tokens.holds(car_token(*car)):
+                    del self.winners[car]
 
     def _is_for_a_car(self, call: CallForProposals) -> bool:
         """Whether its winner may fetch a stored car: only a compartment, or a person's station, calls for that."""
@@ -254,8 +264,8 @@ class Stewardship:
     def _is_untouched(self, car: Reference) -> bool:
         """Whether I hold the car and its station, and nobody has a right to the front as its winner."""
         tokens, winner = self.fleet.tokens, self.winners.get(car)
-        station = self.fleet.mirror.car_station(car)
-        if station is None or not tokens.holds(car_token(*car)) or not tokens.holds(station_token(station)):
+        station = self.fleet.mirror.car_station(car) if tokens.holds(car_token(*car)) else None
+        if station is None or not tokens.holds(station_token(station)):
             return False
         obstacle = self.fleet.mirror.obstacles.machines.get(winner or NOBODY)
         return obstacle is None or station.segment not in obstacle.slots

@@ -143,12 +143,12 @@ class DayModel:
         bay.shown = self._number
         return bay
 
-    def _desk(self, person: _Person, now_us: int) -> _BayModel | None:
+    def _desk(self, person: _Person) -> _BayModel | None:
         """Where a car comes by the site's policy; None where no bay has room for one more."""
         is_own = self._site.desk is DeskPolicy.OWN and person.bay is not None and person.bay.use is not BayUse.ENTRY
         if is_own:
             return person.bay
-        if self._site.desk is DeskPolicy.NEAREST and person.place is not None and person.stored_us <= now_us:
+        if self._site.desk is DeskPolicy.NEAREST and person.place is not None:
             return self._nearest(person.place.segment)
         return self._choose(BayUse.ENTRY)
 
@@ -173,7 +173,15 @@ class DayModel:
 
     def _ask(self, person: _Person, now_us: int) -> None:
         person.asked_us = now_us
-        bay = self._desk(person, now_us)
+        is_aboard = self._site.desk is DeskPolicy.NEAREST and person.stored_us > now_us
+        if is_aboard:
+            # It is called for once it stands.
+            self._at(person.stored_us, lambda then_us: self._send(person, then_us))
+        else:
+            self._send(person, now_us)
+
+    def _send(self, person: _Person, now_us: int) -> None:
+        bay = self._desk(person)
         if bay is None:
             self._waiting.append(person)
         else:
@@ -317,5 +325,5 @@ class DayModel:
         self._found.out_us.append(now_us - person.asked_us)
         self._found.gone_us.append(now_us)
         self._set_free(bay, now_us, now_us)
-        while self._waiting and (suits := self._desk(self._waiting[0], now_us)) is not None:
+        while self._waiting and (suits := self._desk(self._waiting[0])) is not None:
             self._take(suits, self._waiting.popleft(), now_us)
