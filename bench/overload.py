@@ -138,10 +138,14 @@ async def _play(site: Site, demand: Demand, seed: int, loop: VirtualTimeLoop) ->
 
 def probed(site: Site, interval_s: tuple[float, float], cars: int, seed: int) -> Probe:
     """One run to its end, looked at as it went."""
+    return played(site, Demand.by_mean(*interval_s, seed, count=cars), seed)
+
+
+def played(site: Site, demand: Demand, seed: int) -> Probe:
+    """The same of any demand."""
     loop = VirtualTimeLoop()
     try:
         asyncio.set_event_loop(loop)
-        demand = Demand.by_mean(*interval_s, seed, count=cars)
         return loop.run_until_complete(_play(site, demand, seed, loop))
     finally:
         asyncio.set_event_loop(None)

@@ -24,6 +24,7 @@ from onboard.contract.messages import (
 )
 from onboard.core.serial import is_newer
 from onboard.core.token_keys import TokenKey, genesis_holder
+from onboard.wire.pace import SHARES
 
 _SHARES: dict[str, tuple[type, int]] = {
     "share-of-requests": (TokenRequest, 4),
@@ -332,7 +333,7 @@ class Always:
             if span_us >= _LONG_RUN_US and said:
                 frames = len({(one.time_us, one.frame) for one in stage.words[kind]})
                 load = frames * _FRAME_BITS * SECOND / span_us / stage.site.bitrate * 100
-                most = per_cent / len(stage.site.machines)
+                most = per_cent / SHARES[kind.__name__].among(stage.site)
                 stage.judge(name, load <= most, f"{load:.2f} % of the bus, where {most:.2f} % are its share")
         self._changes()
 

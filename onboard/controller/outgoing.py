@@ -63,12 +63,19 @@ class Outgoing:
         #: Told every frame that is to be said, and every one that will not be, as a later one says more.
         self.on_said: Callable[[Frame, int], None] | None = None
         self.on_dropped: Callable[[Frame], None] | None = None
+        #: A heartbeat that has waited, as it is to be said now: meanwhile mirrors have changed, and mine with them.
+        self.renewed: Callable[[Heartbeat], Heartbeat] | None = None
         self._codec = codec
         self._send = send
         self._buckets = {codec.identifier_of(name): Bucket(pace) for name, pace in paces.items()}
         self._head = codec.identifier_of("ItineraryHead")
         self._plans = frozenset({self._head, codec.identifier_of("ItineraryLeg")})
         self._waiting: list[_Waiting] = []
+
+    @property
+    def is_telling(self) -> bool:
+        """Whether a plan of this machine is told in part, or waits to be: nobody else can know it yet."""
+        return any(one.subject in self._plans for one in self._waiting)
 
     def say(self, message: Message, now_us: int) -> None:
         """Send what may go now; the rest waits. Raises ``ValueError`` as ``Codec.encode``."""
@@ -98,7 +105,17 @@ class Outgoing:
                 self._waiting.append(one)
                 held.add(self._head if one.subject in self._plans else one.subject)
             else:
-                self._send(one.frame)
+                self._send(self._as_of_now(one, now_us))
+
+    def _as_of_now(self, one: _Waiting, now_us: int) -> Frame:
+        if self.renewed is None or not isinstance(one.message, Heartbeat) or one.since_us == now_us:
+            return one.frame
+        (frame,) = self._codec.encode(self.renewed(one.message))
+        if frame != one.frame:
+            self._forget([one.frame])
+            if self.on_said is not None:
+                self.on_said(frame, now_us)
+        return frame
 
     def clear(self) -> None:
         """What waits is not said any more."""

@@ -7,7 +7,7 @@ effects are carried out one after the other, so nothing is said before what must
 import asyncio
 from collections import Counter, deque
 from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import ParamSpec
 
@@ -74,6 +74,8 @@ class Controller:
         self._timer_us: int | None = None
         #: What is said on the fleet bus, and what waits for its budget.
         self.outgoing = Outgoing(fleet, paces_of(holon.site), self._put_on_bus)
+        self.outgoing.renewed = lambda beat: replace(beat, mirror_digest=holon.mirror.digest())
+        holon.witness.is_telling = lambda: self.outgoing.is_telling
         self._saying: asyncio.TimerHandle | None = None
         #: Whether its wakes come to rest; a run in simulated time ends with a machine whose wakes do not.
         self.rest = Rest()

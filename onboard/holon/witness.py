@@ -84,6 +84,8 @@ class Witness:
     #: Who has said that it does nothing, as ``Presence`` keeps them.
     halts: Mapping[int, Halted] = field(default_factory=dict)
     doubt: Doubt | None = None
+    #: Whether a plan of mine is on its way still: nobody else has it in his digest.
+    is_telling: Callable[[], bool] = lambda: False
     #: Machines that have answered since this one started: what they say later is no proof against its journal.
     answered: set[int] = field(default_factory=set)
     #: My mirror's digest, and until when it was another.
@@ -140,6 +142,7 @@ class Witness:
         if self._was_mine(told, now_us):
             self._apart.pop(beat.sender, None)
             return
+        self._told[-1] = now_us if self.is_telling() else self._told[-1]
         if now_us - self._told[-1] < FRAMES_WAIT_US or now_us - self._told[0] < RESTLESS_US:
             # Others hear one by one what I said in one step: what they believed in between I never did. Where I say
             # one word after the other, the last ones wait for my share of the bus, and all are behind me.

@@ -10,7 +10,7 @@ A plan that is told anew drops the legs that are over, so a moving leg is known 
 All times are bus time in us. Pure: plans, progress and grants in, an order out.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -201,6 +201,13 @@ class PassingOrder:
         if way is None or number is None:
             return False
         return any(turn.to_come == way.to_come(number) for turn in way.open_turns(there))
+
+    def wants(self, node: int, segments: Iterable[Segment], from_us: int, to_us: int) -> bool:
+        """Whether a machine wants any of these segments at that time, by its plan."""
+        way, stay = self._ways.get(node), Turn(0, from_us, to_us)
+        if way is None:
+            return False
+        return any(overlap_us(turn, stay) > TOLERANCE_US for slot in segments for turn in way.open_turns(slot))
 
     def in_front(self, node: int, other: int, meeting: Meeting) -> int:
         """Who of two that meet passes first by where it is; NOBODY where that does not tell."""

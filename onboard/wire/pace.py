@@ -1,12 +1,14 @@
 """How often a machine may say what is not urgent: budgets that its outgoing queue keeps to, and bounds start from.
 
-A budget is a share of the bus, divided by the machines of the site: so all machines together keep to it, whatever
-their programs want to say, at any bit rate. What no row is for is limited by what it is about (one call of a desk, one
-answer to a request): ``traffic.py`` of a system says by what.
+A budget is a share of the bus, divided by the machines of the site that say such a thing: so all machines together keep
+to it, whatever their programs want to say, at any bit rate. What no row is for is limited by what it is about (one call
+of a desk, one answer to a request): ``traffic.py`` of a system says by what.
 """
 
 from dataclasses import dataclass
 
+from onboard.contract.codes import KindCode
+from onboard.contract.constants import MOBILE_KINDS
 from onboard.core.site import Site
 
 #: A sign of life waits no longer than this for plans, us: half a period, and a machine is silent after three.
@@ -29,12 +31,18 @@ class Share:
     """Of one message: ``parts`` per thousand of the bus for all machines together in the long run.
 
     ``at_once_us``: bus time for what all may say at one instant; but each ``least`` frames, and no more than ``most``.
+    ``who``: the kinds of machines among which it is divided; none for all.
     """
 
     parts: int
     at_once_us: int
     least: int
     most: int
+    who: frozenset[KindCode] = frozenset()
+
+    def among(self, site: Site) -> int:
+        """How many machines of a site it is divided by, 1 at least."""
+        return max(1, sum(not self.who or machine.kind in self.who for machine in site.machines.values()))
 
 
 #: ``least``: rights for one stopping distance, heads of two itineraries, legs of a way over two floors, a heartbeat at
@@ -42,8 +50,8 @@ class Share:
 #: the legs of two, the heartbeats of a start, four reasons. Two thirds of the bus and more are left to what has none.
 SHARES: dict[str, Share] = {
     "TokenRequest": Share(40, 150_000, 4, 14),
-    "ItineraryHead": Share(30, 60_000, 2, 4),
-    "ItineraryLeg": Share(160, 250_000, 8, 62),
+    "ItineraryHead": Share(30, 60_000, 2, 4, MOBILE_KINDS),
+    "ItineraryLeg": Share(160, 250_000, 8, 62, MOBILE_KINDS),
     "Heartbeat": Share(50, 100_000, 3, 4),
     "Diagnostic": Share(10, 60_000, 2, 4),
 }
@@ -51,8 +59,7 @@ SHARES: dict[str, Share] = {
 
 def paces_of(site: Site) -> dict[str, Pace]:
     """The budget of one machine of a site, by the names of the messages that have one."""
-    machines = len(site.machines)
-    return {name: _pace(share, site.bitrate, machines) for name, share in SHARES.items()}
+    return {name: _pace(share, site.bitrate, share.among(site)) for name, share in SHARES.items()}
 
 
 def _pace(share: Share, bit_rate: int, machines: int) -> Pace:

@@ -1,6 +1,7 @@
 """A machine's outgoing queue: what is beyond a budget waits, what is urgent passes, and nothing needless is said."""
 
 import random
+from dataclasses import replace
 
 import pytest
 
@@ -21,9 +22,10 @@ from onboard.contract.messages import (
 )  # fmt: skip
 from onboard.controller.outgoing import Outgoing
 from onboard.core.frame import Frame
+from onboard.systems.car_park.traffic import MOST_LEGS
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
-from onboard.wire.pace import HELD_US, Pace, paces_of
+from onboard.wire.pace import HELD_US, SHARES, Pace, paces_of
 
 PACES = {"ItineraryHead": Pace(2, 1_000), "ItineraryLeg": Pace(4, 100_000), "TokenRequest": Pace(2, 50_000)}
 
@@ -107,6 +109,18 @@ def test_a_sign_of_life_tells_the_latest_and_waits_no_longer_than_it_may() -> No
     assert beats == [(10_000 + HELD_US, fleet_codec().encode(beat(2))[0])]
 
 
+def test_a_sign_of_life_that_has_waited_tells_what_is_believed_when_it_goes_out() -> None:
+    """An older digest was nobody's any more: each of 49 machines asked its sender, who asked all of them."""
+    said = Said()
+    said.queue.renewed = lambda told: replace(told, mirror_digest=99)
+    said.say(plan(1, 6), beat(1))
+    assert said.queue.is_telling
+    said.until(5_000_000)
+    assert said.messages() == [plan(1, 6), beat(99)] and not said.queue.is_telling
+    said.say(beat(2), at_us=6_000_000)
+    assert said.messages()[-1] == beat(2), "one that has not waited is as it was made"
+
+
 def test_a_plan_that_nobody_heard_gives_way_to_the_next_and_one_that_was_begun_is_told_to_its_end() -> None:
     said = Said()
     said.say(plan(1, 8), plan(2, 8), plan(3, 8))
@@ -154,9 +168,15 @@ def test_whatever_a_program_says_its_frames_keep_to_the_budgets(seed: int) -> No
 
 def test_all_machines_together_keep_to_a_share_of_the_bus_at_any_bit_rate() -> None:
     for bit_rate in (125_000, 250_000, 500_000):
-        paces = paces_of(large_with(26, bit_rate))
-        share = sum(26 * 160 * 1e6 / (pace.apart_us * bit_rate) for pace in paces.values())
+        site = large_with(26, bit_rate)
+        paces = paces_of(site)
+        share = sum(SHARES[name].among(site) * 160 * 1e6 / (pace.apart_us * bit_rate) for name, pace in paces.items())
         assert share <= 0.29
+
+
+def test_the_longest_plan_goes_out_at_once_on_the_largest_site_that_ships() -> None:
+    """Told in three seconds, it was taken by all 49 others for something that they had missed: each asked, for ever."""
+    assert paces_of(find_site("harbour"))["ItineraryLeg"].burst >= MOST_LEGS
 
 
 def test_a_fleet_that_may_hardly_say_anything_says_it_later_and_serves_its_cars(

@@ -185,6 +185,29 @@ def test_who_comes_behind_one_that_it_meets_head_on_waits_until_that_is_past() -
     assert second.fleet.mirror.order.meetings(SECOND, FIRST) == []
 
 
+def test_who_lets_another_pass_in_a_spur_waits_there_and_not_on_the_way_out() -> None:
+    """It came out too soon and waited before the spur for who was to pass there first: both waited for ever longer."""
+    site = line_site(9, 10, QUICK, 10, spur_at=4)
+
+    def out_at(out_ms: int) -> list[CarStep]:
+        inside = CarStep(LegAction.STAND, SPUR, 1, 1, 300 * MS, out_ms * MS)
+        into = CarStep(LegAction.TRAVEL, SPUR, 1, 1, 280 * MS, 300 * MS)
+        way_in = [stand(2, 0, 250), travel(2, 4, 250, 280), into]
+        return [*way_in, inside, travel(4, 4, out_ms, out_ms + 20), travel(4, 8, out_ms + 20, out_ms + 70)]
+
+    one = robot(site, FIRST, [stand(1, 0, 300), travel(1, 9, 300, 390)], award_ms=1)
+    two = robot(site, SECOND, out_at(500), award_ms=2)
+    tell_all([one, two])
+    two.program.replace(out_at(300), two.program.stamp)
+    two.fleet.mirror.on_itinerary(two.told(), 0)
+    one.program.shift(0)
+    assert two.hears(one.told()) is YieldDecision.LATER
+    waits = [(step.track, step.from_index) for step in two.program.remaining if step.action is LegAction.STAND]
+    assert waits == [(ALLEY, 2), (SPUR, 1)]
+    one.fleet.mirror.on_itinerary(one.told(), 0)
+    assert one.hears(two.told()) is YieldDecision.NOTHING
+
+
 def test_nobody_comes_behind_what_another_puts_off_for_hours() -> None:
     """On a drawn site three came behind each other in turn until no time on the wire was late enough, and stood."""
     one, two = pair()

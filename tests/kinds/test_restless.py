@@ -19,7 +19,7 @@ def asked(effects: list[Effect]) -> list[Message]:
     return [one.message for one in effects if isinstance(one, Send) and isinstance(one.message, SyncRequest)]
 
 
-def after(words: int, now_us: int) -> list[Message]:
+def after(words: int, now_us: int, *, is_telling: bool = False) -> list[Message]:
     """Whom a robot asks at ``now_us`` that has said so many plans, a second apart, where another's mirror differs."""
     holon = Holon(SITE, SITE.machines[ROBOT], factory_for(SITE, KindCode.ROBOT), boot=1)
     holon.start(0)
@@ -30,6 +30,7 @@ def after(words: int, now_us: int) -> list[Message]:
         told = plan(number)
         holon.mirror.on_itinerary(told, number * SECOND)
         holon.witness.heed([Send(told)], number * SECOND)
+    holon.witness.is_telling = lambda: is_telling
     holon.witness.on_heartbeat(beat, now_us, is_fresh=False)
     return asked(holon.witness.wake(now_us + SECOND))
 
@@ -39,3 +40,8 @@ def test_who_says_one_plan_after_the_other_asks_nobody_whose_mirror_differs() ->
     assert after(1, 5 * SECOND) == [SyncRequest(ROBOT, OTHER, 0)]
     assert after(4, 5 * SECOND) == []
     assert after(4, 8 * SECOND) == [SyncRequest(ROBOT, OTHER, 0)], "it has come to rest"
+
+
+def test_who_has_not_told_its_plan_to_its_end_asks_nobody_who_cannot_know_it() -> None:
+    """A plan of 23 legs takes a second beyond its budget: from its middle a robot asked 20 machines with 943 cars."""
+    assert after(1, 5 * SECOND, is_telling=True) == []

@@ -18,10 +18,11 @@ from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Stamp
 from onboard.core.authority import segment_token
 from onboard.core.site import Segment
-from onboard.systems.car_park.program import CarStep, Program
+from onboard.systems.car_park.program import CarStep, Program, ends_at
 from onboard.systems.car_park.standoff import Standoff
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayFleet
+from onboard.ways.occupancy import standing_segments
 from onboard.ways.passing_order import Meeting
 from onboard.ways.reservations import FOREVER
 from onboard.ways.site import WaySite
@@ -136,9 +137,25 @@ class GivingWay:
                 lacking_us = self.fleet.mirror.order.behind_us(self.fleet.node_id, sender, ends_us[to_come])
                 by_us = lacking_us - (now.begin_us - step.begin_us)
             if by_us > TOLERANCE_US:
-                self.program.delay(number, by_us)
+                self.program.delay(self._not_in_the_way(number, by_us, sender), by_us)
                 answer = YieldDecision.LATER
         return answer
+
+
+    def _not_in_the_way(self, number: int, by_us: int, sender: int) -> int:
+        """Of step ``number`` and those before it the last before which to wait so long is not in the way of ``sender``.
+
+        Who came out of a spur to wait in front of it for who is to pass would be waited for there, and so on for ever.
+        """
+        remaining, order = self.program.remaining, self.fleet.mirror.order
+        for before, _ in reversed(_moving(remaining[: number + 1])):
+            if before == 0:
+                break
+            place = ends_at(self.fleet.site, remaining[before - 1])
+            begin_us = remaining[before].begin_us
+            if not order.wants(sender, standing_segments(self.fleet.site, place), begin_us, begin_us + by_us):
+                return before
+        return number
 
 
 def _begin(meeting: Meeting) -> tuple[int, Segment]:
