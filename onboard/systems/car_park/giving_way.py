@@ -141,7 +141,6 @@ class GivingWay:
                 answer = YieldDecision.LATER
         return answer
 
-
     def _not_in_the_way(self, number: int, by_us: int, sender: int) -> int:
         """Of step ``number`` and those before it the last before which to wait so long is not in the way of ``sender``.
 
