@@ -192,3 +192,26 @@ def test_a_ticket_that_another_took_meanwhile_is_not_fetched_for_by_who_comes_ba
     }
     assert len(fetched_for) == 1
     assert not any(one.sender == 2 and one.winner for at_us, one in scene.all(Award) if at_us > told_us)
+
+
+def asks_again(simulation: Simulation, at_us: int) -> None:
+    """The first customer's ticket is read at the other desk as well, before the car stands."""
+    street = simulation.plant.street
+
+    def reads() -> None:
+        ticket = street.customers[0].ticket
+        assert ticket is not None
+        simulation.plant.compartments[2].insert_ticket(ticket)
+
+    simulation.plant.timers.call_at(at_us, reads)
+
+
+@pytest.mark.parametrize("later_s", [0.5, 1.0, 1.5])
+def test_who_asks_at_two_desks_before_the_car_stands_is_told_at_both_where_it_comes(later_s: float) -> None:
+    asked_us, _ = play(two("nearest"), stays((0, 52))).first(DeskEvent, lambda one: one.event is DeskInput.TICKET)
+    again = partial(asks_again, at_us=asked_us + round(later_s * 1e6))
+    scene = play(two("nearest"), stays((0, 52)), before=again)
+    assert_served(scene, 1)
+    calls = [one for _, one in scene.all(CallForProposals) if one.operation is Operation.RECEIVE]
+    told = {one.sender: one.compartment for _, one in scene.all(DeskOrder) if one.text is DeskText.GO_TO}
+    assert (len(calls), told, ready_at(scene)) == (1, {1: 2, 2: 2}, [2])

@@ -45,6 +45,8 @@ LOOK_AGAIN_US = 2_000_000
 #: so on: whoever hears a call leaves the room to it.
 HOLD_US = 1_000_000
 WAITED_US = 20_000_000
+#: Of desks that all know where a car stands each has its turn so much after the one before, us: a call takes less.
+TURN_US = 20_000
 #: Nobody had room after all: the next try, us.
 FULL_US = 10_000_000
 #: Calls, and cars that others receive, that are remembered; older ones have long left.
@@ -64,6 +66,8 @@ class AskedTicket:
     since_us: int = 0
     call_at_us: int | None = 0
     is_open: bool = False
+    #: It was to be called for when its car had no place yet.
+    is_aboard: bool = False
     #: Its customer was told that the compartment is off to which the car is on its way.
     is_told_off: bool = False
 
@@ -133,8 +137,8 @@ class DeskCalls:
             return None
         if car in self.asked:
             return [self._word(car, self.asked[car].winner)]
-        elsewhere = self._told.get(car, NOBODY)
-        if elsewhere not in (NOBODY, self.fleet.node_id) and elsewhere not in self.fleet.mirror.obstacles.machines:
+        elsewhere = self._told_to(car)
+        if elsewhere != NOBODY:
             return [self._word(car, elsewhere)]
         place = custody.place_of(self.fleet, car)
         obstacles = self.fleet.mirror.obstacles.machines
@@ -146,6 +150,20 @@ class DeskCalls:
         task, number = self.memory.next_reference(self.fleet)
         self.asked[car] = AskedTicket(task, since_us=now_us)
         return [number, self._note(car), self.outputs.show(DeskText.PLEASE_WAIT, car)]
+
+    def _told_to(self, car: Reference) -> int:
+        """Which other compartment that lives hands a car out, by what was heard; NOBODY where none."""
+        node = self._told.get(car, NOBODY)
+        return NOBODY if node == self.fleet.node_id or node in self.fleet.mirror.obstacles.machines else node
+
+    def _asked_for_elsewhere(self) -> list[Effect]:
+        """Who asked at two desks hears at both where the car comes: the other one's call was first."""
+        waiting = [car for car, one in self.asked.items() if not (one.winner or one.is_open)]
+        mine = dict.fromkeys(self.received, self.fleet.node_id)
+        told = {car: node for car in waiting if (node := self._told_to(car) or mine.get(car, NOBODY)) != NOBODY}
+        for car in told:
+            del self.asked[car]
+        return [self._word(car, node) for car, node in told.items()]
 
     def _word(self, car: Reference, winner: int) -> Effect:
         """What the customer reads: where the car comes, or that this is to be known soon."""
@@ -166,6 +184,7 @@ class DeskCalls:
         for car in [car for car in (*self.asked, *self.received) if self._has_left(car)]:
             self.asked.pop(car, None)
             self.received.pop(car, None)
+        effects += self._asked_for_elsewhere()
         rooms = self._rooms(now_us) if self.asked else 0
         if rooms <= 0:
             self._room_us = None
@@ -214,7 +233,16 @@ class DeskCalls:
     def _call(self, car: Reference, one: AskedTicket, now_us: int) -> list[Effect]:
         place = custody.place_of(self.fleet, car)
         if place is None or car not in self.fleet.mirror.cars:
-            one.call_at_us = now_us + LOOK_AGAIN_US
+            one.call_at_us, one.is_aboard = now_us + LOOK_AGAIN_US, True
+            return []
+        others_us = [until_us for call, until_us in self._open_us.items() if self._cars_of_calls.get(call) == car]
+        if one.is_aboard or others_us:
+            # Its driver may have asked at another desk as well, which hears at the same time that it stands now.
+            turn_us = TURN_US * sum(node < self.fleet.node_id for node in self.park.compartments)
+            one.call_at_us, one.is_aboard = (
+                max([now_us + turn_us, *(until_us + HOLD_US for until_us in others_us)]),
+                False,
+            )
             return []
         if not one.since_us:
             # After a restart: who has taken it says so first, and what was said before is void.
