@@ -6,7 +6,17 @@ from bus_sim.sites import find_site
 from onboard.core import authority, backoff, bus_time, mirror, site
 from onboard.core.negotiation import bidding, initiator, negotiation, participant, sub_calls, trust, winners
 from onboard.holon import fixed_times, holding, presence, regeneration, rights, witness
-from onboard.systems.car_park import bay_calls, bay_task, promises, sill, stall, starting, stewardship, travel
+from onboard.systems.car_park import (
+    bay_calls,
+    bay_task,
+    desk_calls,
+    promises,
+    sill,
+    stall,
+    starting,
+    stewardship,
+    travel,
+)
 from onboard.ways import all_or_none, left_behind, passing_order, retreats, standing, told_way
 from onboard.wire import decoder
 
@@ -113,6 +123,7 @@ TIMES: dict[str, tuple[Time, ...]] = {
             _FIXED,
             "a winner that plans no work has lost its task: longer than one without a way keeps it",
         ),
+        Time("T_desk", desk_calls.TURN_US, _FIXED, "turn of a desk to call for a car that stands now"),
         Time("T_claim", bay_task.SETTLING_US, _FIXED, "after a restart, time for a winner to say that it is one"),
         Time("T_told", promises.TOLD_US, _FIXED, "from a ticket to the word when its car will be there"),
     ),
