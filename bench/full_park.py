@@ -236,6 +236,8 @@ def main() -> None:
     parser.add_argument("--operations", type=float, default=2_000.0, help="of the day (default %(default)s)")
     parser.add_argument("--day-hours", type=float, default=23.75, help="counted hours of the day (default %(default)s)")
     args = parser.parse_args()
+    if not 0 <= args.share <= 100:
+        parser.error(f"--share {args.share:g}: write 0 to 100 per cent")
     args.only = [name for name in args.only.split(",") if name in PARTS]
     text = site_text(args.site) + (FAST if args.fast else "")
     site = car_park(parse_site(text, f"{args.site}.toml"))
