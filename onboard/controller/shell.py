@@ -17,7 +17,7 @@ from onboard.controller.rest import Rest
 from onboard.core.effects import Actuate, Effect, Halt, Record, Renew, Report, Send, Tell
 from onboard.core.frame import Frame
 from onboard.holon.holon import Holon
-from onboard.ports.bus import Bus
+from onboard.ports.bus import Bus, ErrorState
 from onboard.ports.ending import NeedsPerson, needs_person
 from onboard.ports.journal import Compaction, Journal
 from onboard.ports.telemetry import Telemetry
@@ -31,6 +31,9 @@ _Given = ParamSpec("_Given")
 
 #: Most frames that wait for one machine; beyond that the oldest bus in the world is too fast for it.
 INBOX_LIMIT = 4096
+#: What the interface had no room for is tried again after this, us: some 70 frames at 500 kbit/s. Where it has taken
+#: none for so long, nobody is there who acknowledges, and all is given up.
+ROOM_US, NO_ROOM_US = 20_000, 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +80,8 @@ class Controller:
         self.outgoing.renewed = lambda beat: replace(beat, mirror_digest=holon.mirror.digest())
         holon.witness.is_telling = lambda: self.outgoing.is_telling
         self._saying: asyncio.TimerHandle | None = None
+        #: What the interface had no room for: who keeps hundreds of cars says more in one answer than it holds.
+        self._unsent: deque[Frame] = deque()
         #: Whether its wakes come to rest; a run in simulated time ends with a machine whose wakes do not.
         self.rest = Rest()
         #: Frames that the fleet bus had taken of me when it last had taken another, and when that was, us.
@@ -217,6 +222,8 @@ class Controller:
         """Carry out effects and waiting events in order, as far as no journal write stands in between."""
         if self._outbox or self._inbox or self.taken_us is not None:
             self._guarded(self._work_off)
+        if self._writing is None and self._unsent:
+            self._writing = self._loop.create_task(self._wait_for_room())
         if self._writing is None and self._may_compact():
             self._writing = self._loop.create_task(self._compact())
         if self._writing is None:
@@ -261,7 +268,25 @@ class Controller:
                 self._halt(why, reason)
 
     def _put_on_bus(self, frame: Frame) -> None:
-        self.ports.fleet_bus.send(frame)
+        bus = self.ports.fleet_bus
+        if not self._unsent and (bus.send(frame) or bus.health().state is ErrorState.BUS_OFF):
+            return
+        self._unsent.append(frame)
+        if self._writing is None:
+            self._writing = self._loop.create_task(self._wait_for_room())
+
+    async def _wait_for_room(self) -> None:
+        """Nothing more is done before what was said is with the interface: it goes out in the order of its saying."""
+        bus, taken_us = self.ports.fleet_bus, self._now_us()
+        while self._unsent and self._now_us() < taken_us + NO_ROOM_US:
+            if bus.send(self._unsent[0]):
+                self._unsent.popleft()
+                taken_us = self._now_us()
+            else:
+                await asyncio.sleep(ROOM_US / 1_000_000)
+        self._unsent.clear()
+        self._writing = None
+        self._carry_out()
 
     def _say_more(self) -> None:
         """What waited for its budget goes out, and what is left has its next time."""
@@ -281,6 +306,7 @@ class Controller:
     def _keep_quiet(self) -> None:
         """What waits is never said."""
         self.outgoing.clear()
+        self._unsent.clear()
         if self._saying is not None:
             self._saying.cancel()
             self._saying = None

@@ -38,8 +38,9 @@ WORDS_WAIT_US = 20_000
 #: Whoever has nothing to say that makes mirrors equal is asked at so many heartbeats, then at every so many.
 OFTEN = 3
 SELDOM = 8
-#: Who asks within this time of an answer shares the next one, us: at power-up all ask all.
-ANSWER_PERIOD_US = 250_000
+#: Who asks within this time of an answer shares the next one, us: at power-up all ask all. And within so many bits of
+#: each of its frames: four who vouch for hundreds of things answer at once, and a frame with stuff bits has 160.
+ANSWER_PERIOD_US, ANSWER_FRAME_BITS = 250_000, 640
 #: Who is to be asked by any one of all: the first slot begins so long after the cause, us, when who was started with
 #: all others has answered all; then each has its own, as long as a question and the first answer at 125 kbit/s.
 FIRST_SLOT_US = 400_000
@@ -197,11 +198,16 @@ class Witness:
         self.tokens.asked = set(self._others)
         # Who comes back after a hold asks anew: what was answered before that is old.
         self.answered.clear()
-        # All answer me now and ask me: what they say in it need not be told to them.
-        self._quiet_until_us = now_us + ANSWER_PERIOD_US
         for node in self._others:
             self._was_started(node)
-        return [*self.tokens.statements(), Send(SyncRequest(self.node_id, NOBODY))]
+        # All answer me now and ask me: what they say in it need not be told to them.
+        return self._be_quiet([*self.tokens.statements(), Send(SyncRequest(self.node_id, NOBODY))], now_us)
+
+    def _be_quiet(self, said: list[Effect], now_us: int) -> list[Effect]:
+        """The next answer is shared by all who ask while this is said: more at once would never let its end through."""
+        said_us = len(said) * ANSWER_FRAME_BITS * 1_000_000 // self.site.bitrate
+        self._quiet_until_us = now_us + max(ANSWER_PERIOD_US, said_us)
+        return said
 
     def shift(self, by_us: int) -> None:
         """Bus time was set, or set anew: what is due stays as far away as it was."""
@@ -273,11 +279,8 @@ class Witness:
     def _live(self, now_us: int) -> set[int]:
         """Who can answer: not who has said that it is halted or held apart; who has stopped itself answers."""
         live = self.mirror.alive(now_us) & self._others
-        return {node for node in live if node not in self.halts or self._has_stopped(node)}
-
-    def _has_stopped(self, node: int) -> bool:
-        """Whether a machine stands of its own accord, and takes in and tells as ever: who is held says OBSTACLE."""
-        return self.mirror.peers[node].state is MachineState.STOPPED
+        stands = {node for node in live if self.mirror.peers[node].state is MachineState.STOPPED}
+        return {node for node in live if node not in self.halts or node in stands}
 
     def wake(self, now_us: int) -> list[Effect]:
         """Ask again who has not answered, and answer those who asked meanwhile."""
@@ -343,11 +346,10 @@ class Witness:
     def on_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         """Answer at once; whoever asks soon after shares one answer with all others who do."""
         if request.whom == self.node_id and self._has_forgotten(request):
-            if not self._may_know_better(request.sender, now_us):
-                self.tokens.drops[Reason.LATE] += 1
-                return self._answer_to(request, now_us)
-            self._doubt(Reason.JOURNAL_LOST, request.sender, f"knew this node under boot {request.boot_before}")
-            return []
+            if self._may_know_better(request.sender, now_us):
+                self._doubt(Reason.JOURNAL_LOST, request.sender, f"knew this node under boot {request.boot_before}")
+                return []
+            self.tokens.drops[Reason.LATE] += 1
         return self._answer_to(request, now_us)
 
     def _may_know_better(self, node: int, now_us: int) -> bool:
@@ -355,8 +357,7 @@ class Witness:
 
         Whoever was there when I was started has compared then; a word of that kind later would stop any machine.
         """
-        since_us = self._since_us or 0
-        just_begun = now_us < since_us + COMPARING_BEATS * self.site.timing.heartbeat_us
+        just_begun = now_us < (self._since_us or 0) + COMPARING_BEATS * self.site.timing.heartbeat_us
         return just_begun or not self.is_over or node not in self.answered
 
     def _answer_to(self, request: SyncRequest, now_us: int) -> list[Effect]:
@@ -381,13 +382,12 @@ class Witness:
 
     def _answer(self, now_us: int) -> list[Effect]:
         askers, self._askers = sorted(self._askers), set()
-        self._answer_at_us, self._quiet_until_us = None, now_us + ANSWER_PERIOD_US
-        effects = self.statements(now_us)
+        self._answer_at_us, effects = None, self.statements(now_us)
         for node in askers:
             effects += self._tell_doubted(node) + self._tell_gifts(node)
         effects += self._tell_own_gifts(set(askers)) + self._for_the_silent(now_us)
         whom = askers[0] if len(askers) == 1 else NOBODY
-        return [*effects, Send(SyncDone(self.node_id, whom, self.boot))]
+        return self._be_quiet([*effects, Send(SyncDone(self.node_id, whom, self.boot))], now_us)
 
     def _tell_doubted(self, node: int) -> list[Effect]:
         lost = self.doubted.get(node, {})
