@@ -23,6 +23,8 @@ from tests.thinned import some
 SCENARIOS = Path(__file__).parent / "scenarios"
 #: Scenarios found by campaigns that are known to fail, and why; each comes off this list with its repair.
 KNOWN: dict[str, str] = {}
+#: Those found since cars come to the compartment beside them where the site file says so.
+AS_IT_SHIPS = {"asked_for_amid_a_power_cut"}
 
 
 #: Sites and the cars of each run, as short as shows something.
@@ -60,8 +62,9 @@ def test_without_faults_no_checker_finds_anything(name: str) -> None:
 )
 def test_what_a_campaign_once_found_does_not_come_back(name: str) -> None:
     scenario, site = load_scenario(SCENARIOS / f"{name}.toml")
-    # Cars came to the desk that reads their tickets on every site when these were found.
-    site = replace(site, desk=DeskPolicy.ANY) if isinstance(site, CarPark) else site
+    # Cars came to the desk that reads their tickets on every site when the others were found.
+    if isinstance(site, CarPark) and name not in AS_IT_SHIPS:
+        site = replace(site, desk=DeskPolicy.ANY)
     report = play(site, scenario)
     assert report.verdict not in FAILURES, report.why()
 
