@@ -38,7 +38,6 @@ from onboard.systems.car_park.outputs import BayOutputs
 from onboard.systems.car_park.records import DeskForRecord, ReceivedRecord, TicketGoneRecord
 from onboard.systems.car_park.site import CarPark, DeskPolicy
 from onboard.ways.mirror import WayFleet
-from onboard.ways.tokens import car_token
 
 #: A car that is aboard a robot, or in a bay, has no way to compare yet: its desk looks again after this, us.
 LOOK_AGAIN_US = 2_000_000
@@ -227,12 +226,11 @@ class DeskCalls:
         return rooms - len(self._open_us) - sum(one.is_open for one in self.asked.values())
 
     def _has_left(self, car: Reference) -> bool:
-        """By the words that all have; one of which not even the right is known left before this machine started.
+        """By its custodian's word: a car of which nothing is known may be anywhere.
 
-        While a robot takes a car nobody says where it is: who starts then hears of its right only.
+        Who was alone when it started hears of others' cars later, and while a robot takes one nobody says where it is.
         """
-        is_known = car in self.fleet.mirror.cars or self.fleet.tokens.is_known(car_token(*car))
-        return bay_task.is_gone(car, self.fleet.mirror) or (not is_known and self.fleet.tokens.is_synced)
+        return bay_task.is_gone(car, self.fleet.mirror)
 
     def _call(self, car: Reference, one: AskedTicket, now_us: int) -> list[Effect]:
         place = custody.place_of(self.fleet, car)
