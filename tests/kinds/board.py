@@ -96,3 +96,12 @@ class Board:
     @property
     def drives(self) -> list[DriveOrder]:
         return [one.message for one in self.said if isinstance(one, Actuate) and isinstance(one.message, DriveOrder)]
+
+
+def taking_part(site: CarPark, node: int) -> Holon:
+    """A machine of a site that has its rights from the start, as where nobody else is."""
+    machine = site.machines[node]
+    holon = Holon(site, machine, factory_for(site, machine.kind), boot=1)
+    holon.start(0)
+    holon.tokens.trust()
+    return holon

@@ -9,11 +9,10 @@ from onboard.core.authority import segment_token, station_token
 from onboard.core.effects import Actuate, Effect, Record, Send
 from onboard.core.journal_records import JournalRecord
 from onboard.core.site import Segment
-from onboard.holon.holon import Holon
 from onboard.systems.car_park.bay_memory import BayMemory, ahead_record, job_record
 from onboard.systems.car_park.bay_task import BayPhase, BayTask
 from onboard.systems.car_park.compartment import Compartment
-from onboard.systems.registry import factory_for
+from tests.kinds.board import taking_part
 from tests.sites import one_floor
 
 SITE = one_floor(robots=2)
@@ -29,9 +28,7 @@ class Bay:
     """Empty, locked on both sides, and waiting for the first of two cars."""
 
     def __init__(self) -> None:
-        self.holon = Holon(SITE, SITE.machines[BAY], factory_for(SITE, SITE.machines[BAY].kind), boot=1)
-        self.holon.start(0)
-        self.holon.tokens.trust()
+        self.holon = taking_part(SITE, BAY)
         self.now_us = 1_000
         for node, car, place in ((SLOW, CAR, SITE.places[0]), (FAST, OTHER, SITE.places[1])):
             self.holon.receive(CarAt(node, car, place.number, 2, WHEELBASE_MM), self.now_us)

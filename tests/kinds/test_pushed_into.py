@@ -6,8 +6,7 @@ from onboard.contract.codes import Reason, TokenKind
 from onboard.contract.messages import Progress, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.effects import Effect, Send
 from onboard.core.site import Segment
-from onboard.holon.holon import Holon
-from onboard.systems.registry import factory_for
+from tests.kinds.board import taking_part
 from tests.sites import one_floor
 
 SITE = one_floor(robots=2)
@@ -21,9 +20,7 @@ class Steward:
     """A compartment that holds the slots of its alley, with robots that say where they are and ask."""
 
     def __init__(self) -> None:
-        self.holon = Holon(SITE, SITE.machines[STEWARD], factory_for(SITE, SITE.machines[STEWARD].kind), boot=1)
-        self.holon.start(0)
-        self.holon.tokens.trust()
+        self.holon = taking_part(SITE, STEWARD)
         self.now_us = 1_000
 
     def hears(self, robot: int, offset_mm: int, speed_mm_s: int = 0) -> None:
