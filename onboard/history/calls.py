@@ -95,6 +95,11 @@ class CallAnswered:
     award: Award
     is_end: bool
 
+    @property
+    def is_withdrawal(self) -> bool:
+        """Whether the caller of a task wants it no more, in whatever call that was."""
+        return self.award.result is CallResult.WITHDRAWN and self.award.sender == self.award.task.origin
+
 
 CallFact = CallOpened | CallRepeated | BidMade | CallAnswered
 

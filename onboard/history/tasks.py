@@ -3,12 +3,14 @@
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import CallResult, Criterion, Operation, TaskPhase
-from onboard.contract.messages import Reference, TaskReport
+from onboard.contract.messages import Award, Reference, TaskReport
 from onboard.history.bounds import drop_oldest
 from onboard.history.calls import CallAnswered, CallOpened
 
 #: Phases of tasks after which nothing is waited for.
 TASKS_OVER = (TaskPhase.DONE, TaskPhase.REFUSED)
+#: Phases of tasks that are begun.
+TASKS_IN_HAND = (TaskPhase.STARTED, TaskPhase.LOADED)
 #: Ends of a call after which its task has neither an owner nor a call.
 CALLS_OVER = (CallResult.REFUSED, CallResult.WITHDRAWN, CallResult.REJECTED)
 
@@ -26,7 +28,8 @@ class TaskHistory:
     depth: int = 0
     #: What is carried or worked on; where no call told it, the task's own name.
     load: Reference | None = None
-    #: Whether its last call ended without a winner and was not opened again: until it is called once more.
+    #: Whether its last call ended without a winner, or its caller wants it no more: until it is called once more, or
+    #: begun all the same.
     is_closed: bool = False
 
     @property
@@ -92,6 +95,8 @@ class TaskFold:
 
     def on_answer(self, fact: CallAnswered) -> None:
         """The end of a call: somebody has the task, or nobody any more."""
+        if fact.is_withdrawal:
+            self._on_withdrawal(fact.award)
         if fact.call is None or not fact.is_end:
             return
         call, award = fact.call.terms, fact.award
@@ -106,6 +111,12 @@ class TaskFold:
             if call.criterion is Criterion.FINISH_TIME:
                 task.promised_ms = fact.call.cost_of(award.winner)
 
+    def _on_withdrawal(self, award: Award) -> None:
+        """Its caller wants it no more, in whatever call it was; who had it already may be at it all the same."""
+        task = self.by_name.get(award.task)
+        if task is not None:
+            task.is_closed = True
+
     def on_report(self, report: TaskReport, time_us: int) -> TaskTold:
         """What its owner or its caller says of it."""
         task = self.by_name.get(report.task)
@@ -113,6 +124,8 @@ class TaskFold:
             return TaskTold(None, report, None, is_first=False)
         is_first, before = report.phase not in task.phase_us, task.phase
         task.phase = report.phase
+        if report.phase in TASKS_IN_HAND and report.sender == task.owner:
+            task.is_closed = False
         if is_first and report.phase is TaskPhase.AWARDED and not task.owner:
             # Ordered by name, without a call.
             task.owner = report.sender

@@ -5,10 +5,12 @@ from pathlib import Path
 import pytest
 
 from bus_sim.cli import main as bus_sim
-from onboard.contract.codes import TaskPhase
+from onboard.contract.codes import CallResult, Reason, TaskPhase
 from onboard.contract.messages import Award, Bid, CallForProposals, Reference, TaskReport
 from onboard.trace.cli import main
-from onboard.trace.story.why import TaskStory, WaitingStory
+from onboard.trace.story.why import TaskStory, WaitingStory, task_lines
+from onboard.trace.view import SiteView
+from onboard.trace.words import Words
 from tests.trace.runs import SITE, SITE_FILE, first, fleet_of, run_log
 
 PARK, FETCH = Reference(1, 1), Reference(1, 2)
@@ -48,6 +50,48 @@ def test_an_undisturbed_story_names_the_handling_the_way_and_the_lift() -> None:
     assert _spent_s(story, 11, "drives") > 10
     assert _spent_s(story, 5, "carries the robot") > 3
     assert _spent_s(story, 1, "call open") == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_load_is_left_where_it_goes_and_taken_where_it_was() -> None:
+    for story in (_story(), _story(task=FETCH)):
+        at = [one.cause.what.rpartition(" ")[2] for one in story.parts if "the car at" in one.cause.what]
+        assert len(set(at)) == 2 and "leaves the car at " + at[0] not in {one.cause.what for one in story.parts}
+
+
+def _called_off(*, until_us: int, is_begun: bool) -> tuple[TaskStory, bool, int]:
+    """The fetch, which its caller wants no more once it is awarded; whether the page counts it then, and when that was.
+
+    ``is_begun``: the robot did not hear so. The log ends ``until_us`` later.
+    """
+    why, view, off_us = WaitingStory(SITE), SiteView(SITE), 0
+    for said in fleet_of(run_log()):
+        message = said.message
+        if off_us and (said.time_us > off_us + until_us or (isinstance(message, TaskReport) and not is_begun)):
+            continue
+        told = [message]
+        if isinstance(message, Award) and message.task == FETCH:
+            told, off_us = [message, Award(1, 0, 0, FETCH, 0, CallResult.WITHDRAWN, Reason.CANCELLED)], said.time_us
+        for one in told:
+            why.feed(one, said.time_us)
+            view.feed(one, said.time_us)
+    why.finish()
+    return why.tasks[FETCH], view.tasks[FETCH].is_waiting, off_us
+
+
+def test_who_is_called_off_is_waited_for_no_longer() -> None:
+    """It was "still busy" with such a task to the end of the log, and the page counted a customer who waits."""
+    story, is_waiting, off_us = _called_off(until_us=60_000_000, is_begun=False)
+    assert not is_waiting
+    assert (story.end_us, story.waited_us) == (off_us, off_us - story.begin_us)
+    assert "called off" in task_lines(story, Words(SITE), 0)[0]
+
+
+def test_who_begins_what_was_called_off_is_waited_for_again() -> None:
+    story, is_waiting, _ = _called_off(until_us=40_000_000, is_begun=True)
+    assert is_waiting and story.end_us is None
+    story, _, _ = _called_off(until_us=600_000_000, is_begun=True)
+    assert "served" in task_lines(story, Words(SITE), 0)[0]
+    assert sum(part.length_us for part in story.parts) == story.waited_us
 
 
 @pytest.mark.parametrize(

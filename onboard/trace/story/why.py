@@ -24,6 +24,7 @@ MISSED_BEATS = 2
 #: A refusal explains standing for this long; a request that still waits is repeated sooner, us.
 _REFUSAL_US = 3_000_000
 _ENDS = (TaskPhase.DONE, TaskPhase.REFUSED)
+_BEGUN = (TaskPhase.STARTED, TaskPhase.LOADED, TaskPhase.DONE)
 
 
 class Cause(NamedTuple):
@@ -59,6 +60,8 @@ class TaskStory:
     phases: dict[TaskPhase, int] = field(default_factory=dict)
     owner: int = 0
     calls: int = 1
+    #: Number of the place at which the load is taken.
+    source: int = 0
     end_us: int | None = None
     #: The call's state: its result if it was closed without an owner.
     result: CallResult | None = None
@@ -68,6 +71,11 @@ class TaskStory:
     def waited_us(self) -> int:
         """From the call to the end, or as far as the log goes."""
         return (self.parts[-1].end_us if self.parts else self.begin_us) - self.begin_us
+
+    @property
+    def is_called_off(self) -> bool:
+        """Whether its caller wants it no more: until it is called anew, or begun all the same."""
+        return self.end_us is not None and self.result is CallResult.WITHDRAWN
 
 
 class WaitingStory:
@@ -120,13 +128,22 @@ class WaitingStory:
                 _put_down(story, heard_us, time_us, Cause("was off, and started anew", node))
 
     def _on_call(self, call: CallForProposals, time_us: int) -> None:
-        story = self.tasks.get(call.task)
-        if story is not None and story.end_us is None:
+        story = self._going(call.task)
+        if story is not None:
             story.calls += call.attempt > story.calls
             story.result = None
             return
-        story = self.tasks[call.task] = TaskStory(call.task, call.operation, call.sender, time_us)
+        story = TaskStory(call.task, call.operation, call.sender, time_us, source=call.from_station)
+        self.tasks[call.task] = story
         self._open.append(story)
+
+    def _going(self, task: Reference) -> TaskStory | None:
+        """The story of a task that is not over; one that was called off goes on."""
+        story = self.tasks.get(task)
+        if story is not None and story.is_called_off:
+            story.end_us = story.result = None
+            self._open.append(story)
+        return None if story is None or story.end_us is not None else story
 
     def _on_answer(self, fact: CallAnswered) -> None:
         award = fact.award
@@ -139,6 +156,8 @@ class WaitingStory:
                 self._is_received(story, self._now_us or story.begin_us)
         else:
             story.result, story.reason = award.result, award.reason
+            if fact.is_withdrawal:
+                self._end(story, self._now_us or story.begin_us)
 
     def _is_received(self, story: TaskStory, time_us: int) -> None:
         """It is known where a load is handed out: whoever does it calls for that under a task of its own."""
@@ -146,7 +165,7 @@ class WaitingStory:
         self._end(story, time_us)
 
     def _on_report(self, report: TaskReport, time_us: int) -> None:
-        story = self.tasks.get(report.task)
+        story = self._going(report.task) if report.phase in _BEGUN else self.tasks.get(report.task)
         if story is None or story.end_us is not None or report.sender not in (story.owner, story.caller):
             return
         story.phases.setdefault(report.phase, time_us)
@@ -244,9 +263,9 @@ class WaitingStory:
             return Cause(f"in the way at {at}: {why}", wait.blocker or owner)
         near = self._history.plans.ahead(owner)[:2]
         leg, following = near[0] if near else None, near[1] if len(near) > 1 else None
-        work = self._work(owner, near)
+        work = self._work(story, near)
         if work is not None:
-            place = self._words.system.place(Station(work.track, work.from_index, work.side).number)
+            place = self._words.system.place(_place(work))
             done, noun = TaskPhase.LOADED in story.phases, self._words.system.noun
             return Cause(f"{'leaves' if done else 'takes'} the {noun} at {place}", owner)
         if owner in self._lives.fresh:
@@ -261,11 +280,13 @@ class WaitingStory:
             return self._planned_wait(story, following)
         return Cause("about to move: rights asked for, orders on their way", owner)
 
-    def _work(self, owner: int, near: tuple[Leg, ...]) -> Leg | None:
+    def _work(self, story: TaskStory, near: tuple[Leg, ...]) -> Leg | None:
         """The plan's leg of taking or leaving a car right here: progress counts it with the way before it."""
+        owner = story.owner
         for leg in near:
             is_here = leg.action is LegAction.WORK and self._at(owner) == Segment(leg.track, leg.from_index)
-            if is_here and (leg is near[0] or self._is_at_end(owner, near[0])):
+            is_taken = TaskPhase.LOADED in story.phases and _place(leg) == story.source
+            if is_here and not is_taken and (leg is near[0] or self._is_at_end(owner, near[0])):
                 return leg
         return None
 
@@ -298,6 +319,11 @@ class WaitingStory:
         return Cause("stands as planned", story.owner)
 
 
+def _place(work: Leg) -> int:
+    """The number of the place at which a leg takes or leaves something."""
+    return Station(work.track, work.from_index, work.side).number
+
+
 def _put_down(story: TaskStory, begin_us: int, end_us: int, cause: Cause) -> None:
     """All from ``begin_us`` to ``end_us`` was spent on this, whatever was thought of it before."""
     begin_us = max(begin_us, story.begin_us)
@@ -317,6 +343,7 @@ def task_lines(story: TaskStory, words: Words, start_us: int) -> list[str]:
     state = (
         "served" if TaskPhase.DONE in story.phases else "not served in this log" if story.end_us is None else "refused"
     )
+    state = "called off" if story.is_called_off else state
     if story.operation is Operation.RECEIVE and story.owner:
         what += f" at {words.machine(story.owner)}"
     lines = [
