@@ -3,7 +3,7 @@
 import pytest
 
 from onboard.config.problems import ConfigError
-from onboard.systems.car_park.site import PlacePolicy, RestAt, RideCalls
+from onboard.systems.car_park.site import DeskPolicy, PlacePolicy, RestAt, RideCalls
 from tests.sites import one_floor
 
 
@@ -54,3 +54,15 @@ def test_cars_stay_where_they_are_unless_the_site_says_otherwise() -> None:
     assert not one_floor().quiet_moves
     site = one_floor(extra="[negotiation]\nquiet_moves = true\n")
     assert site.quiet_moves and site.digest != one_floor().digest
+
+
+SECOND_BAY = '[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,8)"\n'
+
+
+def test_a_car_comes_to_the_bay_that_suits_it_where_each_takes_cars_in_and_gives_them_out() -> None:
+    assert one_floor().desk is DeskPolicy.ANY, "there is one alone"
+    assert one_floor(extra=f'{SECOND_BAY}use = "exit"\n').desk is DeskPolicy.ANY
+    said = [one_floor(extra=SECOND_BAY + word) for word in ("", '[negotiation]\ndesk = "nearest"\n')]
+    assert [site.desk for site in said] == [DeskPolicy.NEAREST] * 2 and said[0].digest == said[1].digest
+    site = one_floor(extra=f'{SECOND_BAY}[negotiation]\ndesk = "any"\n')
+    assert site.desk is DeskPolicy.ANY and site.digest != said[0].digest, "who fetches otherwise is strange"

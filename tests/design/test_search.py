@@ -50,7 +50,9 @@ def day(number: int) -> DayPlan:
 def search(engine: SlowPlant, target: DesignTarget, *, unseen: int = 0) -> Search:
     days = Days([day(1), day(2), day(3)], [day(number) for number in range(4, 4 + unseen)], [])
     ranges = (range(1, 3), range(1, 2), range(1, 4))
-    return Search(site_text("small"), "small.toml", ranges, (1.0, 1.0, 1.0), target, days, engine)
+    # Where any bay may have to be fetched for, waits and machines differ most.
+    text = site_text("small") + '\n[negotiation]\ndesk = "any"\n'
+    return Search(text, "small.toml", ranges, (1.0, 1.0, 1.0), target, days, engine)
 
 
 def found_by(engine: SlowPlant, p95_s: float, *, unseen: int = 0) -> Design:
