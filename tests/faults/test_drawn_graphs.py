@@ -89,11 +89,42 @@ name = "R2"
 node = 32
 at = 4
 """
+RING = """\
+[site]
+name = "d592"
+system = "graph"
+
+[graph]
+rules = "edge-and-node"
+capacity = 5
+speed_mm_s = 500
+load_ms = 0
+edges = [[0, 1, 9000], [1, 2, 8000], [2, 3, 13000], [3, 4, 8000], [4, 5, 4000], [5, 6, 5000], [6, 7, 10000],
+         [7, 0, 6000]]
+
+[[hosts]]
+name = "N1"
+node = 20
+nodes = [0, 2, 4, 6]
+
+[[hosts]]
+name = "N2"
+node = 21
+nodes = [1, 3, 5, 7]
+
+[[desks]]
+name = "D1"
+node = 1
+"""
+RING += "".join(
+    f'\n[[robots]]\nname = "R{number}"\nnode = {30 + number}\nat = {home}\n'
+    for number, home in enumerate((5, 7, 3, 1, 4), start=1)
+)
 
 
-def played(text: str, seed: int, apart_s: float, fault: str) -> TrialReport:
+def played(text: str, seed: int, apart_s: float, *faults: str) -> TrialReport:
     demand = OrderArrivals(12, apart_s)
-    scenario = FaultScenario("drawn", seed, 900.0, demand, (parse_injection(fault),))
+    scenario = FaultScenario("drawn", seed, 900.0, demand, tuple(parse_injection(one) for one in faults))
     return play(parse_site(text, "drawn.toml"), scenario)
 
 
@@ -107,4 +138,11 @@ def test_an_edge_that_was_given_back_unheard_is_free_again() -> None:
 def test_who_loads_while_its_clock_is_set_anew_loads_for_as_long_as_it_takes() -> None:
     """The desk that is the clock of all drifted, and a robot drove off with less aboard than it told."""
     report = played(SMALL, 38, 25.0, "drift:at_s=52.767849,target=D1,ppm=-2000")
+    assert (report.served, report.waiting, tuple(report.violations)) == (12, 0, ())
+
+
+def test_a_slot_that_was_taken_unheard_is_not_given_to_others_for_ever() -> None:
+    """A host did not hear who got a slot of another host's node, and let three robots have it, who asked in vain."""
+    unheard = "lossy:at_s=229.607891,receivers=N1|N2|R1|R5,probability=0.2,seed=369497"
+    report = played(RING, 592, 15.0, "drift:at_s=143.957692,target=R1,ppm=200", unheard)
     assert (report.served, report.waiting, tuple(report.violations)) == (12, 0, ())

@@ -9,7 +9,7 @@ from zlib import crc32
 from onboard.contract.codes import KindCode, MachineState, Reason
 from onboard.contract.constants import NOBODY
 from onboard.contract.graph import EdgeNotice, EdgeState, NodeAnswer, NodeVerdict, RobotAt, TurnSignal
-from onboard.contract.messages import Heartbeat, Message, TokenDispute, TokenGrant
+from onboard.contract.messages import Heartbeat, Message, TokenDispute, TokenGrant, TokenRefusal
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.effects import Effect, Send
@@ -126,6 +126,8 @@ class NodeAgents:
                 return self._on_notice(message, now_us)
             case TokenGrant():
                 self._on_grant(message)
+            case TokenRefusal() if message.requester in self.waiting:
+                return self._on_refusal(message, now_us)
             case Heartbeat():
                 is_strange = is_of_another_site(self.fleet.mirror, message.sender)
                 (self.strangers.discard, self.strangers.add)[is_strange](message.sender)
@@ -203,6 +205,19 @@ class NodeAgents:
         key = TokenKey(grant.token_kind, grant.token)
         if key in self.promised and self.promised[key][0] == grant.holder:
             del self.promised[key]
+
+    def _on_refusal(self, refusal: TokenRefusal, now_us: int) -> list[Effect]:
+        """Who refuses what I take for another's has it, and I missed that: whoever gave it away says so once more.
+
+        Else I let robots have it for ever, and they ask in vain.
+        """
+        key, one = TokenKey(refusal.token_kind, refusal.token), self.waiting[refusal.requester]
+        latest = self.fleet.tokens.beliefs.latest(key)
+        is_news = refusal.version > latest.version and refusal.sender != latest.holder
+        if not is_news or now_us < one.doubt_us or latest.holder in (self.fleet.node_id, NOBODY):
+            return []
+        one.doubt_us = now_us + DOUBT_US
+        return [Send(TokenDispute(self.fleet.node_id, *key, latest.version, latest.holder))]
 
     # --- what is answered --------------------------------------------------------------------------------------
 
