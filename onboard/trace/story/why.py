@@ -14,7 +14,7 @@ from onboard.core.site import Segment, Site, Station
 from onboard.history.calls import CallAnswered, CallOpened, is_task
 from onboard.history.history import History
 from onboard.history.lives import Beat
-from onboard.history.tasks import TaskTold
+from onboard.history.tasks import TASKS_IN_HAND, TASKS_OVER, TaskTold
 from onboard.systems.words import plain
 from onboard.trace.words import Words
 from onboard.ways.site import way_site
@@ -23,8 +23,7 @@ from onboard.ways.site import way_site
 MISSED_BEATS = 2
 #: A refusal explains standing for this long; a request that still waits is repeated sooner, us.
 _REFUSAL_US = 3_000_000
-_ENDS = (TaskPhase.DONE, TaskPhase.REFUSED)
-_BEGUN = (TaskPhase.STARTED, TaskPhase.LOADED, TaskPhase.DONE)
+_BEGUN = (*TASKS_IN_HAND, TaskPhase.DONE)
 
 
 class Cause(NamedTuple):
@@ -165,11 +164,15 @@ class WaitingStory:
         self._end(story, time_us)
 
     def _on_report(self, report: TaskReport, time_us: int) -> None:
-        story = self._going(report.task) if report.phase in _BEGUN else self.tasks.get(report.task)
-        if story is None or story.end_us is not None or report.sender not in (story.owner, story.caller):
+        story = self.tasks.get(report.task)
+        if story is None or report.sender not in (story.owner, story.caller):
+            return
+        if report.phase in _BEGUN:
+            self._going(report.task)
+        if story.end_us is not None:
             return
         story.phases.setdefault(report.phase, time_us)
-        if report.phase in _ENDS:
+        if report.phase in TASKS_OVER:
             self._end(story, time_us)
         elif story.operation is Operation.RECEIVE and report.phase is TaskPhase.AWARDED:
             self._is_received(story, time_us)
