@@ -58,7 +58,8 @@ class StepTurn(Message):
 class TurnRequest(Message):
     """A robot asks for a turn to plan.
 
-    Others need the place where its path ends, or it has no task and would wait better elsewhere.
+    Others need the place where its path ends, it has no task and would wait better elsewhere, or what it has aboard
+    would be there sooner by another path.
     """
 
     #: The step. 0 to 4194303.

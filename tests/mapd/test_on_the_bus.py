@@ -13,7 +13,7 @@ from bus_sim.session import play
 from bus_sim.systems.mapd.published import token_passing
 from bus_sim.systems.mapd.steps import SteppedDay
 from onboard.cli import main as onboard
-from onboard.contract.mapd import StepRound, StepState
+from onboard.contract.mapd import PathHead, StepRound, StepState, StepTurn, TurnRequest
 from onboard.contract.messages import Award, Bid, CallForProposals, Reference
 from onboard.systems.mapd.site import Mapd
 from onboard.wire.codec import codecs
@@ -26,7 +26,7 @@ def without_bus(site: Mapd) -> SteppedDay:
     return SteppedDay(site.floor, list(site.homes.values()), site.rests, site.tasks, ends=site.endpoints).run()
 
 
-@pytest.mark.parametrize(("robots", "seed"), [(1, 1), (4, 2), (6, 3)])
+@pytest.mark.parametrize(("robots", "seed"), [(1, 1), (4, 2), (6, 3), (6, 37)])
 def test_p59_the_bus_brings_the_same_day_as_the_robots_decisions_alone(robots: int, seed: int) -> None:
     site = made(robots, drawn(14, seed))
     run, plant = played(site)
@@ -50,6 +50,28 @@ def test_p59_bids_and_awards_are_frames_and_better_bids_speak_sooner() -> None:
     assert (award.winner, award.task) == (first[0].sender, Reference(site.desk, 0))
     told = {one.task: one.step for one in said if isinstance(one, StepState) and one.served}
     assert told == plant.served
+
+
+def test_what_is_aboard_goes_another_way_where_it_will_be_there_sooner() -> None:
+    run, _ = played(made(6, drawn(14, 37)))
+    loaded: set[int] = set()
+    asks: set[tuple[int, int]] = set()
+    turns: set[tuple[int, int]] = set()
+    planned: list[tuple[int, int]] = []
+    for _, message in run.messages:
+        match message:
+            case StepState():
+                (loaded.add if message.loaded else loaded.discard)(message.sender)
+            case TurnRequest() if message.sender in loaded:
+                asks.add((message.sender, message.step))
+            case StepTurn() if not message.won:
+                turns.add((message.robot, message.step))
+            case PathHead() if (message.sender, message.step) in asks and not message.kept:
+                planned.append((message.sender, message.step))
+    assert run.is_good
+    assert len(asks) > 3
+    assert asks <= turns
+    assert sorted(planned) == sorted(asks)
 
 
 def test_p59_a_ring_of_robots_is_never_planned_and_following_is() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from onboard.systems.mapd.floor import Floor, NetworkLine, grid_floor, network_floor
 from onboard.systems.mapd.paths import Path, Paths
-from onboard.systems.mapd.search import find_path
+from onboard.systems.mapd.search import find_path, is_sooner
 from onboard.ways.rests import lasting_rests
 from onboard.ways.steps import STEP_US, StepMoves, cell_segment
 
@@ -34,6 +34,19 @@ def may_move(floor: Floor, others: Paths, cell: int, to: int, step: int) -> bool
 def may_rest(floor: Floor, others: Paths, cell: int, step: int) -> bool:
     """Whether one may stay in a cell for ever from a step on."""
     return find_path(floor, others, cell, step, (), frozenset([cell])) == Path(step, (cell,))
+
+
+def test_a_way_that_has_become_free_is_sooner_and_a_straight_one_is_not() -> None:
+    # Robot 0 let another pass in front of it on its way to cell 4, and then that one went elsewhere.
+    waits, passes = Path(0, (0, 0, 0, 0, 1, 2, 3, 4)), Path(0, (2, 2, 7, 7))
+    passage, ends = grid_floor([".....", "@@.@@"]), frozenset([4])
+    gone = paths_of(passage, waits, passes)
+    assert is_sooner(passage, gone, 0, 0, 4, ends)
+    assert gone.by_robot == {0: waits, 1: passes}, "nothing is published by looking"
+    assert is_sooner(passage, gone, 0, 2, 4, ends)
+    assert not is_sooner(passage, gone, 0, 3, 4, ends), "from there its path is the shortest"
+    stays = paths_of(passage, waits, Path(0, (2, 2, 2, 2, 2, 7)))
+    assert not is_sooner(passage, stays, 0, 0, 4, ends), "who made it wait still does"
 
 
 def test_two_robots_cannot_be_in_one_cell() -> None:

@@ -12,7 +12,7 @@ from onboard.systems.mapd.calls import CALLS_A_ROUND
 from onboard.systems.mapd.floor import Floor
 from onboard.systems.mapd.nearby import Nearby
 from onboard.systems.mapd.paths import Path, Paths
-from onboard.systems.mapd.search import find_path
+from onboard.systems.mapd.search import find_path, is_sooner
 from onboard.systems.mapd.tasks import TransportTask
 from onboard.systems.mapd.waiting import WaitingPlaces
 
@@ -33,7 +33,8 @@ class SteppedDay:
     """A day's work: ``run`` plays it. ``served`` is the step at which each task was delivered, by number.
 
     ``searches`` were made, and in ``failures`` of them a robot kept its former path. ``rests`` are where robots may
-    stay, ``ends`` where tasks begin and end. Without ``waits`` robots wait where they end, and who works makes no room.
+    stay, ``ends`` where tasks begin and end. Without ``waits`` robots wait where they end, and who works makes no room
+    and looks for no other way.
     """
 
     floor: Floor
@@ -132,26 +133,30 @@ class SteppedDay:
         asking = {robot.number for robot in self.robots if self._wants_turn(robot)}
         offers, tasks = [self._offer(one) for one in self.robots], list(self.open.values())
         won = winners(self._nearby, self.rule, offers, tasks, self.step)
+        for robot, task in self._in_turns(won, asking):
+            self._plan(robot, task)
+
+    def _in_turns(
+        self, won: dict[int, tuple[TransportTask, int]], asking: set[int]
+    ) -> list[tuple[SteppingRobot, TransportTask | None]]:
+        """Who plans, and for which task, as the desk puts them in order."""
         first: list[tuple[SteppingRobot, TransportTask | None]] = []
         then: list[tuple[int, int, TransportTask]] = []
-        last: list[SteppingRobot] = []
+        last: list[tuple[SteppingRobot, TransportTask | None]] = []
         for robot in self.robots:
             task, bid = won.get(robot.number, (None, 0))
-            must_yield = robot.number in asking and self._is_in_the_way(robot)
+            is_asking = robot.number in asking
+            must_yield = is_asking and self._is_in_the_way(robot)
             if robot.loaded:
-                first += [(robot, None)] if must_yield else []
+                turns = first if must_yield else last
+                turns += [(robot, None)] if is_asking else []
             elif task is not None and task != robot.task:
                 then.append((bid, robot.number, task))
             elif must_yield or task != robot.task:
                 first.append((robot, task))
-            elif task is None and robot.number in asking:
-                last.append(robot)
-        for one, same in first:
-            self._plan(one, same)
-        for _, number, task in sorted(then, key=lambda turn: turn[:2]):
-            self._plan(self.robots[number], task)
-        for robot in last:
-            self._plan(robot, None)
+            elif task is None and is_asking:
+                last.append((robot, None))
+        return first + [(self.robots[number], task) for _, number, task in sorted(then, key=lambda one: one[:2])] + last
 
     def _is_in_the_way(self, robot: SteppingRobot) -> bool:
         rest = self.paths.by_robot[robot.number].rest
@@ -160,8 +165,13 @@ class SteppedDay:
     def _wants_turn(self, robot: SteppingRobot) -> bool:
         path = self.paths.by_robot[robot.number]
         if robot.task is not None:
-            return self.waits and self._is_in_the_way(robot)
+            return self.waits and (self._is_in_the_way(robot) or self._is_sooner(robot, robot.task))
         return path.rest not in self._rests(robot) or (self.waits and self._waits_better(robot, path) is not None)
+
+    def _is_sooner(self, robot: SteppingRobot, task: TransportTask) -> bool:
+        return robot.loaded and is_sooner(
+            self.floor, self.paths, robot.number, self.step, task.delivery, self._rests(robot)
+        )
 
     def _waits_better(self, robot: SteppingRobot, path: Path) -> int | None:
         others = []
@@ -211,8 +221,8 @@ class SteppedDay:
         self.paths.put(robot.number, path)
         robot.task = task
         if task is not None:
-            first = next(step for step, cell in path.steps() if cell == goals[0])
-            robot.free_at = next(step for step, cell in path.steps() if cell == task.delivery and step >= first)
+            first = path.arrival(goals[0], self.step)
+            robot.free_at = path.arrival(task.delivery, first)
             if not robot.loaded and first == self.step:
                 self._pick_up(robot, task)
                 self._is_news = True

@@ -224,17 +224,21 @@ class TransportDesk(Plain):
     def _order(self) -> list[tuple[int, int]]:
         """Who plans, and for which task, first ones first: everybody keeps what it bid best for.
 
-        First who lost its task or must make room, then who won, lower bids first, then who only goes where it waits.
+        First who lost its task or must make room, then who won, lower bids first, then who only goes where it waits, or
+        by another way with what it carries.
         """
         won = self._won()
-        first, then, last = [], [], []
+        first: list[tuple[int, int]] = []
+        then: list[tuple[int, int, int]] = []
+        last: list[tuple[int, int]] = []
         for robot in self.site.robots:
             before = self.knowledge.task_of(robot)
             task, bid = won.get(robot, (NO_TASK, 0))
             is_asking = robot in self.yielding
             must_yield = is_asking and self.knowledge.is_in_the_way(robot, self.site.homes[robot])
             if robot in self.knowledge.loads:
-                first += [(robot, NO_TASK)] if must_yield else []
+                turns = first if must_yield else last
+                turns += [(robot, NO_TASK)] if is_asking else []
             elif task not in (NO_TASK, before):
                 then.append((bid, robot, task))
             elif must_yield or task != before:

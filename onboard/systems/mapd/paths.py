@@ -30,6 +30,11 @@ class Path:
         """Cell at a step; before ``start`` the first, for a path that is heard may begin later."""
         return self.cells[max(0, min(step - self.start, len(self.cells) - 1))]
 
+    def arrival(self, cell: int, step: int) -> int:
+        """The first step from ``step`` on at which the robot is in a cell, the ``end`` for one it comes to no more."""
+        first = max(self.start, step)
+        return next((at for at in range(first, self.end + 1) if self.at(at) == cell), max(self.end, step))
+
     @property
     def end(self) -> int:
         """First step of the stay in the last cell."""

@@ -37,7 +37,7 @@ from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.memory import path_record, read_past
 from onboard.systems.mapd.moves import path_frames
 from onboard.systems.mapd.paths import Path
-from onboard.systems.mapd.search import find_path
+from onboard.systems.mapd.search import find_path, is_sooner
 from onboard.systems.mapd.site import Mapd
 from onboard.systems.mapd.steps import LAST, STEP_TABLE, GridStepPhase, StepDeed, StepFinding
 from onboard.systems.mapd.turns import Turns
@@ -432,9 +432,7 @@ class UnitRobot(Plain):
         carried = self.knowledge.tasks.get(self.task)
         if not self._is_loaded or carried is None:
             return Availability(me, path.at(self.step), 0)
-        steps = range(self.step, max(self.step, path.end) + 1)
-        free_at = next((step for step in steps if path.at(step) == carried.delivery), path.end)
-        return Availability(me, carried.delivery, free_at - self.step)
+        return Availability(me, carried.delivery, path.arrival(carried.delivery, self.step) - self.step)
 
     def _rests(self) -> frozenset[int]:
         """Where it may end: not in others' homes, nor where somebody has to pick up or deliver; its home always."""
@@ -443,8 +441,16 @@ class UnitRobot(Plain):
     def _wants_turn(self) -> bool:
         path = self.knowledge.paths.by_robot[self.fleet.node_id]
         if self.task != NO_TASK:
-            return self.knowledge.is_in_the_way(self.fleet.node_id, self._home)
+            return self.knowledge.is_in_the_way(self.fleet.node_id, self._home) or self._is_sooner()
         return path.rest not in self._rests() or self._waits_better(path) is not None
+
+    def _is_sooner(self) -> bool:
+        """Whether what it carries would be there sooner by another path."""
+        carried = self.knowledge.tasks.get(self.task)
+        if not self._is_loaded or carried is None:
+            return False
+        floor, paths, me = self.site.floor, self.knowledge.paths, self.fleet.node_id
+        return is_sooner(floor, paths, me, self.step, carried.delivery, self._rests())
 
     def _waits_better(self, path: Path) -> int | None:
         """Where it would wait better than at the end of its path."""

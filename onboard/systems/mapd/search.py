@@ -40,3 +40,18 @@ def find_path(
         steps = (leg.end_us - leg.begin_us) // STEP_US
         cells += [leg.to_index if leg.action is LegAction.TRAVEL else cells[-1]] * steps
     return Path(step, tuple(cells))
+
+
+def is_sooner(floor: Floor, paths: Paths, robot: int, step: int, goal: int, rests: frozenset[int]) -> bool:
+    """Whether a robot would now find a way that brings it to ``goal`` before its published path does.
+
+    What it planned around may have gone elsewhere since. Its path is back in ``paths`` afterwards.
+    """
+    old = paths.by_robot[robot]
+    here, arrival = old.at(step), old.arrival(goal, step)
+    if arrival <= step + floor.steps_to(goal)[here]:
+        return False
+    paths.take(robot)
+    found = find_path(floor, paths, here, step, (goal,), rests)
+    paths.put(robot, old)
+    return found is not None and found.arrival(goal, step) < arrival
