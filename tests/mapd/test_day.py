@@ -98,9 +98,9 @@ def test_no_task_waits_for_ever_behind_new_ones_that_are_nearer() -> None:
         return winners(Nearby(floor), BidWeights(), [Availability(11, 0, 0)], tasks, 5 + later)[11][0].number
 
     assert chosen(0) == 2
-    # 28 steps more to the pick-up and 28 more with the load, at 100 and 27, less 5 at 50 as the old one ends beside the
+    # 28 steps more to the pick-up and 28 more with the load, at 100 and 27, less 5 at 55 as the old one ends beside the
     # other, against 20 for each step: half of it, as there are two tasks for one robot.
-    assert (chosen(330), chosen(331)) == (2, 1)
+    assert (chosen(328), chosen(329)) == (2, 1)
 
 
 @pytest.mark.parametrize(("tasks", "robots", "later"), [(1, 1, 200), (10, 10, 200), (2, 10, 200), (40, 10, 50)])

@@ -47,7 +47,7 @@ class BidWeights:
     crowded_wait: int = 50
     crowded_loaded: int = 27
     #: Where much is open: for each step from its end to the next task, and for each that others end nearer to it.
-    nearby: int = 50
+    nearby: int = 55
     #: Where all are shared out, for each step that a task is shorter than the longest: what takes longest begins first.
     shorter: int = 300
 
