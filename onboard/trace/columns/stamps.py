@@ -11,7 +11,7 @@ _TENS = 10 ** np.arange(len(_PLACES) - 1, -1, -1, dtype=np.int64)
 
 def stamps(time_us: npt.NDArray[np.int64]) -> list[str] | None:
     """Absolute times in brackets, a space before and behind; None where one has more than ten digits of seconds."""
-    if len(time_us) and not 0 <= int(time_us.min()) <= int(time_us.max()) < 10 * _TENS[0]:
+    if len(time_us) and not 0 <= int(np.min(time_us)) <= int(np.max(time_us)) < 10 * _TENS[0]:
         return None
     text = np.empty((len(time_us), len(_FORM)), np.uint8)
     text[:] = np.frombuffer(_FORM, np.uint8)
