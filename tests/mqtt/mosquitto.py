@@ -28,7 +28,10 @@ def free_port() -> int:
 
 @cache
 def certificates(folder: Path) -> Path:
-    """An authority, a broker and one client for each role and for a stranger's authority; EC keys, quick to make."""
+    """An authority, a broker and one client for each role and for a stranger's authority; EC keys, quick to make.
+
+    With the extensions that RFC 5280 asks for (4.2.1.1 to 4.2.1.3): Python 3.13 and newer refuse what lacks them.
+    """
     openssl = require_tool("openssl")
     folder.mkdir(parents=True, exist_ok=True)
 
@@ -39,6 +42,7 @@ def certificates(folder: Path) -> Path:
         key(name)
         run_tool(
             *(openssl, "req", "-x509", "-new", "-key", str(folder / f"{name}.key"), "-subj", f"/CN={name}"),
+            *("-addext", "keyUsage=critical,keyCertSign,cRLSign"),
             *("-days", "2", "-out", str(folder / f"{name}.pem")),
         )
 
@@ -57,7 +61,9 @@ def certificates(folder: Path) -> Path:
             ),
             *("-out", str(request)),
         )
-        extensions.write_text(f"basicConstraints=CA:FALSE\n{extra}\n", encoding="ascii")
+        told = "basicConstraints=CA:FALSE\nkeyUsage=critical,digitalSignature\n"
+        told += "subjectKeyIdentifier=hash\nauthorityKeyIdentifier=keyid\n"
+        extensions.write_text(f"{told}{extra}\n", encoding="ascii")
         run_tool(
             *(openssl, "x509", "-req", "-in", str(request), "-CA", str(folder / f"{of}.pem")),
             *("-CAkey", str(folder / f"{of}.key"), "-CAcreateserial", "-days", "2"),

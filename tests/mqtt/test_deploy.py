@@ -81,7 +81,8 @@ async def test_each_role_writes_what_it_may_and_nothing_else(mosquitto: Mosquitt
     """What is forbidden vanishes, as MQTT 3.1.1 has it (3.3.5): who reads it all does not see it."""
     ready = asyncio.Event()
     witness = asyncio.ensure_future(heard_until(mosquitto.broker(WITNESS), ("#",), b"last", ready))
-    await ready.wait()
+    async with asyncio.timeout(DEADLINE_S):
+        await ready.wait()
     async with mosquitto.broker(role).session(f"{role}-1", None, ()) as session:
         for topic in sorted(EVERY):
             await session.publish(Publication(topic, b"x", 1))
