@@ -15,6 +15,8 @@ YEARS = range(1970, 2200)
 _DAY_NUMBERS = range(15_000, 100_000)
 #: The year of a format that says none.
 _NO_YEAR = 1900
+#: Directives that say one. A day without a year Python 3.13 reads with a warning, and 3.15 may not.
+_OF_YEAR = ("%Y", "%y", "%G", "%c", "%x")
 #: The longest text of ISO 8601 that is a day without a time.
 _DAY_LENGTH = len("2019-07-24")
 
@@ -27,7 +29,7 @@ def checked_format(text: str) -> str:
     """A format as it is, or one of our words. Raises ``DemandError`` for one that ``strptime`` does not have."""
     if text not in _PER_SECOND:
         try:
-            datetime.strptime(datetime(2000, 2, 2, tzinfo=UTC).strftime(text), text)  # noqa: DTZ007  # a trial
+            _strptime(datetime(2000, 2, 2, tzinfo=UTC).strftime(text), text)
         except ValueError as error:
             what = str(error).partition(" in format")[0]
             raise DemandError(
@@ -106,9 +108,16 @@ def _by_format(text: str, form: str) -> datetime | None:
             if _is_day_number(text):
                 return None
             return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=float(text) / _PER_SECOND[form])
-        return datetime.strptime(text, form)  # noqa: DTZ007  # a format may have an offset or none: the caller looks
+        return _strptime(text, form)
     except (ValueError, OverflowError):
         return None
+
+
+def _strptime(text: str, form: str) -> datetime:
+    """In ``_NO_YEAR`` where the format says none. Raises ``ValueError``."""
+    if not any(directive in form for directive in _OF_YEAR):
+        text, form = f"{_NO_YEAR} {text}", f"%Y {form}"
+    return datetime.strptime(text, form)  # noqa: DTZ007  # a format may have an offset or none: the caller looks
 
 
 def _clocked(moment: datetime, zone: ZoneInfo) -> tuple[datetime, ...]:
