@@ -323,7 +323,9 @@ class Holon:
             case TimeHeard.FIRST:
                 return self._begin(now_us)
             case TimeHeard.SET_ANEW:
-                return self._set_anew(now_us)
+                # What was read of plans meanwhile was read in the wrong time.
+                self.mirror.retime(now_us)
+                return self._awake(now_us)
         return []
 
     def _begin(self, now_us: int) -> list[Effect]:
@@ -335,11 +337,6 @@ class Holon:
         self._sensed_early.clear()
         self.fixed.say_first(now_us, self.behaviour.state, asks=not self.journal.is_foreign)
         return effects
-
-    def _set_anew(self, now_us: int) -> list[Effect]:
-        """Bus time was far off, and is set: what was read of plans meanwhile was read in the wrong time."""
-        self.mirror.retime(now_us)
-        return self._awake(now_us)
 
     # --- handlers ----------------------------------------------------------------------------------------------
 
@@ -382,11 +379,9 @@ class Holon:
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         if request.whom not in (NOBODY, self.node_id):
             return []
-        effects = self.witness.on_request(request, now_us)
-        if self.clock.is_source:
-            # Who asks may just have joined: it need not wait for the next period.
-            effects = [self.fixed.bus_time(now_us), *effects]
-        return effects
+        # Who asks may just have joined: it need not wait for the next period.
+        told = [self.fixed.bus_time(now_us)] if self.clock.is_source else []
+        return told + self.witness.on_request(request, now_us)
 
     def _statements(self, now_us: int) -> list[Effect]:
         return self.behaviour.statements(now_us) + self.mirror.statements()

@@ -10,8 +10,9 @@ from enum import Enum
 from onboard.contract.codes import Reason
 from onboard.contract.constants import MOBILE_KINDS
 from onboard.contract.messages import BusTime
-from onboard.core.bus_time import BUS_TIME_MODULUS, MAX_SLEW_US, BusClock
+from onboard.core.bus_time import BUS_TIME_MODULUS, FAR_US, MAX_SLEW_US, BusClock
 from onboard.core.mirror import Mirror
+from onboard.core.serial import away
 from onboard.core.site import Machine, Site
 
 
@@ -40,8 +41,8 @@ class Timekeeper:
     due_us: int | None = None
     _steady_us: int = 0
     _behind_us: int = 0
-    #: The lowest node that has sent bus time within a heartbeat, and when it did last, loop time in us.
-    _source: tuple[int, int] | None = None
+    #: The lowest node that has sent bus time within a heartbeat, and when it did last, us: loop time, and as it said.
+    _source: tuple[int, int, int] | None = None
 
     def __post_init__(self) -> None:
         self.clock = BusClock(self.site.timing.bus_time_us)
@@ -103,13 +104,17 @@ class Timekeeper:
         return TimeHeard.SET_ANEW if self.clock.bus_us(local_us) - before_us > MAX_SLEW_US else TimeHeard.FOLLOWED
 
     def _is_old(self, message: BusTime, local_us: int) -> bool:
-        """Whether a machine that is the source no longer says a time that waited behind its other words.
+        """Whether a time waited behind other words of its sender.
 
-        At power-up every fixed machine sends bus time until it hears a lower one, and may have hundreds of words before
-        it on the bus: two such times that are as far off would set clocks wrong.
+        At power-up a fixed machine that is not the source has hundreds of words before it on the bus; and the source
+        tells each who asks, behind its own answer to the first. Two such times are as far off, and would set clocks.
         """
-        known = self._source
-        if known is None or message.sender <= known[0] or local_us - known[1] >= self.site.timing.heartbeat_us:
-            self._source = message.sender, local_us
+        known, said_us = self._source, message.bus_time_us
+        if known is not None and message.sender > known[0] and local_us - known[1] < self.site.timing.heartbeat_us:
+            return self.clock.is_far(said_us, local_us)
+        self._source = message.sender, local_us, said_us
+        if known is None or message.sender != known[0] or not 0 <= said_us - known[2] <= FAR_US:
             return False
-        return self.clock.is_far(message.bus_time_us, local_us)
+        is_behind = away(said_us, self.clock.said_us(local_us), BUS_TIME_MODULUS) < -FAR_US
+        self.clock.far_us = None if is_behind else self.clock.far_us  # the one before has waited too
+        return is_behind

@@ -154,6 +154,21 @@ def test_an_old_time_of_who_is_the_source_no_longer_sets_no_clock() -> None:
     assert robot.clock.bus_us(0) == HOURS_US, "it is the source once the lower one was silent for a heartbeat"
 
 
+def test_times_that_waited_behind_an_answer_set_no_clock() -> None:
+    """Three ask the source at once: it tells each the time, and before the second and third time its long answer."""
+    robot = fixed(11)
+    robot.start(0)
+    robot.receive(BusTime(BAY, 1_000_000), 0)
+    before_us = robot.clock.bus_us(0)
+    robot.receive(BusTime(BAY, 6_009_000), 5_009_300)
+    for said_us in (6_009_500, 6_009_800):
+        effects = robot.receive(BusTime(BAY, said_us), said_us - 1_000_000 + 277_000)
+        assert effects == []
+    now_us = 10_000_000
+    assert abs(robot.clock.bus_us(0) - before_us) <= MAX_SLEW_US and not robot.clock.is_lost(now_us)
+    assert robot.drops[Reason.LATE] == 2
+
+
 def asked_alone(effects: list[Effect]) -> list[int]:
     words = [effect.message for effect in effects if isinstance(effect, Send)]
     return [word.whom for word in words if isinstance(word, SyncRequest) and word.whom]
@@ -172,7 +187,7 @@ def test_a_clock_that_is_set_while_all_answer_a_start_asks_nobody_alone() -> Non
     for node in (BAY, LIFT):
         effects += robot.receive(beat(node), 1_000)
     effects += robot.receive(BusTime(BAY, 5_000), 6_000)
-    for late_us in (300_000, 301_000):
+    for late_us in (200_000, 201_000 + FAR_US):
         effects += robot.receive(BusTime(BAY, late_us - 200_000), late_us)
     for due_us in range(310_000, 380_000, 10_000):
         effects += robot.wake(due_us)
