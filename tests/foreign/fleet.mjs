@@ -101,7 +101,9 @@ export class Fleet {
 
   /** T2, T3. */
   #onTime(told) {
-    const error = told - this.local - (this.offset ?? 0);
+    const [error, since] = [told - this.local - (this.offset ?? 0), told - this.toldUs];
+    this.toldUs = told;
+    if (error < -100 * MS && since >= 0 && since <= 100 * MS) return (this.far = undefined);
     const isSame = Math.abs(error - this.far) <= 20 * MS;
     const [isFirst, isNear] = [this.offset === undefined, Math.abs(error) <= 100 * MS];
     this.timeAt = this.local;
