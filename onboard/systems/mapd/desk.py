@@ -53,7 +53,7 @@ class TransportDesk(Plain):
     awards: list[Award] = field(default_factory=list)
     is_open: bool = False
     #: Robots that asked for a turn in this round.
-    yielding: set[int] = field(default_factory=set)
+    asking: set[int] = field(default_factory=set)
     #: Tasks that were ordered and not served, by number, with the step from which on they are to be called for.
     orders: dict[int, TransportTask] = field(default_factory=dict)
     served: set[int] = field(default_factory=set)
@@ -93,7 +93,7 @@ class TransportDesk(Plain):
                 self.fleet.drops[Reason.FALSE_STATEMENT] += 1
             case TurnRequest() if message.sender in self.site.homes and self.is_open and self.round is not None:
                 if (message.step, message.attempt) == (self.round.step, self.round.attempt):
-                    self.yielding.add(message.sender)
+                    self.asking.add(message.sender)
             case StepState():
                 self.fleet.winners.works(message.sender, message.step, now_us)
                 return self._on_state(message)
@@ -204,7 +204,7 @@ class TransportDesk(Plain):
         self._due_us = now_us + self.site.step_us
         record = Record(RoundRecord(step, bidding, count))
         if bidding:
-            self.is_open, self.yielding = True, set()
+            self.is_open, self.asking = True, set()
             self._close_us = now_us + self.site.bid_window_us
             standing = {number_of(task.number): terms_of(me, task, step) for task in self.knowledge.open_tasks}
             self.fleet.negotiation.begin_round(standing, self._close_us)
@@ -234,7 +234,7 @@ class TransportDesk(Plain):
         for robot in self.site.robots:
             before = self.knowledge.task_of(robot)
             task, bid = won.get(robot, (NO_TASK, 0))
-            is_asking = robot in self.yielding
+            is_asking = robot in self.asking
             must_yield = is_asking and self.knowledge.is_in_the_way(robot, self.site.homes[robot])
             if robot in self.knowledge.loads:
                 turns = first if must_yield else last
