@@ -59,15 +59,26 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _taken_late(args: argparse.Namespace, words: list[str]) -> bool:
+    """Whether words after an option are such as may come last: argparse gives up what it could leave out before one."""
+    if any(word.startswith("-") for word in words):
+        return False
+    match args.command, words:
+        case "dump", _:
+            args.filters += words
+        case "why", [task] if args.task is None:
+            args.task = task
+        case _:
+            return False
+    return True
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     parser = build_parser()
     args, late = parser.parse_known_args(argv)
-    if late and (args.command != "dump" or any(word.startswith("-") for word in late)):
+    if late and not _taken_late(args, late):
         parser.error(f"unrecognized arguments: {' '.join(late)}")
-    if late:
-        # argparse gives a list of words up at the first option; candump's filters may come after its letters.
-        args.filters += late
     run: Callable[[argparse.Namespace], int] = args.run
     before = gc.get_threshold()
     # Frames and words of them make no cycles: to look for some every few hundred takes a tenth of the time.

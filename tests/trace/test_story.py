@@ -143,6 +143,16 @@ def test_why_prints_the_parts_and_their_sum(capsys: pytest.CaptureFixture[str]) 
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["IOC1/2", "IOC1/1"]
 
 
+def test_a_task_may_be_named_last(capsys: pytest.CaptureFixture[str]) -> None:
+    log, site = str(run_log()), str(SITE_FILE)
+    assert main(["why", log, "--site", site, "IOC1/2"]) == 0
+    assert capsys.readouterr().out.startswith("task IOC1/2: ")
+    for words in (["IOC1/2", "IOC1/1"], ["IOC1/2", "--wide"]):
+        with pytest.raises(SystemExit) as ended:
+            main(["why", log, "--site", site, *words])
+        assert ended.value.code == 2 and "unrecognized arguments: " in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(("task", "said"), [("IOC1/9", "no task IOC1/9 in it"), ("XY/1", "write CALLER/NUMBER")])
 def test_a_task_that_is_not_there_is_one_clear_line(task: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["why", str(run_log()), task, "--site", str(SITE_FILE)]) == 2

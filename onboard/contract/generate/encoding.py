@@ -20,6 +20,9 @@ _LETTERS = {1: "B", 2: "H", 4: "I", 8: "Q"}
 _DIGIT_BITS = 30
 #: Signals as short have a dictionary for what they add to a word: 18 kB at most.
 _TABLE_BITS = 8
+#: As few low bits of a signal have a tuple for what they add beyond a digit: a product more than one digit long takes
+#: 8 ns longer.
+_LOW_BITS = 4
 _FRAME_BYTES = 8
 #: What steps cost, in ns: least squares over the twelve likeliest cuts of every message. A word more, one of more than
 #: a digit put together, the whole frame as one number; ``&`` and ``>>``; ``*`` within a digit, to more than one and by
@@ -36,6 +39,7 @@ _MEASURED = {
     "OrderAnswer": (2, 1, 4, 1),
     "Progress": (4, 4),
     "Regeneration": (4, 4),
+    "RegenerationState": (8,),
     "StepReport": (1, 2, 4, 1),
 }
 
@@ -194,9 +198,22 @@ def _table(piece: Piece) -> tuple[str, str]:
     return name, f"{{value: value << {piece.at} for value in range({ends})}}"
 
 
+def _is_low_end(piece: Piece) -> bool:
+    """Whether a tuple has what the low bits of a signal add to a word that they take beyond a digit."""
+    is_short = not piece.first and not piece.has_sign and piece.bits <= _LOW_BITS
+    return is_short and piece.at < _DIGIT_BITS < piece.at + piece.bits and piece.signal.scale == 1
+
+
+def _low_table(piece: Piece) -> tuple[str, str]:
+    """Name and value of that tuple."""
+    size = 1 << piece.bits
+    return f"_LOW_{piece.bits}_AT_{piece.at}", f"tuple(value << {piece.at} for value in range({size}))"
+
+
 def _is_fixed(word: Word, piece: Piece) -> bool:
     """Whether a piece needs no product: it comes out of a table, or is yes or no above the lowest bit."""
-    return _is_from_table(word, piece) or (piece.signal.choices == YES_NO and piece.at > 0)
+    is_yes_no = piece.signal.choices == YES_NO and piece.at > 0
+    return is_yes_no or _is_from_table(word, piece) or _is_low_end(piece)
 
 
 class _Lines:
@@ -316,6 +333,8 @@ class _Lines:
 
     def _fixed(self, piece: Piece) -> str:
         name = self.names[piece.signal.name]
+        if _is_low_end(piece):
+            return f"{_low_table(piece)[0]}[{name} & 0x{(1 << piece.bits) - 1:X}]"
         if piece.signal.choices:
             return f"(0x{1 << piece.at:X} if {name} else 0)"
         return f"{_table(piece)[0]}[{name}]"
@@ -361,6 +380,7 @@ def tools(frame: DbcMessage) -> set[tuple[str, str]]:
     """Names and values of what a frame's function uses."""
     cut = words(frame)
     found = {_table(piece) for word in cut for piece in word.pieces if _is_from_table(word, piece)}
+    found |= {_low_table(piece) for word in cut for piece in word.pieces if _is_low_end(piece)}
     needs_none = any(word.is_number for word in cut) or not any(word.pieces for word in cut)
     return found if needs_none else found | {_packer(cut)}
 

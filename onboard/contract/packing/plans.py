@@ -29,6 +29,7 @@ _FROM_0_TO_255_AT_21 = {value: value << 21 for value in range(256)}
 _FROM_0_TO_30_AT_2 = {value: value << 2 for value in range(31)}
 _FROM_0_TO_31_AT_8 = {value: value << 8 for value in range(32)}
 _FROM_1_TO_254_AT_13 = {value: value << 13 for value in range(1, 255)}
+_LOW_3_AT_29 = tuple(value << 29 for value in range(8))
 _PACK_BBBBBBH = struct.Struct("<BBBBBBH").pack
 _PACK_BBBBXXXX = struct.Struct("<BBBBxxxx").pack
 _PACK_BBHXXXX = struct.Struct("<BBHxxxx").pack
@@ -140,7 +141,7 @@ def pack_progress(message: Progress) -> bytes:
             + _FROM_0_TO_31_AT_8[message.leg]
             + _FROM_1_TO_254_AT_13[message.track]
             + _FROM_0_TO_255_AT_21[message.index]
-            + (offset_mm & 0x7) * 0x20000000,
+            + _LOW_3_AT_29[offset_mm & 0x7],
             (offset_mm >> 3) + speed_mm_s * 0x2000,
         )
     except (KeyError, struct.error) as error:

@@ -28,7 +28,8 @@ _FROM_0_TO_250_AT_20 = {value: value << 20 for value in range(251)}
 _FROM_0_TO_255_AT_4 = {value: value << 4 for value in range(256)}
 _FROM_1_TO_255_AT_4 = {value: value << 4 for value in range(1, 256)}
 _FROM_1_TO_255_AT_56 = {value: value << 56 for value in range(1, 256)}
-_PACK_HIBB = struct.Struct("<HIBB").pack
+_LOW_4_AT_28 = tuple(value << 28 for value in range(16))
+_PACK_IHBB = struct.Struct("<IHBB").pack
 _PACK_II = struct.Struct("<II").pack
 _UNPACK_Q = struct.Struct("<Q").unpack_from
 
@@ -88,15 +89,13 @@ def pack_token_refusal(message: TokenRefusal) -> bytes:
     token = message.token
     if token < 0 or token > 16777215:
         raise OutOfRangeError("TokenRefusal.token", token, 0, 16777215)
+    version = message.version
     requester = message.requester
     if requester < 1:
         raise OutOfRangeError("TokenRefusal.requester", requester, 1, 255)
     try:
-        return _PACK_HIBB(
-            message.token_kind + (token & 0xFFF) * 0x10,
-            (token >> 12) + message.version * 0x1000,
-            requester,
-            message.reason,
+        return _PACK_IHBB(
+            message.token_kind + token * 0x10 + _LOW_4_AT_28[version & 0xF], version >> 4, requester, message.reason
         )
     except struct.error as error:
         raise refusal(message, ("TokenRefusal.version", 0, 1048575), ("TokenRefusal.requester", 1, 255)) from error
@@ -122,10 +121,11 @@ def pack_token_request(message: TokenRequest) -> bytes:
     token = message.token
     if token < 0 or token > 16777215:
         raise OutOfRangeError("TokenRequest.token", token, 0, 16777215)
+    version_seen = message.version_seen
     try:
-        return _PACK_HIBB(
-            message.token_kind + (token & 0xFFF) * 0x10,
-            (token >> 12) + message.version_seen * 0x1000,
+        return _PACK_IHBB(
+            message.token_kind + token * 0x10 + _LOW_4_AT_28[version_seen & 0xF],
+            version_seen >> 4,
             message.itinerary_version,
             message.predecessor,
         )
@@ -275,7 +275,7 @@ def pack_regeneration(message: Regeneration) -> bytes:
             + _FROM_1_TO_255_AT_4[message.epoch]
             + _FROM_0_TO_250_AT_12[message.lost]
             + _FROM_0_TO_250_AT_20[message.absent]
-            + (tokens & 0xF) * 0x10000000,
+            + _LOW_4_AT_28[tokens & 0xF],
             (tokens >> 4) + digest * 0x1000,
         )
     except (KeyError, struct.error) as error:

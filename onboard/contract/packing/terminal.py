@@ -22,11 +22,12 @@ from onboard.contract.terminal import (
 _new = tuple.__new__
 _ACTION = tuple(Action)
 _STEP_RESULT = tuple(StepResult)
-_FROM_0_TO_255_AT_5 = {value: value << 5 for value in range(256)}
+_FROM_0_TO_255_AT_21 = {value: value << 21 for value in range(256)}
 _FROM_1_TO_255_AT_7 = {value: value << 7 for value in range(1, 256)}
+_LOW_3_AT_29 = tuple(value << 29 for value in range(8))
 _PACK_BBBBHBB = struct.Struct("<BBBBHBB").pack
 _PACK_BBHHBX = struct.Struct("<BBHHBx").pack
-_PACK_BBHI = struct.Struct("<BBHI").pack
+_PACK_BBIH = struct.Struct("<BBIH").pack
 _PACK_BBIXX = struct.Struct("<BBIxx").pack
 _PACK_BHHBH = struct.Struct("<BHHBH").pack
 _PACK_BHIX = struct.Struct("<BHIx").pack
@@ -214,11 +215,11 @@ def pack_plan_task(message: PlanTask) -> bytes:
     if task_number > 65535:
         raise OutOfRangeError("PlanTask.task_number", task_number, 0, 65535)
     try:
-        return _PACK_BBHI(
+        return _PACK_BBIH(
             version,
             part + message.pick * 0x8,
-            put + (box & 0x7FF) * 0x20,
-            (box >> 11) + _FROM_0_TO_255_AT_5[task[0]] + task_number * 0x2000,
+            put + box * 0x20 + _FROM_0_TO_255_AT_21[task[0]] + _LOW_3_AT_29[task_number & 0x7],
+            task_number >> 3,
         )
     except (KeyError, struct.error) as error:
         raise refusal(
