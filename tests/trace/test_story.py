@@ -5,8 +5,19 @@ from pathlib import Path
 import pytest
 
 from bus_sim.cli import main as bus_sim
-from onboard.contract.codes import CallResult, Reason, TaskPhase
-from onboard.contract.messages import Award, Bid, CallForProposals, Reference, TaskReport
+from onboard.contract.codes import CallResult, Grade, LegAction, Reason, Side, TaskPhase
+from onboard.contract.messages import (
+    Award,
+    Bid,
+    CallForProposals,
+    Heartbeat,
+    Itinerary,
+    Leg,
+    Progress,
+    Reference,
+    Stamp,
+    TaskReport,
+)
 from onboard.trace.cli import main
 from onboard.trace.story.why import TaskStory, WaitingStory, task_lines
 from onboard.trace.view import SiteView
@@ -92,6 +103,37 @@ def test_who_begins_what_was_called_off_is_waited_for_again() -> None:
     story, _, _ = _called_off(until_us=600_000_000, is_begun=True)
     assert "served" in task_lines(story, Words(SITE), 0)[0]
     assert sum(part.length_us for part in story.parts) == story.waited_us
+
+
+@pytest.mark.parametrize("is_taken", [False, True], ids=["behind a way", "behind taking the car"])
+def test_who_stands_as_planned_is_told_so(*, is_taken: bool) -> None:
+    """Nothing is said when a wait begins: it was told as "about to move" for as long as it lasted."""
+    why = WaitingStory(SITE)
+    said = fleet_of(run_log())
+    awarded_us = next(one.time_us for one in said if isinstance(one.message, Award))
+    source = next(one.message.from_station for one in said if isinstance(one.message, CallForProposals))
+    beat = next(one.message for one in said if isinstance(one.message, Heartbeat) and one.message.sender == 11)
+    at, end_ms = source & 0x7F, [awarded_us // 1_000 + s * 1_000 for s in (10, 10, 40, 60)]
+    stay = Leg(LegAction.WORK, 1, at, at, Side(source >> 7 & 1), end_ms[1])
+    way = Leg(LegAction.TRAVEL, 1, 2, at, Side.NEAR, end_ms[0])
+    wait, back = (
+        Leg(one, 1, at, at, Side.NEAR, end)
+        for one, end in zip((LegAction.STAND, LegAction.TRAVEL), end_ms[2:], strict=True)
+    )
+    legs = (way, stay, wait, back) if is_taken else (way, wait, back)
+    told = [(one.time_us, one.message) for one in said if one.time_us <= awarded_us]
+    told += [(awarded_us + 1_000, Itinerary(11, 200, Grade.FIRM, Stamp(0, 1, 1), legs))]
+    told += [(awarded_us + 2_000, Progress(11, 200, 0, 1, 2, 0, 900))]
+    told += [(awarded_us + 10_000_000, Progress(11, 200, 0, 1, at, 0, 0))]
+    if is_taken:
+        told += [(awarded_us + 10_000_001, TaskReport(11, PARK, TaskPhase.LOADED, source, Reason.NONE))]
+    told += [(awarded_us + s * 1_000_000, beat) for s in range(11, 40)]
+    told += [(awarded_us + 40_000_000, Progress(11, 200, len(legs) - 1, 1, at, 0, 900))]
+    for time_us, message in told:
+        why.feed(message, time_us)
+    why.finish()
+    assert _spent_s(why.tasks[PARK], 11, "stands as planned") == pytest.approx(30, abs=0.01)
+    assert not _spent_s(why.tasks[PARK], 11, "about to move") > 0.01
 
 
 @pytest.mark.parametrize(

@@ -264,7 +264,7 @@ class WaitingStory:
                 return self._lift_awaited(self._site.stewards[wait.track], now_us)
             at, why = self._words.system.slot(wait.track, wait.index), plain(wait.reason.name)
             return Cause(f"in the way at {at}: {why}", wait.blocker or owner)
-        near = self._history.plans.ahead(owner)[:2]
+        near = self._near(story)
         leg, following = near[0] if near else None, near[1] if len(near) > 1 else None
         work = self._work(story, near)
         if work is not None:
@@ -283,13 +283,24 @@ class WaitingStory:
             return self._planned_wait(story, following)
         return Cause("about to move: rights asked for, orders on their way", owner)
 
+    def _near(self, story: TaskStory) -> tuple[Leg, ...]:
+        """The leg in hand and the next. Who stands as planned says no place anew: what is over is told by its end."""
+        owner, near = story.owner, self._history.plans.ahead(story.owner)[:4]
+        if near and near[0].action is LegAction.TRAVEL and self._is_at_end(owner, near[0]):
+            near = near[1:]
+        if near and near[0].action is LegAction.WORK and self._is_taken(story, near[0]):
+            near = near[1:]
+        return near[:2]
+
+    def _is_taken(self, story: TaskStory, leg: Leg) -> bool:
+        return TaskPhase.LOADED in story.phases and _place(leg) == story.source
+
     def _work(self, story: TaskStory, near: tuple[Leg, ...]) -> Leg | None:
         """The plan's leg of taking or leaving a car right here: progress counts it with the way before it."""
         owner = story.owner
         for leg in near:
             is_here = leg.action is LegAction.WORK and self._at(owner) == Segment(leg.track, leg.from_index)
-            is_taken = TaskPhase.LOADED in story.phases and _place(leg) == story.source
-            if is_here and not is_taken and (leg is near[0] or self._is_at_end(owner, near[0])):
+            if is_here and not self._is_taken(story, leg) and (leg is near[0] or self._is_at_end(owner, near[0])):
                 return leg
         return None
 
