@@ -129,6 +129,19 @@ def test_no_round_is_opened_before_all_robots_have_come_to_the_step(desk: Counte
     assert desk.opened().step == 0
 
 
+def test_the_round_is_opened_as_soon_as_the_last_robot_has_come(desk: Counter) -> None:
+    """It waited until it would have asked again, by when those who had come asked the desk for the round."""
+    desk.senses(key())
+    desk.stand(0, R1)
+    asked = len(desk.sent(SyncRequest))
+    while len(desk.sent(SyncRequest)) == asked:
+        desk.passes(STEP_US / 1e6, STEP_US)
+    desk.passes(2 * STEP_US / 1e6, STEP_US)
+    desk.stand(0, R2)
+    desk.passes(STEP_US / 1e6, STEP_US)
+    assert desk.sent(StepRound)
+
+
 def test_a_task_is_called_for_from_its_step_on_and_not_before(desk: Counter) -> None:
     desk.senses(key(3), key(4, release=2))
     desk.stand()

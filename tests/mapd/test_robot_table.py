@@ -14,7 +14,7 @@ from onboard.holon.holon import Holon
 from onboard.systems.mapd.calls import award_of, call_of
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.records import PathRecord
-from onboard.systems.mapd.robot import UnitRobot
+from onboard.systems.mapd.robot import ASK_US, UnitRobot
 from onboard.systems.mapd.steps import LAST, STEP_TABLE, GridStepPhase, StepDeed, StepFinding
 from onboard.systems.mapd.tasks import TransportTask
 from onboard.systems.registry import factory_for
@@ -172,6 +172,18 @@ def test_every_phase_meets_whatever_was_heard(heard: str) -> None:
             said = expected.walk(late=now_us == LATER_US)
             assert told(one.advance(now_us)) == said, (words, now_us)
             assert (one.phase, one.step) == (expected.phase, expected.step), (words, now_us)
+
+
+def test_the_desk_is_asked_only_some_time_after_the_last_has_come() -> None:
+    """Who had waited for a straggler asked at once: the desk said all its calls while it had only begun to open."""
+    one = robot(Words("none", "behind", "open", has_call=True, has_won=False))
+    assert told(one.advance(NOW_US)) == [("here", 0)]
+    come_us = NOW_US + SITE.step_us + ASK_US - 100_000
+    one.hear(StepState(OTHER, 0, SITE.homes[OTHER], NO_TASK, False, False), come_us)
+    assert told(one.advance(come_us + 200_000)) == []
+    again = StepState(OTHER, 0, SITE.homes[OTHER], NO_TASK, False, False)
+    one.hear(again, come_us + 300_000)
+    assert told(one.advance(come_us + ASK_US)) == ["asks"], "what is said again keeps nobody from asking"
 
 
 def test_a_robot_whose_own_path_gave_way_to_anothers_asks_for_it() -> None:

@@ -117,9 +117,11 @@ class TransportDesk(Plain):
             if self._close_us is None or now_us < self._close_us:
                 return []
             return self._close(now_us)
-        if now_us < self._due_us:
+        if now_us < self._due_us and self._missed_us is None:
             return []
         missing = self.knowledge.behind(self.step)
+        if missing and now_us < self._due_us:
+            return []
         if missing:
             self._missed_us = now_us if self._missed_us is None else self._missed_us
             if now_us - self._missed_us >= STANDS_AFTER_US:

@@ -156,7 +156,9 @@ class UnitRobot(Plain):
         return []
 
     def _on_state(self, state: StepState, now_us: int) -> list[Effect]:
-        self.knowledge.on_state(state)
+        if self.knowledge.on_state(state) and self.phase is GridStepPhase.GATHER and self._ask_us is not None:
+            # While others still come the desk has nothing to tell.
+            self._ask_us = max(self._ask_us, now_us + ASK_US)
         return []
 
     def _on_desk(self, message: StepTurn | Award | CallForProposals | StepRound, now_us: int) -> list[Effect]:
