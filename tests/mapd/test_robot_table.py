@@ -7,17 +7,21 @@ import pytest
 
 from onboard.contract.mapd import PathHead, StepRound, StepState, StepTurn
 from onboard.contract.mapd_device import CartState
-from onboard.contract.messages import SyncRequest
+from onboard.contract.messages import BusTime, SyncRequest
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.motion_authority import acts
 from onboard.holon.holon import Holon
+from onboard.systems.mapd.asking import ASK_US
 from onboard.systems.mapd.calls import award_of, call_of
 from onboard.systems.mapd.fields import NO_TASK
+from onboard.systems.mapd.memory import path_record, step_record
+from onboard.systems.mapd.paths import Path
 from onboard.systems.mapd.records import PathRecord
-from onboard.systems.mapd.robot import ASK_US, UnitRobot
+from onboard.systems.mapd.robot import UnitRobot
 from onboard.systems.mapd.steps import LAST, STEP_TABLE, GridStepPhase, StepDeed, StepFinding
 from onboard.systems.mapd.tasks import TransportTask
 from onboard.systems.registry import factory_for
+from tests.conformance.alone import Alone
 from tests.mapd.sites import made
 
 SITE = made(2, [(0, "1,2", "3,5")])
@@ -202,3 +206,16 @@ def test_a_line_of_the_table_is_for_what_can_be() -> None:
         expected.walk(late=True)
         met |= expected.met
     assert met == set(STEP_TABLE)
+
+
+def test_who_had_set_out_tells_after_a_restart_where_it_had_come_to() -> None:
+    """Another that had forgotten it waited for that word in its cell, and it for the cell: all power had been cut."""
+    home, beside = SITE.homes[ME], SITE.floor.ways[SITE.homes[ME]][0]
+    journal = [path_record(Path(0, (home, home, beside)), 1, TASK).entry, step_record(2).entry]
+    again = Alone(SITE, ME, [{"record": "boot", "boot": 1}, *journal], boot=2)
+    again.hears(BusTime(DESK, 0))
+    again.senses(CartState(ME, 0, home, False, NO_TASK))
+    again.passes(5)
+    again.hears(SyncRequest(OTHER, ME, 0))
+    again.passes(1)
+    assert StepState(ME, 1, home, TASK, False, False) in again.sent(StepState)

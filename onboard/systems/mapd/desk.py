@@ -10,12 +10,13 @@ from dataclasses import dataclass, field
 from onboard.contract.codes import KindCode, MachineState, OrderResult, Reason
 from onboard.contract.mapd import PathHead, PathMoves, StepRound, StepState, StepTurn, TurnRequest
 from onboard.contract.mapd_device import TransportAnswer, TransportKey
-from onboard.contract.messages import Award, Bid, Message, Reference, SyncRequest
+from onboard.contract.messages import Award, Bid, Message, Reference
 from onboard.core.authority import TokenKey
 from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import Entry, records_in
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.core.records import BootRecord
+from onboard.systems.mapd.asking import ASK_US, SAID_US, questions
 from onboard.systems.mapd.calls import (
     CALL_AGAIN_US,
     CALLS_A_ROUND,
@@ -33,12 +34,6 @@ from onboard.systems.mapd.site import Mapd
 from onboard.systems.mapd.tasks import TransportTask
 from onboard.work.plain import Plain
 
-#: Robots that are missed are asked this long after the step could have begun, and again after as long, us: a lost frame
-#: costs less than a step.
-ASK_US = 500_000
-ASK_AT_ONCE = 3
-#: What was just said is not said again for another who asks, us: all have heard it.
-SAID_US = 100_000
 _LOW = 1 << 16
 
 
@@ -129,8 +124,7 @@ class TransportDesk(Plain):
                 for node in missing:
                     self.fleet.winners.blame_node(node, now_us)
             self._due_us = now_us + ASK_US
-            asked = dict.fromkeys([*self.knowledge.pathless(), *missing])
-            return [Send(SyncRequest(self.fleet.node_id, node)) for node in list(asked)[:ASK_AT_ONCE]]
+            return questions(self.fleet.node_id, [*self.knowledge.pathless(), *missing])
         self._missed_us = None
         return self._open(now_us)
 

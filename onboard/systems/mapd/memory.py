@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from onboard.contract.mapd import StepState
+from onboard.contract.mapd_device import CartState
 from onboard.core.effects import Record
 from onboard.core.journal_records import Entry, records_in
 from onboard.systems.mapd.fields import NO_TASK
@@ -22,6 +24,11 @@ class Past:
     task: int = NO_TASK
     step: int = 0
     served: tuple[int, int] = (NO_TASK, -1)
+
+    def come_to(self, step: int, path: Path, body: CartState) -> StepState:
+        """The word of having come to ``step``, from which it set out since; that it served there was told before."""
+        is_loaded = body.task != NO_TASK or self.served == (self.task, step)
+        return StepState(body.sender, step, path.at(step), self.task, is_loaded, False)
 
 
 def path_record(path: Path, version: int, task: int) -> Record:

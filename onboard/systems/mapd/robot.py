@@ -19,7 +19,6 @@ from onboard.contract.messages import (
     Diagnostic,
     Message,
     Reference,
-    SyncRequest,
     TaskReport,
     TokenGrant,
 )
@@ -28,6 +27,7 @@ from onboard.core.behaviour import NEVER_US
 from onboard.core.effects import Effect, Send
 from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import successor, to_bus_ms
+from onboard.systems.mapd.asking import ASK_US, SAID_US, TOKENS_SAID_US, questions
 from onboard.systems.mapd.auction import Availability, BidWeights
 from onboard.systems.mapd.bidding import Round, UnitGeneration, bid_timing
 from onboard.systems.mapd.calls import CALL_AGAIN_US, mark_of
@@ -43,17 +43,6 @@ from onboard.systems.mapd.steps import LAST, STEP_TABLE, GridStepPhase, StepDeed
 from onboard.systems.mapd.turns import Turns
 from onboard.systems.mapd.waiting import WaitingPlaces
 from onboard.work.plain import Plain
-
-#: Whoever is missed is asked this long after everything else was there, and again after as long, us: a lost frame costs
-#: less than a step.
-ASK_US = 500_000
-#: So many are asked at once.
-ASK_AT_ONCE = 3
-#: What was just said is not said again for another who asks, us: all have heard it.
-SAID_US = 100_000
-#: Tokens are said again for whoever asks at most this often, us: the same loss makes several ask at once.
-TOKENS_SAID_US = 1_000_000
-
 
 #: What may let a robot go on; all else, such as others' heartbeats, changes nothing for it.
 _OF_INTEREST: frozenset[type[Message]] = frozenset(
@@ -279,6 +268,8 @@ class UnitRobot(Plain):
         if past.step > 0 and past.step > path.start:
             # It had set out for that step: it goes there (again), and tells when it is there.
             self.step, self.phase = past.step - 1, GridStepPhase.MOVE
+            # Whoever forgot meanwhile that it had come to the step before waits for that word.
+            self._said = past.come_to(self.step, path, body)
         if past.served[0] == past.task:
             # Unloading had begun: on the way to this step, or before.
             self.driving.unloaded = past.task
@@ -414,8 +405,7 @@ class UnitRobot(Plain):
         if self._ask_us is None or now_us < self._ask_us:
             return []
         self._ask_us = now_us + ASK_US
-        others = [node for node in dict.fromkeys(nodes) if node != self.fleet.node_id]
-        return [Send(SyncRequest(self.fleet.node_id, node)) for node in others[:ASK_AT_ONCE]]
+        return questions(self._me, nodes)
 
     # --- decisions ---------------------------------------------------------------------------------------------
 
