@@ -146,13 +146,17 @@ def searching(
     visits: tuple[Visit, ...],
     refuges: frozenset[Segment],
     max_expansions: int,
+    before_us: int = FOREVER,
 ) -> Search[Route | NoRoute]:
-    """As ``planning``, over any ground and moves; ``start_us`` in whole milliseconds."""
+    """As ``planning``, over any ground and moves; ``start_us`` in whole milliseconds.
+
+    A route whose last visit ends at ``before_us`` or later counts for nothing, and is not looked for.
+    """
     state = moves.state_at(start, start_us)
     if state is None:
         return NoRoute(f"the start {start} is reserved by another machine", 0)
     root = _Node(0, state, (start_us, 0, 0, 0, -start_us), None, LegAction.STAND, ())
-    found = yield from _IntervalSearch(ground, moves, visits, refuges).run(root, max_expansions)
+    found = yield from _IntervalSearch(ground, moves, visits, refuges, before_us).run(root, max_expansions)
     yield found.pops % PAUSE_POPS * POP_STEPS
     return found
 
@@ -200,7 +204,9 @@ class _IntervalSearch:
     max(t + work, floor) with nobody in the way.
     """
 
-    def __init__(self, roads: Ground, edges: Moves, visits: tuple[Visit, ...], refuges: frozenset[Segment]) -> None:
+    def __init__(
+        self, roads: Ground, edges: Moves, visits: tuple[Visit, ...], refuges: frozenset[Segment], before_us: int
+    ) -> None:
         self.roads = roads
         self.edges = edges
         self.visits = visits
@@ -215,8 +221,9 @@ class _IntervalSearch:
         self._best: list[dict[int, _Label]] = [{} for _ in self._targets]
         #: By phase: intervals of its visit that are not reached yet. When there are none the phase is over.
         self._open = [{state for state in edges.states(visit.segment) if _fits(state, visit)} for visit in visits]
-        #: End of the last visit and arrival in a refuge of the best route found.
-        self._found = FOREVER, FOREVER
+        #: End of the last visit and arrival in a refuge of the best route found; before there is one, of the worst that
+        #: counts.
+        self._found = before_us - 1, FOREVER
 
     def run(self, root: _Node, max_expansions: int) -> Search[Route | NoRoute]:
         """Search from ``root``; see ``plan_route``. It may pause after each ``PAUSE_POPS``."""

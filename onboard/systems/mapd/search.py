@@ -11,7 +11,8 @@ from itertools import pairwise
 from onboard.contract.codes import LegAction
 from onboard.systems.mapd.floor import Floor
 from onboard.systems.mapd.paths import NOBODY, Path, Paths
-from onboard.ways.sipp import NoRoute, Visit, find_route
+from onboard.ways.reservations import FOREVER
+from onboard.ways.sipp import NoRoute, Route, Visit, find_route
 from onboard.ways.steps import FAR, STEP_US, StepGround, StepMoves, cell_segment
 
 #: Most states that one search may expand: bounded work, the same on every machine.
@@ -26,13 +27,7 @@ def find_path(
     The last goal is reached as early as can be; the way to the rest counts only after that. None where the bounded
     search finds no way. ``others`` must not hold the robot's own path.
     """
-    if any(floor.steps_to(goal)[before] >= FAR for before, goal in pairwise((cell, *goals))):
-        return None
-    moves = StepMoves(floor.network, others.reservations, NOBODY, step, others.goes_round)
-    visits = tuple(Visit(cell_segment(goal), 0) for goal in goals)
-    refuges = frozenset(map(cell_segment, rests))
-    ground = StepGround(floor.steps_to, floor.steps_to_any)
-    found = find_route(ground, moves, cell_segment(cell), step * STEP_US, visits, refuges, MOST_EXPANSIONS)
+    found = _find_route(floor, others, cell, step, goals, rests)
     if isinstance(found, NoRoute):
         return None
     cells = [cell]
@@ -40,6 +35,25 @@ def find_path(
         steps = (leg.end_us - leg.begin_us) // STEP_US
         cells += [leg.to_index if leg.action is LegAction.TRAVEL else cells[-1]] * steps
     return Path(step, tuple(cells))
+
+
+def _find_route(
+    floor: Floor,
+    others: Paths,
+    cell: int,
+    step: int,
+    goals: Sequence[int],
+    rests: frozenset[int],
+    before_us: int = FOREVER,
+) -> Route | NoRoute:
+    """The same as a route; one that is at the last goal at ``before_us``, steps times ``STEP_US``, or later is none."""
+    if any(floor.steps_to(goal)[before] >= FAR for before, goal in pairwise((cell, *goals))):
+        return NoRoute("a goal is out of reach", 0)
+    moves = StepMoves(floor.network, others.reservations, NOBODY, step, others.goes_round)
+    visits = tuple(Visit(cell_segment(goal), 0) for goal in goals)
+    refuges = frozenset(map(cell_segment, rests))
+    ground = StepGround(floor.steps_to, floor.steps_to_any)
+    return find_route(ground, moves, cell_segment(cell), step * STEP_US, visits, refuges, MOST_EXPANSIONS, before_us)
 
 
 def is_sooner(floor: Floor, paths: Paths, robot: int, step: int, goal: int, rests: frozenset[int]) -> bool:
@@ -52,6 +66,6 @@ def is_sooner(floor: Floor, paths: Paths, robot: int, step: int, goal: int, rest
     if arrival <= step + floor.steps_to(goal)[here]:
         return False
     paths.take(robot)
-    found = find_path(floor, paths, here, step, (goal,), rests)
+    found = _find_route(floor, paths, here, step, (goal,), rests, arrival * STEP_US)
     paths.put(robot, old)
-    return found is not None and found.arrival(goal, step) < arrival
+    return isinstance(found, Route)
