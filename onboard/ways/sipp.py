@@ -13,7 +13,7 @@ at whole only where its bound promises an earlier arrival, or an equal one with 
 evaluation of edges; Cohen, Phillips and Likhachev 2014); states and edges are kept for the next search.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from heapq import heappop, heappush
 from typing import NamedTuple
 
@@ -212,7 +212,8 @@ class _IntervalSearch:
         self.visits = visits
         self.refuges = refuges
         self._targets = (*(frozenset((visit.segment,)) for visit in visits), refuges)
-        self._ways_us = [roads.ways_us(goals).to_us for goals in self._targets]
+        #: By phase, as each is come to first: many searches end before they look for a refuge.
+        self._ways_us: list[Callable[[Segment], int]] = []
         self._tails = _tails(roads, visits)
         self._queue: list[_Entry] = []
         self.expansions = 0
@@ -322,6 +323,8 @@ class _IntervalSearch:
         known = best.get(key)
         if known is not None and label >= known:
             return
+        if phase == len(self._ways_us):
+            self._ways_us.append(self.roads.ways_us(self._targets[phase]).to_us)
         way_us = self._ways_us[phase](segment)
         if phase < len(self.visits):
             work_us, floor_us = self._tails[phase]
