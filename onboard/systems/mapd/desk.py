@@ -114,6 +114,7 @@ class TransportDesk(Plain):
             return self._close(now_us)
         if now_us < self._due_us and self._missed_us is None:
             return []
+        # Who is missed may come at any moment: the step begins with the last of them, not when it is asked again.
         missing = self.knowledge.behind(self.step)
         if missing and now_us < self._due_us:
             return []
