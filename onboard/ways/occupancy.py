@@ -112,9 +112,14 @@ def hop_origins(site: WaySite, there: Segment) -> list[Segment]:
     return into + [site.tracks[end.track].inside(end.index) for end in site.links.get(there, ())]
 
 
+def is_hop(leg: Leg) -> bool:
+    """Whether a leg leads through a mouth from one track to another."""
+    return leg.action is LegAction.TRAVEL and leg.from_index == leg.to_index
+
+
 def hop_origin(site: WaySite, leg: Leg) -> Segment | None:
     """Where a hop through a mouth begins; None for every other leg, and where a leg before it has to say so."""
-    if leg.action is not LegAction.TRAVEL or leg.from_index != leg.to_index:
+    if not is_hop(leg):
         return None
     origins = hop_origins(site, Segment(leg.track, leg.from_index))
     return origins[0] if len(origins) == 1 else None

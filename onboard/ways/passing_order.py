@@ -29,6 +29,7 @@ from onboard.ways.told_way import (
     ToldWay,
     Turn,
     Turns,
+    ahead,
     conflict,
     has_work,
     meet,
@@ -114,8 +115,8 @@ class PassingOrder:
             way.in_hand, way.left = in_hand, set()
         way.leg = min(progress.leg, len(way.itinerary.legs) - 1)
         leg = way.itinerary.legs[way.leg]
+        way.body = Segment(progress.track, progress.index)
         if leg.track == progress.track:
-            way.body = progress.index
             way.left |= self._behind(leg, progress)
 
     def on_return(self, node: int, segment: Segment) -> None:
@@ -128,9 +129,8 @@ class PassingOrder:
             return
         leg = way.itinerary.legs[way.leg]
         if leg.action is LegAction.TRAVEL and leg.track == segment.track:
-            body = leg.from_index if way.body is None else way.body
             step = 1 if leg.to_index > leg.from_index else -1
-            if (segment.index - body) * step > 0:
+            if (segment.index - way.index) * step > 0:
                 return
         way.left.add(segment)
 
@@ -313,7 +313,7 @@ class PassingOrder:
         if number is None or legs[number].action is not LegAction.TRAVEL or legs[number].track != there.track:
             return None
         run, step = legs[number], _step(legs[number])
-        here = way.body if way.body is not None and number == way.leg else run.from_index
+        here = way.index if number == way.leg else run.from_index
         return number if there.index in range(here + step, run.to_index + step, step) else None
 
     def _is_in_front(self, node: int, other: int, segment: Segment, mine: Turn, theirs: Turn) -> bool:
@@ -324,9 +324,11 @@ class PassingOrder:
         it, or through it again, that I came into behind it, would be a circle.
         """
         there = self.place(other)
-        number = self._run_through(node, there)
-        if there is None or number is None or theirs.to_us >= FOREVER or segment.track != there.track:
+        if there is None or theirs.to_us >= FOREVER:
             return False
+        number = self._run_through(node, there)
+        if number is None or segment.track != there.track:
+            return self._goes_ahead(node, other, segment, mine, theirs)
         way, run = self._ways[node], self._ways[node].itinerary.legs[number]
         step = _step(run)
         if segment.index not in range(there.index, run.to_index + step, step):
@@ -335,6 +337,14 @@ class PassingOrder:
             return False
         before = self._ways[other]
         return any(before.stays(segment, first, theirs.to_come) for first in before.line(segment, step))
+
+    def _goes_ahead(self, node: int, other: int, segment: Segment, mine: Turn, theirs: Turn) -> bool:
+        """The same over several tracks: wherever I come by where it is and go on the way that it goes on."""
+        before = self._ways[other]
+        return any(
+            mine.to_come <= my_leg and before.stays(segment, their_leg, theirs.to_come)
+            for their_leg, my_leg in ahead(self._ways[node], before).items()
+        )
 
     def _agreed_first(self, node: int, other: int, segment: Segment, one: Turn, two: Turn) -> int | None:
         """Who of two machines comes first in these turns by the times under which they last agreed."""

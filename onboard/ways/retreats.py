@@ -14,7 +14,7 @@ from onboard.core.serial import from_bus_ms, ms_after, to_bus_ms
 from onboard.core.site import Segment
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lifts import lift_at
-from onboard.ways.occupancy import final_position, hop_origins, leg_begins_us, turn_in_us, turned_in
+from onboard.ways.occupancy import final_position, hop_origins, is_hop, leg_begins_us, turn_in_us, turned_in
 from onboard.ways.site import WaySite
 from onboard.ways.told_way import BegunItinerary, moves, worked
 
@@ -88,16 +88,14 @@ def put_off(site: WaySite, plan: BegunItinerary, leg_in_hand: int, place: Segmen
 
 def _is_through(leg: Leg, place: Segment) -> bool:
     """Whether a run, or standing or work, is or comes by at a place; a hop and a ride are not told by their indices."""
-    if leg.track != place.track or leg.action is LegAction.RIDE:
-        return False
-    if leg.action is LegAction.TRAVEL and leg.from_index == leg.to_index:
+    if leg.track != place.track or leg.action is LegAction.RIDE or is_hop(leg):
         return False
     return min(leg.from_index, leg.to_index) <= place.index <= max(leg.from_index, leg.to_index)
 
 
 def _hops_from(site: WaySite, leg: Leg, place: Segment) -> bool:
     """Whether a leg is a hop through a mouth that begins at a place, turned there already or not."""
-    if leg.action is not LegAction.TRAVEL or leg.from_index != leg.to_index:
+    if not is_hop(leg):
         return False
     return bool({place, turned_in(site, place)} & {*hop_origins(site, Segment(leg.track, leg.from_index))})
 

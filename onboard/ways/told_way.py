@@ -8,14 +8,14 @@ All times are bus time in us.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise, takewhile
+from itertools import islice, pairwise, takewhile
 from typing import NamedTuple
 
 from onboard.contract.codes import LegAction
 from onboard.contract.messages import Itinerary, Leg
 from onboard.core.serial import BUS_MS_MODULUS, away, from_bus_ms
 from onboard.core.site import Segment
-from onboard.ways.occupancy import LegWindows, leg_begins_us
+from onboard.ways.occupancy import LegWindows, hop_origin, is_hop, leg_begins_us
 from onboard.ways.site import WaySite
 
 #: Windows told in whole milliseconds may overlap by their rounding; so much is no conflict, us.
@@ -106,8 +106,8 @@ def overlap_us(one: Turn, two: Turn) -> int:
 class ToldWay:
     """One machine's plan: its turns, and how far it has come.
 
-    ``in_hand`` is how many moving legs come behind leg number ``leg``, the one in hand; in that leg its body is at
-    index ``body`` and has left the segments ``left``. ``retreat`` moving legs come behind its last work.
+    ``in_hand`` is how many moving legs come behind leg number ``leg``, the one in hand; in that leg its body is in
+    ``body`` and has left the segments ``left``. ``retreat`` moving legs come behind its last work.
     """
 
     itinerary: Itinerary
@@ -116,7 +116,8 @@ class ToldWay:
     in_hand: int
     retreat: int
     leg: int = 0
-    body: int | None = None
+    start: Segment | None = None
+    body: Segment | None = None
     left: set[Segment] = field(default_factory=set)
     #: When it was told, bus us, and the times that it had before, where the same trip goes on.
     told_us: int = 0
@@ -127,14 +128,28 @@ class ToldWay:
         """A plan of which nothing is over yet, with the windows of its legs."""
         going = tuple(leg._replace(end_ms=0) for leg in told.legs if moves(leg))
         way = cls(told, turns_of(site, told, windows), going, 0, retreat_moves(told), told_us=now_us)
-        way.in_hand = way.to_come(0) if told.legs else 0
+        if told.legs:
+            first = told.legs[0]
+            way.start = hop_origin(site, first) if is_hop(first) else Segment(first.track, first.from_index)
+            way.in_hand = way.to_come(0)
         return way
 
     @property
-    def place(self) -> Segment:
-        """Where its body is, by its own word."""
+    def place(self) -> Segment | None:
+        """Where its body is, by its own word: before a hop, and while it turns, where that begins.
+
+        None where it has not said so yet, and its plan begins with a hop from one of several tracks.
+        """
         leg = self.itinerary.legs[self.leg]
-        return Segment(leg.track, leg.from_index if self.body is None else self.body)
+        if self.body is not None and (self.body.track == leg.track or is_hop(leg)):
+            return self.body
+        return self.start if self.leg == 0 else Segment(leg.track, leg.from_index)
+
+    @property
+    def index(self) -> int:
+        """How far it has come on the track of the leg in hand."""
+        leg, place = self.itinerary.legs[self.leg], self.place
+        return place.index if place is not None and place.track == leg.track else leg.from_index
 
     def open_turns(self, segment: Segment, turns: Turns | None = None) -> Iterator[Turn]:
         """Turns on a segment that are not over, in order; with other times where ``turns`` are given."""
@@ -180,6 +195,26 @@ class ToldWay:
             elif leg.from_index == segment.index:
                 yield self.to_come(number)
 
+    def goes_on(self, until: tuple[LegAction, ...]) -> Iterator[tuple[Segment | None, int]]:
+        """Its place, then where runs and hops lead ``until`` another leg, each with ``to_come`` of what leads there."""
+        here = self.place
+        yield here, self.in_hand
+        for number in range(self.leg, len(self.itinerary.legs)):
+            leg = self.itinerary.legs[number]
+            if leg.action in until:
+                return
+            if leg.action is LegAction.TRAVEL:
+                for index in self._indices(number):
+                    if Segment(leg.track, index) != here:
+                        here = Segment(leg.track, index)
+                        yield here, self.to_come(number)
+
+    def _indices(self, number: int) -> range:
+        """Indices along a run or a hop, of the one in hand what is left."""
+        leg = self.itinerary.legs[number]
+        step = 1 if leg.to_index > leg.from_index else -1
+        return range(self.index if number == self.leg else leg.from_index, leg.to_index + step, step)
+
     def stays(self, segment: Segment, first: int, last: int) -> bool:
         """Whether it is in a segment without a break from its turn ``first`` moving legs before the end to ``last``."""
         stay = [turn for turn in self.turns.get(segment, ()) if last <= turn.to_come <= first]
@@ -194,6 +229,22 @@ class ToldWay:
     def to_come(self, leg: int) -> int:
         """How many moving legs come behind leg number ``leg``."""
         return sum(moves(one) for one in self.itinerary.legs[leg + 1 :])
+
+
+def ahead(one: ToldWay, two: ToldWay) -> dict[int, int]:
+    """Legs of ``two``, from where it is, that ``one`` comes behind it on the same way; each with that of ``one``.
+
+    By their ``to_come``. Empty where ``one`` works or rides before it comes by, or goes on elsewhere from there.
+    """
+    mine = [*one.goes_on((LegAction.WORK, LegAction.RIDE))]
+    there = next((number for number, (segment, _) in enumerate(mine) if segment and segment == two.place), len(mine))
+    found: dict[int, int] = {}
+    theirs = islice(two.goes_on((LegAction.RIDE,)), 1, None)
+    for (segment, my_leg), (other, their_leg) in zip(mine[there + 1 :], theirs, strict=False):
+        if segment != other:
+            break
+        found.setdefault(their_leg, my_leg)
+    return found
 
 
 def conflict(one: ToldWay, two: ToldWay) -> bool:
