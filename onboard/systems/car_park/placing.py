@@ -11,7 +11,7 @@ from onboard.contract.codes import DriveMode
 from onboard.contract.messages import DriveState
 from onboard.core.site import Segment
 from onboard.systems.car_park.axis import TrackAxis
-from onboard.ways.lifts import is_same_stop, lift_at, lift_index_of, platform_on
+from onboard.ways.lifts import MARK_TOLERANCE_MM, is_same_stop, lift_at, lift_index_of, platform_on
 from onboard.ways.site import WaySite
 
 #: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps.
@@ -54,7 +54,8 @@ class Placing:
             return track, None if state.across else state
         if state.across:
             return track, state
-        if state.mode is DriveMode.TURNING or (goal is not None and goal.track == track):
+        is_there = self._mouth_near(state, mouths[0].track, track) is not None
+        if state.mode is DriveMode.TURNING or (is_there and goal is not None and goal.track == track):
             return track, self.moved(state, mouths[0], Segment(track, 0))
         return mouths[0].track, state
 
@@ -83,8 +84,33 @@ class Placing:
         nearest = min(axis.mouths, key=lambda index: abs(state.position_mm - axis.position_mm(index)))
         return axis.mouths[nearest]
 
+    def aside(self, state: DriveState | None, track: int) -> Segment | None:
+        """The mouth of which a carrier that has to turn in it is not at the mark, as it was pushed; else None."""
+        mouth = self.unturned(state, track)
+        if state is None or mouth is None:
+            return None
+        is_at_mark = state.mode is DriveMode.STANDING and abs(self.told(state, track)[1]) <= MARK_TOLERANCE_MM
+        return None if is_at_mark else mouth
+
+    def told(self, state: DriveState, track: int) -> tuple[Segment, int]:
+        """Position and offset in mm as the fleet is told; beyond a linked end is turned, or turning, in the mouth."""
+        index = self.axis(track).index_at(state.position_mm)
+        offset_mm = state.position_mm - self.axis(track).position_mm(index)
+        return self.unturned(state, track) or Segment(track, index), offset_mm
+
+    def slots(self, state: DriveState, track: int) -> list[Segment]:
+        """Slots that the body is in, with the gate where it is across a sill; not turned yet, those of the alley."""
+        mouth, half_mm, centre_mm = self.unturned(state, track), self.site.carrier_length_mm // 2, state.position_mm
+        if mouth is None:
+            return self.axis(track).overlapped(centre_mm - half_mm, centre_mm + half_mm)
+        if self.aside(state, track) is None:
+            return [mouth]
+        axis = self.axis(mouth.track)
+        centre_mm = axis.position_mm(mouth.index) + self.told(state, track)[1]
+        return axis.overlapped(centre_mm - half_mm, centre_mm + half_mm)
+
     def faced(self, state: DriveState, track: int, goal: Segment) -> tuple[int, DriveState]:
-        """The axis that a goal on another track needs in hand: its own where the way leads in through a mouth.
+        """The axis that a goal on another track needs in hand: its own in the mouth through which the way leads in.
 
         Whoever is turned away from the goal comes out first, on the axis that it is on.
         """
@@ -93,15 +119,18 @@ class Placing:
             state, track = self.moved(state, self._end(track, mouth), mouth), mouth.track
         inward = self.axis(goal.track)
         for index, at in inward.mouths.items():
-            if at.track == track and inward.track.inside(index) == goal:
+            if at == self._position(state, track) and inward.track.inside(index) == goal:
                 return goal.track, self.moved(state, at, Segment(goal.track, index))
         return track, state
 
     def way_out(self, track: int, goal: Segment) -> int:
-        """The index beyond the end of a track through which one comes to a goal on another."""
-        axis = self.axis(track)
-        found = axis.end_at(goal)
-        return next(iter(axis.mouths), 0) if found is None else found
+        """The index by which one comes to a goal on another track: beyond an end of this one, or of a mouth on it."""
+        found = self.axis(track).end_at(goal)
+        if found is not None:
+            return found
+        ends = self.axis(goal.track).track
+        mouths = (at.index for index, at in ends.ends if at.track == track and ends.inside(index) == goal)
+        return next(mouths, next(iter(self.axis(track).mouths), 0))
 
     def moved(self, state: DriveState, here: Segment, there: Segment) -> DriveState:
         """The same place, which is ``here`` on one axis, as ``there`` on another."""

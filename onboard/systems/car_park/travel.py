@@ -155,23 +155,7 @@ class Carriage:
 
     def occupied(self) -> list[Segment]:
         """Slots that the body is in now, with the gate where it is across a sill; empty where it is unknown."""
-        if self.sensed is None:
-            return []
-        if self._in_mouth is not None:
-            return [self._in_mouth]
-        half_mm, centre_mm = self.fleet.site.carrier_length_mm // 2, self.sensed.position_mm
-        return self.axis.overlapped(centre_mm - half_mm, centre_mm + half_mm)
-
-    @property
-    def _in_mouth(self) -> Segment | None:
-        """The mouth where the carrier stands before it turns, the axis inside already in hand; else None."""
-        return self.placing.unturned(self.sensed, self.track)
-
-    def _told_at(self, state: DriveState) -> tuple[Segment, int]:
-        """Position and offset in mm as the fleet is told; beyond a linked end is turned, or turning, in the mouth."""
-        index = self.axis.index_at(state.position_mm)
-        offset_mm = state.position_mm - self.axis.position_mm(index)
-        return self._in_mouth or Segment(self.track, index), offset_mm
+        return [] if self.sensed is None else self.placing.slots(self.sensed, self.track)
 
     def sense(self, state: DriveState, now_us: int) -> list[Effect]:
         """Take up the drive's state: tell the fleet where the body stops, and now and then where it has come to."""
@@ -186,9 +170,11 @@ class Carriage:
         if placed is None:
             # Turned into some spur, but nobody remembers which.
             return []
+        self._face()
         now, known = self._progress(), self.fleet.mirror.progress.get(self.fleet.node_id)
         here = Segment(now.track, now.index)
-        if self._told.is_news(here, placed.mode, now_us):
+        is_pushed = placed.mode is DriveMode.STANDING and not self._told.slots.issuperset(self.occupied())
+        if self._told.is_news(here, placed.mode, now_us) or is_pushed:
             return self.statement(now_us)
         if known is not None and here != (known.track, known.index):
             # It counts for me before others hear it: I give what lies behind to who asks.
@@ -210,7 +196,7 @@ class Carriage:
 
     def _progress(self) -> Progress:
         assert self.sensed is not None
-        (track, index), offset_mm = self._told_at(self.sensed)
+        (track, index), offset_mm = self.placing.told(self.sensed, self.track)
         return Progress(self.fleet.node_id, *self.in_hand(), track, index, offset_mm, self.sensed.speed_mm_s)
 
     def go(self, goal: Segment, *, waits: bool = False) -> None:
@@ -222,8 +208,12 @@ class Carriage:
             self._turned = True
             self.target = None
             self.blocked = None
-            if self.sensed is not None and goal.track != self.track:
-                self.track, self.sensed = self.placing.faced(self.sensed, self.track, goal)
+            self._face()
+
+    def _face(self) -> None:
+        """Take the axis in hand that leads to the goal, also for who was pushed out of the mouth and is back in it."""
+        if self.sensed is not None and self.goal is not None and self.goal.track != self.track:
+            self.track, self.sensed = self.placing.faced(self.sensed, self.track, self.goal)
 
     def stay(self) -> None:
         """Drop the goal: the drive gets no more orders, and brakes by itself where it moves."""
@@ -379,6 +369,9 @@ class Carriage:
         permit = self._may_be_in(self.occupied(), authorised(self.fleet.motion, ALONE, own), is_out=is_out)
         if not permit:
             return None, permit, permit.reason
+        aside = self.placing.aside(self.sensed, self.track)
+        if aside is not None:
+            return aside, permit, Reason.NONE
         reach = None
         reason = Reason.NONE
         blocked = self.fleet.mirror.obstacles.blocked
@@ -410,8 +403,9 @@ class Carriage:
         state = self.sensed
         if state is None or self.goal is None or self.goal.track == self.track:
             return False
-        off_mm = abs(state.position_mm - self.axis.position_mm(self.placing.way_out(self.track, self.goal)))
-        return state.mode in (DriveMode.STANDING, DriveMode.TURNING) and off_mm <= MARK_TOLERANCE_MM
+        end = self.placing.way_out(self.track, self.goal)
+        is_at_mark = abs(state.position_mm - self.axis.position_mm(end)) <= MARK_TOLERANCE_MM
+        return end in self.axis.mouths and state.mode in (DriveMode.STANDING, DriveMode.TURNING) and is_at_mark
 
     def _hold(self, ahead: list[int], reason: Reason) -> list[Effect]:
         """Say once for what the machine waits, for whom and why; no order is repeated, so the drive brakes."""
@@ -469,7 +463,8 @@ class Carriage:
     def _after_place(self, given: list[Effect], now_us: int, *, went: bool = False) -> list[Effect]:
         """What is given back, or ``went`` to who asked, after the word that the body has left it."""
         has_left = self.sensed is not None and not (
-            self._told_at(self.sensed)[0] == self._told.last[0] and self._told.slots <= {*self.occupied()}
+            self.placing.told(self.sensed, self.track)[0] == self._told.last[0]
+            and self._told.slots <= {*self.occupied()}
         )
         return [*self.statement(now_us), *given] if (given or went) and has_left else given
 
