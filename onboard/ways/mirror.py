@@ -296,6 +296,11 @@ class WayFleet(CarFleet):
             return Reason.NONE if oldest else Reason.TOKEN_NOT_GRANTABLE_YET
         return self.mirror.order.verdict(requester, slot_of(key), claim.itinerary_version, claim.predecessor)
 
+    def is_shared(self, slot: Segment) -> bool:
+        """Whether who has the right to a slot stands in it: another that was pushed into it too cannot have that."""
+        holder = self.tokens.holder_of(segment_token(slot))
+        return holder != self.node_id and self.mirror.bodies.is_in(holder, slot)
+
 
 def way_mirror(mirror: Mirror) -> WayMirror:
     """The same mirror, for machines of a site with ways. Raises ``TypeError`` for any other."""

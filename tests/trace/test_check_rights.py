@@ -189,6 +189,26 @@ def test_an_order_that_crosses_the_push_by_hand_is_excused_and_none_after_it() -
     assert tape.say(2.2, DriveOrder(MR1, 2, 26400, 1500)).broken() == {"inside-authority": 1}
 
 
+@pytest.mark.parametrize(
+    ("other_at", "target_mm", "broken"),
+    [
+        pytest.param(11, 26_400, {}, id="away from who has the right and stands there"),
+        pytest.param(11, 24_000, {"inside-authority": 1}, id="towards it"),
+        pytest.param(8, 26_400, {"inside-authority": 1}, id="who has the right is elsewhere, and can give it"),
+    ],
+)
+def test_who_is_pushed_against_another_may_drive_away_from_it(
+    other_at: int, target_mm: int, broken: dict[str, int]
+) -> None:
+    stood = DriveState(MR1, 0, 26_400, 0, DriveMode.STANDING, at_mark=True)
+    tape = Tape(one_alley()).say(1, at(MR1, 1, 12), stood)
+    if other_at != 11:
+        tape.say(1.2, grant(Segment(1, other_at), 1, 1, MR2))
+    tape.say(1.5, at(MR2, 1, other_at))
+    tape.say(2, at(MR1, 1, 12, -100), replace(stood, position_mm=26_300, at_mark=False))
+    assert tape.say(3, DriveOrder(MR1, 1, target_mm, 1_500)).broken() == broken
+
+
 def test_where_nobody_knows_the_holder_nothing_is_judged_but_counted() -> None:
     verdict = Tape(one_alley(), started=False).say(1, at(MR1, 1, 5)).verdict()
     assert verdict.is_good and verdict.unjudged

@@ -109,6 +109,17 @@ class Placing:
         centre_mm = axis.position_mm(mouth.index) + self.told(state, track)[1]
         return axis.overlapped(centre_mm - half_mm, centre_mm + half_mm)
 
+    def leaves(self, slot: Segment, state: DriveState | None, track: int, to_index: int) -> bool:
+        """Whether a carrier goes out of a slot that it is in: to an index of its axis, or back into the mouth."""
+        if state is None:
+            return False
+        mouth, off_mm = self.unturned(state, track), self.told(state, track)[1]
+        if mouth is not None:
+            return slot.track == mouth.track and (slot.index - mouth.index) * off_mm > 0
+        axis = self.axis(track)
+        slot_mm, to_mm = (axis.position_mm(index) - state.position_mm for index in (slot.index, to_index))
+        return slot.track == track and slot_mm * to_mm < 0
+
     def faced(self, state: DriveState, track: int, goal: Segment) -> tuple[int, DriveState]:
         """The axis that a goal on another track needs in hand: its own in the mouth through which the way leads in.
 

@@ -173,9 +173,11 @@ class Carriage:
         self._face()
         now, known = self._progress(), self.fleet.mirror.progress.get(self.fleet.node_id)
         here = Segment(now.track, now.index)
-        is_pushed = placed.mode is DriveMode.STANDING and not self._told.slots.issuperset(self.occupied())
-        if self._told.is_news(here, placed.mode, now_us) or is_pushed:
+        if self._told.is_news(here, placed.mode, now_us):
             return self.statement(now_us)
+        if placed.mode is DriveMode.STANDING and self._told.slots and not self._told.slots.issuperset(self.occupied()):
+            # Pushed: it asks for that too, also where it does nothing any more.
+            return self.statement(now_us) + self._claim(now_us)
         if known is not None and here != (known.track, known.index):
             # It counts for me before others hear it: I give what lies behind to who asks.
             self.fleet.mirror.on_progress(now)
@@ -252,10 +254,7 @@ class Carriage:
             return []
         ahead = self._ahead()
         effects = self._return_left(now_us) if self._turned else []
-        for slot in self.occupied():
-            # Pushed there by hand, or found there after a restart: a body asks for what it is in.
-            effects += self.fleet.tokens.want(segment_token(slot), now_us)
-        effects += self._ask(ahead, now_us) + self._ask_lifts(ahead, now_us)
+        effects += self._claim(now_us) + self._ask(ahead, now_us) + self._ask_lifts(ahead, now_us)
         reach, permit, reason = self._reach(ahead)
         if self.whole.slots and not self.whole.is_complete:
             reach, reason = None, Reason.NOT_AUTHORISED
@@ -278,10 +277,8 @@ class Carriage:
 
     def next_wake(self) -> int | None:
         """When the drive's order is to be repeated, or something is to be done about missing tokens."""
-        asking_us = self._asks_at_us()
-        if asking_us is None or self.refresh_at_us is None:
-            return self.refresh_at_us if asking_us is None else asking_us
-        return min(asking_us, self.refresh_at_us)
+        due = [time for time in (self._asks_at_us(), self.refresh_at_us) if time is not None]
+        return min(due, default=None)
 
     def _asks_at_us(self) -> int | None:
         """When something is to be done about missing tokens, while it is on its way."""
@@ -339,10 +336,12 @@ class Carriage:
         self.target = self.blocked = None
         self.stall.rests()
         self.whole.passed(self.occupied())
-        effects: list[Effect] = []
-        for segment in self.occupied():
-            effects += self.fleet.tokens.want(segment_token(segment), now_us)
-        return effects + self._give_back(now_us)
+        return self._claim(now_us) + self._give_back(now_us)
+
+    def _claim(self, now_us: int) -> list[Effect]:
+        """Ask for what the body is in: pushed there by hand, or found there after a restart."""
+        wanted = (self.fleet.tokens.want(segment_token(slot), now_us) for slot in self.occupied())
+        return [effect for effects in wanted for effect in effects]
 
     def _ahead(self) -> list[int]:
         """Indices from where the body is to the goal, the goal included, in the order of travel."""
@@ -366,7 +365,8 @@ class Carriage:
         """The last position of the unbroken authorised line and what permits it, or None; and why it ends there."""
         is_out = self.goal is not None and self.goal == self.way_out
         own = Reason.OPERATOR if self.stopped else Reason.POSITION_UNKNOWN if self.sensed is None else Reason.NONE
-        permit = self._may_be_in(self.occupied(), authorised(self.fleet.motion, ALONE, own), is_out=is_out)
+        here = [slot for slot in self.occupied() if not self._leaves_to_another(slot, ahead)]
+        permit = self._may_be_in(here, authorised(self.fleet.motion, ALONE, own), is_out=is_out)
         if not permit:
             return None, permit, permit.reason
         aside = self.placing.aside(self.sensed, self.track)
@@ -389,6 +389,10 @@ class Carriage:
         if reach is None or (reach == self.standing_at and reach != self.goal):
             return None, permit, reason
         return reach, permit, reason
+
+    def _leaves_to_another(self, slot: Segment, ahead: list[int]) -> bool:
+        """Whether it goes out of a slot that it was pushed to, and cannot have: who has the right stands in it too."""
+        return self.fleet.is_shared(slot) and self.placing.leaves(slot, self.sensed, self.track, ahead[-1])
 
     def _may_be_in(self, slots: Iterable[Segment], permit: Permit, *, is_out: bool) -> Permit:
         """The permit for these slots too. Out of a sill, to the side from where the body came, nothing is proved."""

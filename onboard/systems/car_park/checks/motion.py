@@ -9,6 +9,7 @@ from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.geometry import (
     TOLERANCE_MM,
     ReportedPosition,
+    body_at,
     lifts_under,
     occupied,
     sent_through,
@@ -100,7 +101,17 @@ class InsideAuthority(Rule):
         sensed = self.picture.sensed(body)
         if sensed is not None and way_site(site).tracks[body.track].kind is not TrackKind.LIFT:
             slots = sent_through(site, sensed, event.message)
+            slots = [slot for slot in slots if not self._leaves_to_another(sensed, slot, event.message)]
             self._judge(event, body, slots, "is sent through")
+
+    def _leaves_to_another(self, body: ReportedPosition, slot: Segment, order: DriveOrder) -> bool:
+        """Whether who was pushed is sent out of a slot in which another stands: it can have no right to that."""
+        ways, aim = self.picture.ways, body_at(self.picture.site, body, order.target_mm)
+        if body.node not in self._pushed or not slot.track == body.track == aim.track:
+            return False
+        goes_away = (ways.position_mm(slot) - body.position_mm) * (aim.position_mm - body.position_mm) < 0
+        others = [other for node, other in self.picture.bodies.items() if node != body.node and not other.speed_mm_s]
+        return goes_away and any(slot in occupied(ways, other) for other in others)
 
     def _judge(
         self,
