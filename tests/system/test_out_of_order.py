@@ -7,9 +7,11 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.car_park.simulation import Simulation
+from onboard.config.site import parse_site
 from onboard.contract.codes import DeskText, Reason
 from onboard.contract.messages import DeskOrder, Halted
 from onboard.systems.car_park.outage import OUT_AFTER_US
+from onboard.systems.car_park.site import car_park
 from tests.sites import one_floor
 from tests.system.scenarios import played
 from tests.system.scene import Scene, play, stays
@@ -74,3 +76,58 @@ def test_whom_a_robot_with_a_fault_keeps_waiting_is_told_why(at_s: int, limit_s:
     )
     assert (report.verdict, report.waiting, report.told) == (RunVerdict.TOLD, 0, 4)
     assert (report.violations, report.stalls) == ((), ())
+
+
+#: One bay, two robots, and more than one way round.
+ONE_BAY = """
+[site]
+name = "one-bay"
+[floors]
+count = 3
+positions = 12
+sides = ["far"]
+[[lifts]]
+name = "ER1"
+node = 100
+end = "left"
+[[lifts]]
+name = "ER2"
+node = 101
+doors = ["p(*,10)N"]
+[[spurs]]
+at = "p(1,8)"
+side = "near"
+length = 1
+[[spurs]]
+at = "p(*,6)"
+side = "far"
+length = 1
+[[compartments]]
+name = "IOC1"
+node = 1
+at = "p(1,6)"
+side = "near"
+[[robots]]
+name = "MR1"
+node = 11
+home = "p(195,1)"
+[[robots]]
+name = "MR2"
+node = 12
+home = "p(192,1)"
+[negotiation]
+call_at = "arrival"
+place = "random"
+"""
+
+
+def test_a_car_that_a_robot_keeps_aboard_holds_up_nobody_else_at_its_bay() -> None:
+    """All whose tickets came after its own waited at that bay for as long as it stood (drawn car parks, 3987)."""
+    site = car_park(parse_site(ONE_BAY, "one-bay.toml"))
+    fault = parse_injection("actuator_stuck:target=MR2,at_s=75,for_s=3000")
+    kept = play(site, stays((0, 300), (60, 310), (120, 320)), before=lambda one: arm(one, (fault,)), limit_s=1_500)
+    assert [texts(kept, number)[-1] for number in (1, 2, 3)] == [
+        DeskText.OUT_OF_ORDER,
+        DeskText.CAR_READY,
+        DeskText.CAR_READY,
+    ]

@@ -5,6 +5,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import DeskText, KindCode, Operation
+from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import Reference
 from onboard.core.authority import segment_token
 from onboard.core.effects import Effect
@@ -55,16 +56,22 @@ class Outage:
         return job is not None and job.car == car and job.was_granted
 
     def _due_us(self, phase: BayPhase) -> dict[Reference, int | None]:
-        """From when on nobody comes to each who waits: who has the bay's task stands, or has his, or is before it."""
+        """From when on nobody comes to each who waits: who has the bay's task stands, or has his, or is before it.
+
+        Or whose car is aboard of who stands.
+        """
         job = self.calls.job
         fetched = [task for task in self.calls.in_hand() if task.operation is Operation.RETRIEVE]
         if job is None or phase not in _WAITS:
-            return dict.fromkeys([*(task.car for task in fetched), *self.tickets])
+            return {
+                **dict.fromkeys(task.car for task in fetched),
+                **{car: self._aboard_us(car) for car in self.tickets},
+            }
         robots = [one.node_id for one in self.fleet.site.machines.values() if one.kind is KindCode.ROBOT]
         bay_us = _first(
             self._out_from_us([job.winner] if job.winner else robots), self._out_from_us([self._in_front()])
         )
-        due: dict[Reference, int | None] = dict.fromkeys(self.tickets, bay_us)
+        due = {car: _first(bay_us, self._aboard_us(car)) for car in self.tickets}
         for task in fetched:
             due[task.car] = _first(bay_us, self._out_from_us([task.winner] if task.winner else robots))
         return due
@@ -73,6 +80,13 @@ class Outage:
         """Who has the right to the slot in front of the bay: while it stands there nobody else comes."""
         station = self.calls.station
         return self.fleet.tokens.holder_of(segment_token(Segment(station.track, station.index)))
+
+    def _aboard_us(self, car: Reference) -> int | None:
+        """When the robot that a car is aboard of counts as out."""
+        known = self.fleet.mirror.cars.get(car)
+        if known is None or known.station != ANY_STATION:
+            return None
+        return self._out_from_us([known.custodian])
 
     def _out_from_us(self, nodes: Collection[int]) -> int | None:
         """When all of these are known not to come, or go, soon; None where one of them may."""

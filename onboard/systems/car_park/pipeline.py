@@ -156,8 +156,7 @@ class Pipeline:
             self.is_queued, self.outs = False, 0
         # After a restart the journal may know of a task whose bay was not noted yet.
         called = self.call(now_us, now_us) if self.is_on and self.calls.ahead is None else []
-        is_asked_for = bool(self.tickets) and custody.place_of(self.fleet, self.tickets[0]) is not None
-        is_out = self.calls.ahead is not None or (is_asked_for and not self.is_on)
+        is_out = self.calls.ahead is not None or (not self.is_on and self._first_that_stands() is not None)
         self.outs += is_out
         self.ins = 0 if is_out else self.ins
         return is_out, brought + called
@@ -206,12 +205,17 @@ class Pipeline:
         return [] if taken_us is None else self.call(max(taken_us, now_us) + driver_us + door_us, now_us)
 
     def call(self, ready_us: int, now_us: int) -> list[Effect]:
-        """Call for the first car that is asked for; the bay can take it from ``ready_us`` on."""
+        """Call for the first car that is asked for and stands; the bay can take it from ``ready_us`` on."""
         bay_task.forget_tickets(self.tickets, self.fleet.mirror)
-        if not self.tickets or custody.place_of(self.fleet, self.tickets[0]) is None:
+        car = self._first_that_stands()
+        if car is None:
             return []
-        car = self.tickets.popleft()
+        self.tickets.remove(car)
         task, number = self.memory.next_reference(self.fleet)
         wheelbase_mm = self.fleet.mirror.cars[car].wheelbase_mm
         ahead = self.calls.ahead = BayTask(task, Operation.RETRIEVE, car, wheelbase_mm, ready_us=ready_us)
         return [number, ahead_record(task, car, wheelbase_mm), *self.calls.call_for(ahead, now_us)]
+
+    def _first_that_stands(self) -> Reference | None:
+        """The car that was asked for first, but for those aboard: a robot that has stopped keeps its own for long."""
+        return next((car for car in self.tickets if custody.place_of(self.fleet, car) is not None), None)
