@@ -43,9 +43,8 @@ KEEP_US = 12_000_000
 SAY_AGAIN_US, SAY_AGAIN = 1_000_000, 20
 #: Who makes room for another has so long until that goes on, us: as long as a run of ten positions.
 ASIDE_US = 16_000_000
-#: A plan is made anew for so much that all its work is done sooner, us: what two plans that answer it cost (4 s each);
-#: and for so long after an obstacle came or went: what stood in the way is given back within ``KEEP_US``.
-SOONER_US, SOONER_FOR_US = 8_000_000, 30_000_000
+#: A plan is made anew for so much that all its work is done sooner, us: what two plans that answer it cost (4 s each).
+SOONER_US = 8_000_000
 
 
 @dataclass
@@ -72,10 +71,9 @@ class GoingAround:
     _place_at_us: int | None = None
     #: Since when somebody stands in my way for ever, by its plan.
     _stands_since_us: int | None = None
-    #: Plans heard, and when that was, when it last looked whether it can set off sooner; until when it does so.
+    #: Plans heard, and when that was, when it last looked whether it can set off sooner.
     _plans_seen: int = -1
     _looked_us: int = 0
-    _sooner_until_us: int = 0
 
     def __post_init__(self) -> None:
         self.places = PlaceChoice(self.fleet, self.generation, self.shuttle)
@@ -118,7 +116,6 @@ class GoingAround:
             self._since_us = self._retry_at_us = now_us
         changes = self.fleet.mirror.obstacles.changes
         if changes != self._seen:
-            self._sooner_until_us = self._sooner_until_us if self._seen < 0 else now_us + SOONER_FOR_US
             self._seen = changes
             if self._since_us is not None or self._is_hindered(self.program.remaining, now_us):
                 self._since_us = now_us if self._since_us is None else self._since_us
@@ -276,11 +273,11 @@ class GoingAround:
             self.program.steps[self.program.current + 1] = off._replace(to_index=off.from_index + step)
 
     def _set_off_sooner(self, now_us: int) -> list[Effect]:
-        """Who stands by its plan looks, after an obstacle came or went, whether all can be done much sooner by now.
+        """Who stands by its plan looks, as others tell theirs, whether all can be done much sooner by now.
 
-        Others plan anew then as well, and what they gave up would be waited for to its planned end.
+        What they gave up, or are done with before its time, would be waited for to its planned end.
         """
-        if self._heard == self._plans_seen or not self._looked_us + LOOK_US <= now_us < self._sooner_until_us:
+        if self._heard == self._plans_seen or now_us < self._looked_us + LOOK_US:
             return []
         step, works = self.program.step, self.program.works()
         if step is None or step.action is not LegAction.STAND or step.end_us - now_us < SOONER_US or not works:
