@@ -16,7 +16,7 @@ from onboard.core.site import Site
 SPAN_S = (20.0, 900.0)
 #: So many faults a run, unless a profile has a number of its own.
 COUNT = (1, 4)
-COUNTS: Final[dict[str, tuple[int, int]]] = {"two-crashes": (2, 2)}
+COUNTS: Final[dict[str, tuple[int, int]]] = {"two-crashes": (2, 2), "pushes": (6, 6)}
 
 #: At a rate, a fault that names a car names one of so many that came last, or the next: an older one has left.
 CARS_AROUND = 5
@@ -101,6 +101,13 @@ _PEOPLE: Final[dict[str, Draw]] = {
     "oversize": lambda c, _: {"car": c.randint(1, 6)},
     "moved": lambda c, s: {"target": _ROBOT(c, s), "by_mm": c.choice([-2400, -600, -40, 40, 600, 2400])},
 }
+#: From within a slot to beyond the next one, and so against whoever is near.
+_PUSHES: Final[dict[str, Draw]] = {
+    "moved": lambda c, s: {
+        "target": _ROBOT(c, s),
+        "by_mm": c.choice([-1, 1]) * c.choice([30, 100, 300, 600, 900, 1500, 2400, 4000]),
+    },
+}
 #: Only in ``all``. A position sensor that lies plausibly, a broken bolt and a double node-ID are left to scenarios of
 #: their own: what then follows is not the controllers' doing alone.
 _MORE: Final[dict[str, Draw]] = {
@@ -145,6 +152,7 @@ PROFILES: Final[dict[str, dict[str, Draw]]] = {
     "crash": _CRASH,
     "two-crashes": {"crash": _crash},
     "people": _PEOPLE,
+    "pushes": _PUSHES,
     "all": {**_BUS, **_CRASH, **_PEOPLE, **_MORE, **_POWER},
     "clocks": _CLOCKS,
     "power": {**_POWER, "crash": _crash, "pause": _CRASH["pause"], "power_cut": _CRASH["power_cut"]},
