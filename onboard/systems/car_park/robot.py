@@ -491,7 +491,7 @@ class ParkingRobot:
         What follows is a person's decision: the controller is started anew once the machine is sound.
         """
         self._fault, self.carriage.stopped = reason, True
-        effects: list[Effect] = [Report(f"stopped: {reason.name}")]
+        effects: list[Effect] = [Report(f"stopped: {reason.name}"), *self.carriage.claim(now_us)]
         lost = self._untouched()
         for task in lost:
             self.recovery.forget(task)

@@ -173,12 +173,11 @@ class Carriage:
         self._face()
         now, known = self._progress(), self.fleet.mirror.progress.get(self.fleet.node_id)
         here = Segment(now.track, now.index)
-        is_news = self._told.is_news(here, placed.mode, now_us)
+        if self._told.is_news(here, placed.mode, now_us):
+            return self.statement(now_us)
         if placed.mode is DriveMode.STANDING and self._told.slots and not self._told.slots.issuperset(self.occupied()):
             # Pushed: it asks for that too, also where it does nothing any more.
-            return self.statement(now_us) + self._claim(now_us)
-        if is_news:
-            return self.statement(now_us)
+            return self.statement(now_us) + self.claim(now_us)
         if known is not None and here != (known.track, known.index):
             # It counts for me before others hear it: I give what lies behind to who asks.
             self.fleet.mirror.on_progress(now)
@@ -255,7 +254,7 @@ class Carriage:
             return []
         ahead = self._ahead()
         effects = self._return_left(now_us) if self._turned else []
-        effects += self._claim(now_us) + self._ask(ahead, now_us) + self._ask_lifts(ahead, now_us)
+        effects += self.claim(now_us) + self._ask(ahead, now_us) + self._ask_lifts(ahead, now_us)
         reach, permit, reason = self._reach(ahead)
         if self.whole.slots and not self.whole.is_complete:
             reach, reason = None, Reason.NOT_AUTHORISED
@@ -337,9 +336,9 @@ class Carriage:
         self.target = self.blocked = None
         self.stall.rests()
         self.whole.passed(self.occupied())
-        return self._claim(now_us) + self._give_back(now_us)
+        return self.claim(now_us) + self._give_back(now_us)
 
-    def _claim(self, now_us: int) -> list[Effect]:
+    def claim(self, now_us: int) -> list[Effect]:
         """Ask for what the body is in: pushed there by hand, or found there after a restart."""
         wanted = (self.fleet.tokens.want(segment_token(slot), now_us) for slot in self.occupied())
         return [effect for effects in wanted for effect in effects]
