@@ -107,8 +107,8 @@ class ToldWay:
     """One machine's plan: its turns, and how far it has come.
 
     ``in_hand`` is how many moving legs come behind leg number ``leg``, the one in hand; in that leg its body is in
-    ``body`` and has left the segments ``left``. ``retreat`` moving legs come behind its last work. ``start`` is where the
-    first leg begins, None where a hop does not tell.
+    ``body`` and has left the segments ``left``. ``retreat`` moving legs come behind its last work. ``start`` is where
+    the first leg begins, None where a hop does not tell.
     """
 
     itinerary: Itinerary

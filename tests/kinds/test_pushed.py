@@ -35,7 +35,7 @@ def ready_to_turn() -> Carriage:
 
 
 def test_pushed_into_another_slot_it_says_where_it_is_though_its_place_is_the_same() -> None:
-    """Whoever has the right to that slot would drive into it: seen where it only asked for it (drawn car parks, 3867)."""
+    """Whoever has the right to that slot would drive into it (drawn car parks, 3867, with half of the mend)."""
     one = in_mouth()
     one.go(MOUTH)
     one.sense(state(MOUTH_MM), 1)
