@@ -78,6 +78,8 @@ def test_pushed_it_asks_for_the_slot_at_once_also_where_it_has_stopped_itself() 
     one.statement(0)
     one.stopped = True
     assert asked(one.sense(state(MOUTH_MM - 600), 1)) == [Segment(1, 6).number]
+    effects = one.sense(state(MOUTH_MM - 2 * PITCH_MM), 2)
+    assert (places(effects), asked(effects)) == ([(1, 5, 0)], [Segment(1, 5).number]), "also past a whole slot"
 
 
 def pushed_to(other_at: int) -> Carriage:

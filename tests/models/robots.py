@@ -94,6 +94,10 @@ class _StandingCarriage(Carriage):
         self.target, position_mm = goal, self.axis.position_mm(goal.index)
         return [Actuate(DriveState(self.fleet.node_id, 0, position_mm, 0, DriveMode.STANDING, True), None)]
 
+    def claim(self, now_us: int) -> list[Effect]:
+        """It was not pushed there."""
+        return []
+
 
 @dataclass
 class _TimelessProgram(Program):

@@ -1,5 +1,6 @@
 """What people do to a car park that nobody asked them to do."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -9,6 +10,7 @@ from bus_sim.systems.car_park.plant.customer import Customer, CustomerEvent
 from bus_sim.systems.car_park.plant.motion import standing
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import DoorName, DoorPosition
+from onboard.systems.car_park.axis import TrackAxis
 from onboard.ways.site import way_site
 
 #: Somebody who waits for the right moment looks again after this, us: a person's attention.
@@ -87,20 +89,35 @@ def moved(simulation: Simulation, injection: Injection) -> None:
         return
     here_mm = robot.motion.final_mm
     low_mm, high_mm = 0.0, float((track.length - 1) * track.pitch_mm)
-    length_mm = way_site(simulation.site).carrier_length_mm
-    for other, body in world.robots.items():
-        if other != node_id and body.track == robot.track:
-            there_mm = body.motion.at(now_us)[0]
-            ends = (there_mm, body.motion.final_mm)
-            if there_mm > here_mm:
-                high_mm = min(high_mm, min(ends) - length_mm)
-            else:
-                low_mm = max(low_mm, max(ends) + length_mm)
+    half_mm = way_site(simulation.site).carrier_length_mm / 2
+    for from_mm, to_mm in _taken_by_others(simulation, node_id):
+        if from_mm + to_mm > 2 * here_mm:
+            high_mm = min(high_mm, from_mm - half_mm)
+        else:
+            low_mm = max(low_mm, to_mm + half_mm)
     if high_mm < low_mm:
         return
     target_mm = min(max(here_mm + injection.number("by_mm"), low_mm), high_mm)
     world.move_carrier(node_id, standing(target_mm, now_us))
     simulation.plant.carriers[node_id].start()
+
+
+def _taken_by_others(simulation: Simulation, node_id: int) -> Iterator[tuple[float, float]]:
+    """From where to where, mm, others' bodies are on a robot's track or drive to; who closes a mouth has all of it."""
+    site, world = way_site(simulation.site), simulation.plant.world
+    track, half_mm = site.tracks[world.robots[node_id].track], site.carrier_length_mm // 2
+    for other, body in world.robots.items():
+        if other == node_id:
+            continue
+        ends_mm = body.motion.at(simulation.loop.now_us())[0], body.motion.final_mm
+        from_mm, to_mm = min(ends_mm) - half_mm, max(ends_mm) + half_mm
+        if body.track == track.number:
+            yield from_mm, to_mm
+            continue
+        for slot in TrackAxis(site, world.axis_of(other)).overlapped(round(from_mm) + 1, round(to_mm) - 1):
+            if slot.track == track.number:
+                middle_mm = site.position_mm(slot)
+                yield middle_mm - track.pitch_mm / 2, middle_mm + track.pitch_mm / 2
 
 
 def _on_platform(simulation: Simulation, node_id: int) -> bool:

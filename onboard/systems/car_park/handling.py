@@ -3,11 +3,15 @@
 A station's token is the right to send the shuttle in; the car's token is its custody. Both are asked for in front of
 the station; a compartment grants its bay only with the output door open. The journal notes each step before the order
 to the actuator.
+
+Who was pushed off its mark as it sent the shuttle out is refused by the shuttle's drive, which has not begun: nothing
+is broken. It takes the order back, goes back to the mark and begins anew.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import ShuttleAction, ShuttleMode
+from onboard.contract.codes import ShuttleAction, ShuttleMode, Side
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import ShuttleOrder, ShuttleState
 from onboard.core.authority import TokenKey, station_token
@@ -63,6 +67,8 @@ class ShuttleWork:
     sensed: ShuttleState | None = None
     fault: bool = False
     stall: Stall = field(default_factory=lambda: Stall(repeats=False))
+    #: Whether the carrier stands at the mark of what is in hand, as far as is sensed.
+    at_mark: Callable[[], bool] = lambda: True
     _resuming: bool = False
     _ordered: ShuttleOrder | None = None
     _unheard: Unheard = field(default_factory=Unheard)
@@ -80,7 +86,7 @@ class ShuttleWork:
     @property
     def is_out(self) -> bool:
         """Whether the shuttle may be outside the carrier: then the carrier must not move (row P32)."""
-        return self.phase in (HandlingPhase.REACH, HandlingPhase.CLAMP, HandlingPhase.RETRACT)
+        return self.phase not in (HandlingPhase.ACQUIRE, HandlingPhase.DONE)
 
     @property
     def is_astray(self) -> bool:
@@ -107,12 +113,23 @@ class ShuttleWork:
             # The shuttle does nothing on an order that it has had: go on from its number after a restart.
             self.sequence = state.sequence
         self.sensed = state
-        self.fault = state.mode is ShuttleMode.FAULT
+        if self._is_refused(state):
+            self.phase = HandlingPhase.REFUSED
+            return self._send(ShuttleAction.RETRACT, state.side, state.wheelbase_mm, now_us)
+        is_answer = state.sequence == self.sequence
+        self.fault = state.mode is ShuttleMode.FAULT and (is_answer or self.phase is not HandlingPhase.REFUSED)
+        if self.phase is HandlingPhase.REFUSED and is_answer and self.is_home:
+            self.phase = HandlingPhase.ACQUIRE
         order = self._ordered
         if order is None or not self.is_out or state.sequence == order.sequence:
             self.stall.rests()
             return []
         return self._permit().order(order) if self._unheard.is_due("shuttle", now_us, heard=False) else []
+
+    def _is_refused(self, state: ShuttleState) -> bool:
+        """Whether the drive would not reach out where the carrier, pushed since, does not stand at the mark."""
+        has_stayed = state.mode is ShuttleMode.FAULT and not state.extension_mm and state.sequence == self.sequence
+        return has_stayed and self.phase is HandlingPhase.REACH and bool(self._permit()) and not self.at_mark()
 
     def advance(self, now_us: int) -> list[Effect]:
         """Take the next step of the table where its condition is met."""
@@ -191,14 +208,17 @@ class ShuttleWork:
             # A car that is not measured as far as is known would be torn: its custodian tells it.
             return []
         self.phase = following
-        self.sequence = successor(self.sequence, 8)
-        self._ordered = ShuttleOrder(self.fleet.node_id, self.sequence, order, side, wheelbase_mm)
-        self._unheard.ordered("shuttle")
-        self.stall.ordered(now_us)
         measured_mm = 0 if self.work.wheelbase_mm else wheelbase_mm
         station, car = self.work.station.number, self.work.car.number
         begun = StepRecord(self.phase, self.work.handling, station, car, measured_mm)
-        return [Record(begun), *permit.order(self._ordered)]
+        return [Record(begun), *self._send(order, side, wheelbase_mm, now_us)]
+
+    def _send(self, action: ShuttleAction, side: Side, wheelbase_mm: int, now_us: int) -> list[Effect]:
+        self.sequence = successor(self.sequence, 8)
+        self._ordered = ShuttleOrder(self.fleet.node_id, self.sequence, action, side, wheelbase_mm)
+        self._unheard.ordered("shuttle")
+        self.stall.ordered(now_us)
+        return self._permit().order(self._ordered)
 
     def _finish(self, work: StationWork, now_us: int) -> list[Effect]:
         """The shuttle is home: state where the car is, pass custody on after leaving it, give the station back."""

@@ -40,6 +40,7 @@ class HandlingPhase(StrEnum):
 
     ACQUIRE = "acquire"
     REACH = "reach"
+    REFUSED = "refused"
     CLAMP = "clamp"
     RETRACT = "retract"
     DONE = "done"

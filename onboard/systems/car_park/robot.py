@@ -96,7 +96,7 @@ class ParkingRobot:
     def __post_init__(self) -> None:
         self.carriage = Carriage(self.fleet, self.fleet.machine.home.track)
         self.shuttle = ShuttleWork(self.fleet)
-        self.carriage.is_clear = lambda: self.shuttle.is_home
+        self.carriage.is_clear, self.shuttle.at_mark = lambda: self.shuttle.is_home, lambda: self.carriage.arrived
         self.carriage.in_hand = lambda: (self.program.version, self.program.leg)
         self.carriage.route_ahead = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
         self.riding = Riding(self.fleet)

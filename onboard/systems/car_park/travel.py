@@ -173,11 +173,12 @@ class Carriage:
         self._face()
         now, known = self._progress(), self.fleet.mirror.progress.get(self.fleet.node_id)
         here = Segment(now.track, now.index)
-        if self._told.is_news(here, placed.mode, now_us):
-            return self.statement(now_us)
+        is_news = self._told.is_news(here, placed.mode, now_us)
         if placed.mode is DriveMode.STANDING and self._told.slots and not self._told.slots.issuperset(self.occupied()):
             # Pushed: it asks for that too, also where it does nothing any more.
             return self.statement(now_us) + self.claim(now_us)
+        if is_news:
+            return self.statement(now_us)
         if known is not None and here != (known.track, known.index):
             # It counts for me before others hear it: I give what lies behind to who asks.
             self.fleet.mirror.on_progress(now)
