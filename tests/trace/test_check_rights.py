@@ -18,6 +18,7 @@ from onboard.contract.messages import (
 )
 from onboard.core.site import Segment
 from onboard.ways.site import way_site
+from tests.sites import one_floor
 from tests.trace.checking import (
     ER1,
     GATE,
@@ -155,8 +156,8 @@ def test_a_body_outside_its_authority_is_found_once(where: Message) -> None:
     assert tape.broken() == {"inside-authority": 1}
 
 
-def beat(node: int) -> Heartbeat:
-    return Heartbeat(node, 1, 1, 0, 1, KindCode.ROBOT, MachineState.IDLE)
+def beat(node: int, boot: int = 1) -> Heartbeat:
+    return Heartbeat(node, 1, 1, 0, boot, KindCode.ROBOT, MachineState.IDLE)
 
 
 def test_who_is_pushed_by_hand_has_time_to_ask_and_no_more() -> None:
@@ -166,6 +167,27 @@ def test_who_is_pushed_by_hand_has_time_to_ask_and_no_more() -> None:
     assert stays.say(60, beat(MR1)).say(63, beat(MR1)).broken() == {"inside-authority": 1}
     drives = Tape(one_alley()).say(1, at(MR1, 1, 12)).say(2, at(MR1, 1, 11)).say(3, at(MR1, 1, 11, 0, -10))
     assert drives.broken() == {"inside-authority": 1}
+
+
+def test_who_is_pushed_out_of_a_mouth_before_it_has_told_its_turn_was_pushed_all_the_same() -> None:
+    """Its controller was off meanwhile; the last that it had said was of the spur's axis (drawn car parks, 4234)."""
+    spur = one_floor(2, extra='[[spurs]]\nat = "p(1,7)"\n')
+    tape = Tape(spur).say(1, grant(Segment(1, 7), 1, 1, MR1), grant(Segment(192, 1), 1, 1, MR1))
+    tape.say(2, at(MR1, 192, 0)).say(3, at(MR1, 1, 5))
+    assert tape.broken() == {}
+    assert tape.say(60, beat(MR1)).say(64, beat(MR1)).broken() == {"inside-authority": 1}
+    entered = Tape(spur).say(1, grant(Segment(1, 7), 1, 1, MR1)).say(2, at(MR1, 1, 7)).say(3, at(MR1, 192, 1))
+    assert entered.say(60, beat(MR1)).broken() == {}
+
+
+@pytest.mark.parametrize(("boot", "broken"), [(2, {}), (1, {"inside-authority": 1})])
+def test_who_drove_as_it_failed_and_is_elsewhere_when_it_starts_again_was_pushed(
+    boot: int, broken: dict[str, int]
+) -> None:
+    """In the same life it has driven there (drawn car parks, 4245)."""
+    tape = Tape(one_alley()).say(1, beat(MR1), at(MR1, 1, 12, 0, -10)).say(20, beat(MR1, boot), at(MR1, 1, 9))
+    assert tape.broken() == broken
+    assert tape.say(70, beat(MR1, boot)).say(85, beat(MR1, boot)).broken() == {"inside-authority": 1}
 
 
 def test_a_slot_given_back_too_early_is_found() -> None:

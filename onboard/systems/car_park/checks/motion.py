@@ -46,6 +46,7 @@ class InsideAuthority(Rule):
         self._pushed: dict[int, tuple[LogEvent[Progress], ReportedPosition, int]] = {}
         self._stood: dict[int, DriveState] = {}
         self._drive_pushed_us: dict[int, int] = {}
+        self._lives: dict[int, int] = {}
 
     def handlers(self) -> Handlers:
         """Where bodies are, and with device buses where drives are sent."""
@@ -77,10 +78,25 @@ class InsideAuthority(Rule):
             self._judge(event, body, [slot for slot in ahead if slot not in here], "cannot stop before")
 
     def _was_pushed(self, body: ReportedPosition) -> bool:
-        before = self.picture.bodies.get(body.node)
-        if before is None or before.track != body.track or before.speed_mm_s or body.speed_mm_s:
+        before, life = self.picture.bodies.get(body.node), self.picture.boots.get(body.node, 0)
+        is_new_life, self._lives[body.node] = life != self._lives.get(body.node, life), life
+        if before is None or body.speed_mm_s:
             return False
-        return body.node in self._pushed or abs(before.position_mm - body.position_mm) > TOLERANCE_MM
+        if before.speed_mm_s:
+            # It drove as its controller failed: nobody has told where it came to rest, before it was pushed.
+            return is_new_life
+        before_mm = self._seen_from(before, body.track)
+        if before_mm is None:
+            return False
+        return body.node in self._pushed or abs(before_mm - body.position_mm) > TOLERANCE_MM
+
+    def _seen_from(self, body: ReportedPosition, track: int) -> int | None:
+        """Where a body is on a track, mm: its own, or one that it could tell as well, turned in a mouth; else None."""
+        if body.track == track:
+            return body.position_mm
+        ways, here = self.picture.ways, Segment(body.track, body.index)
+        turned = (*ways.links.get(here, ()), *([ways.mouths[here]] if here in ways.mouths else ()))
+        return next((ways.position_mm(place) for place in turned if place.track == track), None)
 
     def tick(self, now_us: int) -> None:
         """Who was pushed has had its time."""
