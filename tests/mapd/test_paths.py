@@ -4,6 +4,7 @@ import random
 
 import pytest
 
+from onboard.systems.mapd import search
 from onboard.systems.mapd.floor import Floor, NetworkLine, grid_floor, network_floor
 from onboard.systems.mapd.paths import Path, Paths
 from onboard.systems.mapd.search import find_path, is_sooner
@@ -47,6 +48,43 @@ def test_a_way_that_has_become_free_is_sooner_and_a_straight_one_is_not() -> Non
     assert not is_sooner(passage, gone, 0, 3, 4, ends), "from there its path is the shortest"
     stays = paths_of(passage, waits, Path(0, (2, 2, 2, 2, 2, 7)))
     assert not is_sooner(passage, stays, 0, 0, 4, ends), "who made it wait still does"
+
+
+#: An open floor, one of narrow ways, and one with a zone and a way that leads in one direction only.
+FLOORS = (
+    grid_floor(["......", ".@..@.", "......", ".@..@."]),
+    grid_floor(["......", "@@.@@.", "......", ".@@.@@"]),
+    network_floor(
+        "abcdef",
+        [NetworkLine(a, b, 2) for a, b in ("ab", "bc", "cd", "de", "ef", "fa", "be")]
+        + [NetworkLine("a", "d", 2, one_way=True)],
+        [["b", "b>e"]],
+    ),
+)
+
+
+@pytest.mark.parametrize("floor", FLOORS, ids=["open", "narrow", "network"])
+def test_the_quick_look_says_no_only_where_a_search_does(floor: Floor, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Robots that planned around one another, some of whom have gone elsewhere since."""
+    rng, found, quick = random.Random(11), 0, search._may_be_there
+    cells = [cell for cell, ways in enumerate(floor.ways) if ways]
+    for _ in range(150):
+        paths = Paths(floor.network)
+        for robot, cell in enumerate(rng.sample(cells, 5)):
+            goals, ends = (rng.choice(cells),), frozenset(rng.sample(cells, 4))
+            path = find_path(floor, paths, cell, 0, goals, ends)
+            if path is not None:
+                paths.put(robot, path)
+        for gone in rng.sample(sorted(paths.by_robot), len(paths.by_robot) // 2):
+            paths.take(gone)
+        for robot, step in [(robot, step) for robot in sorted(paths.by_robot) for step in range(3)]:
+            ask = floor, paths, robot, step, paths.by_robot[robot].rest, frozenset(cells)
+            monkeypatch.setattr(search, "_may_be_there", lambda *_: True)
+            is_found = is_sooner(*ask)
+            monkeypatch.setattr(search, "_may_be_there", quick)
+            assert is_sooner(*ask) is is_found
+            found += is_found
+    assert found > 20
 
 
 def test_two_robots_cannot_be_in_one_cell() -> None:

@@ -89,15 +89,15 @@ class Paths:
                 return robot
         return None
 
-    def goes_round(self, robot: int, cell: int, step: int) -> bool:
-        """Whether ``robot``, or one that it follows in this step, moves to what ``cell`` takes."""
+    def goes_round(self, robot: int, cell: int, step: int, without: int = NOBODY) -> bool:
+        """Whether ``robot``, or one that it follows in this step, moves to what ``cell`` takes; ``without`` is gone."""
         asked, takes = {robot}, self.network.takes
         while True:
             to = self.by_robot[robot].at(step + 1)
             if takes[to] == takes[cell]:
                 return True
             ahead = self.holder(to, step)
-            if ahead is None or ahead in asked:
+            if ahead is None or ahead == without or ahead in asked:
                 return False
             asked.add(ahead)
             robot = ahead
