@@ -136,3 +136,15 @@ def test_the_shuttle_stays_in_between_marks() -> None:
     bench.shuttle(ShuttleAction.REACH, 1)
     assert bench.shuttles[ROBOT].fault == "the carrier does not stand at a mark"
     assert bench.rules == []
+
+
+def test_what_has_refused_and_has_not_begun_is_home_as_soon_as_it_is_told_to_be() -> None:
+    """A checker took it for in the bay whose door was closed (corner, pushes, seed 50417)."""
+    bench = Bench()
+    bench.drive(26_400 - 1_000, 1)
+    bench.shuttle(ShuttleAction.REACH, 1)
+    bench.links[ROBOT].order(ShuttleOrder(ROBOT, 2, ShuttleAction.RETRACT, Side.FAR, 2700))
+    assert [state.mode for _, state in bench.links[ROBOT].all(ShuttleState)][-2:] == [
+        ShuttleMode.FAULT,
+        ShuttleMode.HOME,
+    ]

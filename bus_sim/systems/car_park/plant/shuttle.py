@@ -103,6 +103,9 @@ class Shuttle:
         if order.action is ShuttleAction.REACH:
             self._station = self._world.station_beside(self.node_id, order.side)
             self._extend(self._site.shuttle_reach_mm, order.side)
+        elif order.action is ShuttleAction.RETRACT and self.is_home():
+            # One that has refused, and has not begun.
+            self._extended()
         elif order.action is ShuttleAction.RETRACT:
             self._extend(0, self._body.side)
         else:
