@@ -7,7 +7,7 @@ import pytest
 from onboard.systems.mapd.auction import Availability, Backlog, BidWeights, bids
 from onboard.systems.mapd.floor import grid_floor
 from onboard.systems.mapd.nearby import Nearby
-from onboard.systems.mapd.prospects import Prospects
+from onboard.systems.mapd.prospects import SPAN, Offers, Prospects
 from onboard.systems.mapd.tasks import TransportTask, task_named
 
 FLOOR = grid_floor(["." * 24] * 12)
@@ -19,6 +19,24 @@ def by_itself(rule: BidWeights, offer: Availability, tasks: list[TransportTask],
     nearby = Nearby(FLOOR)
     nearby.see(tasks)
     return bids(FLOOR, rule, offer, tasks, Backlog.of(nearby, tasks, ROBOTS, step))
+
+
+def looked_at(offers: Offers) -> list[tuple[int, int]]:
+    """All bids, as far as one looks."""
+    found: list[tuple[int, int]] = []
+    while some := offers.look_on():
+        assert some[-1][0] <= some[0][0] + SPAN
+        found += some
+    return found
+
+
+def test_what_is_not_open_and_what_cannot_be_reached_has_no_bid() -> None:
+    split = grid_floor(["...@..."])
+    near, far = task_named(1, 0, 0, 2), task_named(2, 0, 4, 6)
+    offers = Prospects(split, ROBOTS).offers(BidWeights(), Availability(11, 1, 0), [near, far], 0)
+    assert (offers.bid(2), offers.bid(3)) == (None, None)
+    assert looked_at(offers) == [(offers.bid(1), 1)]
+    assert offers.look_on() == []
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -41,7 +59,9 @@ def test_robots_that_know_different_tasks_bid_as_if_alone(seed: int) -> None:
         for rule in (BidWeights(), BidWeights(nearby=0)):
             for tasks in (both, late, both):
                 offer = Availability(11, chance.choice(cells), chance.randrange(4))
-                assert prospects.bids(rule, offer, tasks, step) == by_itself(rule, offer, tasks, step)
+                alone, offers = by_itself(rule, offer, tasks, step), prospects.offers(rule, offer, tasks, step)
+                assert [(offers.bid(number), number) for _, number in alone] == alone
+                assert looked_at(offers) == sorted(alone), "cheapest first"
 
 
 def test_the_same_tasks_are_looked_at_once() -> None:
@@ -56,5 +76,5 @@ def test_the_same_tasks_are_looked_at_once() -> None:
     prospects._nearby = Counted(FLOOR)
     for robot in range(ROBOTS):
         tasks = [task_named(number, 0, number, number + 20) for number in range(8)]
-        prospects.bids(BidWeights(), Availability(robot, robot, 0), tasks, 5)
+        prospects.offers(BidWeights(), Availability(robot, robot, 0), tasks, 5)
     assert looks == 1

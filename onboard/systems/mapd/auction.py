@@ -154,10 +154,15 @@ def shares(floor: Floor, rule: BidWeights, tasks: Iterable[TransportTask], backl
 
 def offered(rule: BidWeights, offer: Availability, backlog: Backlog, known: Iterable[Share]) -> list[tuple[int, int]]:
     """One robot's bid for each task that it can reach, with its number, from the ``shares``."""
-    cell, weight, robots = offer.cell, rule.empty, backlog.robots
-    lighter = backlog.crowd * min(4 * robots, backlog.tasks) // (4 * robots)
-    wait = (100 * rule.wait - (rule.wait - rule.crowded_wait) * lighter) * offer.steps // 100
+    cell, weight, wait = offer.cell, rule.empty, until_free(rule, offer, backlog)
     return [(wait + weight * empty + part, number) for steps, number, part in known if (empty := steps[cell]) < FAR]
+
+
+def until_free(rule: BidWeights, offer: Availability, backlog: Backlog) -> int:
+    """What the steps until a robot is free add to its bid for any task."""
+    robots = backlog.robots
+    lighter = backlog.crowd * min(4 * robots, backlog.tasks) // (4 * robots)
+    return (100 * rule.wait - (rule.wait - rule.crowded_wait) * lighter) * offer.steps // 100
 
 
 def winners(

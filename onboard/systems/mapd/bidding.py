@@ -13,14 +13,13 @@ from onboard.contract.messages import Bid, CallForProposals
 from onboard.core.negotiation import Proposal
 from onboard.core.site import Timing
 from onboard.systems.mapd.calls import task_of
+from onboard.systems.mapd.prospects import Offers
 from onboard.work.plain import NoEstimator
 
 #: Half of the longest delay is owed by a bid of 30 steps, us: most pick-ups in a warehouse are nearer.
 HALF_US = 3_000_000
 #: Share of a round's length that the longest delay may take, per cent: the rest is for those who are beaten late.
 DELAY_PERCENT = 60
-#: Tasks are put in order as far as this beyond the cheapest, hundredths of a step.
-SPAN = 1_000
 
 
 def bid_timing(timing: Timing, window_us: int) -> Timing:
@@ -32,26 +31,26 @@ def bid_timing(timing: Timing, window_us: int) -> Timing:
 class UnitGeneration(NoEstimator):
     """A robot's task-generation function: what each open task costs it in the round ``mark``, as it saw it then."""
 
-    costs: dict[int, int] = field(default_factory=dict)
+    offers: Offers | None = None
     mark: int = 0
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         """Hundredths of a step; None for a task that it does not know, or cannot reach."""
-        return self.costs.get(call.task.number)
+        return None if self.offers is None else self.offers.bid(call.task.number)
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
         """The same: what is in the way is seen when the path is planned."""
-        cost = self.costs.get(call.task.number)
+        cost = self.lower_bound(call, now_us)
         return None if cost is None else Proposal(cost, None, (call.task.number,), (), version=self.mark)
 
 
 @dataclass
 class Round:
-    """A round that was opened at ``begun_us``; ``preferences`` are (cost, task) of what was not looked at yet."""
+    """A round that was opened at ``begun_us``, and what this robot can offer in it."""
 
     node_id: int
     begun_us: int
-    preferences: Sequence[tuple[int, int]]
+    offers: Offers
     #: The task whose call it takes part in.
     looked_at: int | None = None
     bids: dict[int, list[Bid]] = field(default_factory=dict)
@@ -78,12 +77,6 @@ class Round:
                 if best is None or (cost, self.node_id) <= best:
                     return task
                 self._next += 1
-            if not self.preferences:
+            self._near, self._next = self.offers.look_on(), 0
+            if not self._near:
                 return None
-            self._look_farther()
-
-    def _look_farther(self) -> None:
-        """Of a great many tasks few are ever looked at: only those are put in order."""
-        limit, others = min(self.preferences)[0] + SPAN, self.preferences
-        self._near, self._next = sorted(one for one in others if one[0] <= limit), 0
-        self.preferences = [one for one in others if one[0] > limit]

@@ -37,6 +37,7 @@ from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.memory import path_record, read_past
 from onboard.systems.mapd.moves import path_frames
 from onboard.systems.mapd.paths import Path
+from onboard.systems.mapd.prospects import Offers
 from onboard.systems.mapd.search import find_path, is_sooner
 from onboard.systems.mapd.site import Mapd
 from onboard.systems.mapd.steps import LAST, STEP_TABLE, GridStepPhase, StepDeed, StepFinding
@@ -371,10 +372,10 @@ class UnitRobot(Plain):
     def _begin_bids(self, now_us: int) -> list[Effect]:
         """What each open task would cost; who is to make room for others' ends, or waits elsewhere better, says so."""
         assert self.round is not None
-        costs = self._costs()
-        self.generation.costs, self.generation.mark = {task: bid for bid, task in costs}, mark_of(self.round)
+        offers = self._offers()
+        self.generation.offers, self.generation.mark = offers, mark_of(self.round)
         self.fleet.negotiation.leave_round(self.site.desk)
-        self._bids = Round(self.fleet.node_id, now_us, costs)
+        self._bids = Round(self.fleet.node_id, now_us, offers)
         for heard in self._heard_bids:
             self._bids.hear(heard)
         self._ask_us = now_us + self.site.bid_window_us + ASK_US
@@ -414,9 +415,9 @@ class UnitRobot(Plain):
         body = self.driving.cart.state
         return body is not None and body.task != NO_TASK
 
-    def _costs(self) -> list[tuple[int, int]]:
-        """What each open task would cost, with its number: the task-generation function of this system."""
-        return self.site.prospects.bids(self.rule, self._offer(), self.knowledge.open_tasks, self.step)
+    def _offers(self) -> Offers:
+        """What each open task would cost: the task-generation function of this system."""
+        return self.site.prospects.offers(self.rule, self._offer(), self.knowledge.open_tasks, self.step)
 
     def _offer(self) -> Availability:
         """Where and when it will be free: at once, or where it delivers what it carries."""
