@@ -231,6 +231,15 @@ def test_who_is_pushed_against_another_may_drive_away_from_it(
     assert tape.say(3, DriveOrder(MR1, 1, target_mm, 1_500)).broken() == broken
 
 
+def test_it_may_do_so_before_its_word_that_it_was_pushed_is_on_the_bus() -> None:
+    """Started again, it says much else first (drawn lines, 863)."""
+    stood = DriveState(MR1, 0, 26_400, 0, DriveMode.STANDING, at_mark=True)
+    tape = Tape(one_alley()).say(1, at(MR1, 1, 12), stood).say(1.5, at(MR2, 1, 11))
+    tape.say(2, replace(stood, position_mm=26_300, at_mark=False)).say(3, DriveOrder(MR1, 1, 26_400, 1_500))
+    assert tape.broken() == {}
+    assert tape.say(3.1, DriveOrder(MR1, 2, 24_000, 1_500)).broken() == {"inside-authority": 1}
+
+
 def test_where_nobody_knows_the_holder_nothing_is_judged_but_counted() -> None:
     verdict = Tape(one_alley(), started=False).say(1, at(MR1, 1, 5)).verdict()
     assert verdict.is_good and verdict.unjudged

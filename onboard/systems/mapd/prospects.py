@@ -91,7 +91,7 @@ class Prospects:
         self._nearby = Nearby(self.floor)
 
     def offers(self, rule: BidWeights, offer: Availability, tasks: Sequence[TransportTask], step: int) -> Offers:
-        """The bids for ``tasks``, all that are open in this ``step`` as the bidder knows them; they stay as they are."""
+        """The bids for ``tasks``, all that are open in this ``step`` as the bidder knows them; nobody changes them."""
         asked = step, rule, tasks
         if asked != self._asked:
             self._nearby.see(tasks)

@@ -123,7 +123,9 @@ class InsideAuthority(Rule):
     def _leaves_to_another(self, body: ReportedPosition, slot: Segment, order: DriveOrder) -> bool:
         """Whether who was pushed is sent out of a slot in which another stands: it can have no right to that."""
         ways, aim = self.picture.ways, body_at(self.picture.site, body, order.target_mm)
-        if body.node not in self._pushed or not slot.track == body.track == aim.track:
+        # It may not have said so yet: its words wait behind others' frames, and orders do not.
+        was_pushed = body.node in self._pushed or self._drive_pushed_us.get(body.node, 0) > body.time_us
+        if not was_pushed or not slot.track == body.track == aim.track:
             return False
         goes_away = (ways.position_mm(slot) - body.position_mm) * (aim.position_mm - body.position_mm) < 0
         others = [other for node, other in self.picture.bodies.items() if node != body.node and not other.speed_mm_s]
