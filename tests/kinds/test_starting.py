@@ -2,11 +2,34 @@
 
 import pytest
 
-from onboard.contract.codes import CallResult, Grade, LegAction, MachineState, Reason, ShuttleMode
-from onboard.contract.messages import Award, Itinerary, Reference, Stamp
+from onboard.contract.codes import CallResult, Grade, LegAction, MachineState, Reason, ShuttleMode, TaskPhase
+from onboard.contract.messages import Award, Itinerary, Reference, Stamp, TaskReport
+from onboard.core.effects import Send
 from onboard.core.site import Segment
-from onboard.systems.car_park.program import CarStep, HandlingPhase, Program, to_itinerary
-from tests.kinds.board import AWARDED, BOOT, MOVED_US, OTHER, PLACE, ROBOT, SITE, STEWARD, TAKEN, Board, Entry
+from onboard.systems.car_park.program import (
+    CarHandling,
+    CarStep,
+    HandlingPhase,
+    Program,
+    StationWork,
+    to_itinerary,
+)
+from onboard.systems.car_park.recovery import handled_record
+from tests.kinds.board import (
+    AWARDED,
+    BOOT,
+    CALL,
+    MOVED_US,
+    OTHER,
+    PLACE,
+    ROBOT,
+    SITE,
+    STEWARD,
+    TAKEN,
+    TASK,
+    Board,
+    Entry,
+)
 
 
 def through(index: int) -> Itinerary:
@@ -104,6 +127,17 @@ def test_pushed_away_while_it_listens_it_says_where_it_is_then() -> None:
     board.shuttle(ShuttleMode.HOME)
     board.stands(7)
     assert [leg.to_index for leg in board.plans[-1].legs] == [7]
+
+
+def test_pushed_away_while_it_listens_it_says_once_that_its_last_task_is_done() -> None:
+    """The checker found it told again in the same life (drawn lines, 885; car parks 4292 and 4297)."""
+    board = Board(*AWARDED, TAKEN, handled_record(StationWork(CarHandling.LEAVE, PLACE, TASK, 2_700, CALL)).entry)
+    board.stands(9)
+    board.shuttle(ShuttleMode.HOME)
+    board.stands(7)
+    assert [leg.to_index for leg in board.plans[-1].legs] == [7]
+    told = [one.message for one in board.said if isinstance(one, Send) and isinstance(one.message, TaskReport)]
+    assert [(word.task, word.phase) for word in told] == [(TASK, TaskPhase.DONE)]
 
 
 def test_a_program_without_a_place_refuses_to_be_changed() -> None:

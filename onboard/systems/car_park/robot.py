@@ -370,8 +370,8 @@ class ParkingRobot:
             task, station = self.recovery.last_done
             self._done.append((task, station))
             if self.recovery.is_news:
-                # The power may have failed before this was said, or heard.
-                mine = [self._report(task, TaskPhase.DONE, station), *mine]
+                # The power may have failed before this was said, or heard; who is pushed as it starts has said it.
+                self.recovery.is_news, mine = False, [self._report(task, TaskPhase.DONE, station), *mine]
         return mine
 
     def _started(self, planned: tuple[CarStep, ...] | None, now_us: int) -> list[Effect]:
