@@ -9,7 +9,7 @@ from enum import Enum
 from functools import cached_property
 from typing import ClassVar, NamedTuple
 
-from onboard.contract.codes import KindCode, Side
+from onboard.contract.codes import KindCode, Side, TokenKind
 
 
 class Segment(NamedTuple):
@@ -128,11 +128,12 @@ class Site:
     seals: str = "off"
 
     @cached_property
-    def at_first(self) -> tuple[dict[int, int], dict[int, int]]:
+    def at_first(self) -> dict[TokenKind, dict[int, int]]:
         """Whose home a segment is, and who is at a station, by their numbers; of several machines the first."""
         machines = list(reversed(self.machines.values()))
         homes = {one.home.number: one.node_id for one in machines if one.kind is KindCode.ROBOT}
-        return homes, {one.station.number: one.node_id for one in machines if one.station is not None}
+        stations = {one.station.number: one.node_id for one in machines if one.station is not None}
+        return {TokenKind.SEGMENT: homes, TokenKind.STATION: stations}
 
     def machine(self, name: str) -> Machine:
         """The machine so named. Raises ``KeyError`` where there is none."""

@@ -32,9 +32,9 @@ def genesis_holder(site: Site, key: tuple[TokenKind, int]) -> int:
     stations. All else is made by its origin node.
     """
     kind, number = key
-    if kind > TokenKind.STATION:
+    if (first := site.at_first.get(kind)) is None:
         return number >> 16
-    holder = site.at_first[kind].get(number)
+    holder = first.get(number)
     return site.stewards.get(number >> 8, 0) if holder is None else holder
 
 

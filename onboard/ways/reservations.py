@@ -105,6 +105,23 @@ class Reservations(Planned):
                 raise ValueError(f"use {use} has no length, or is not of node {owner}")
             insort(self._uses.setdefault(use.lift_track, []), use, key=_begin)
 
+    def reserve_apart(self, owner: int, windows: Sequence[SlotWindow]) -> bool:
+        """Add windows of ``owner``, which has none, unless one overlaps another node's: then False, and nothing is."""
+        by_segment, found = self._windows, []
+        for segment, from_us, to_us in windows:
+            known = by_segment.get(segment)
+            if known is None:
+                known = by_segment[segment] = []
+            for start_us, end_us, _ in known:
+                if start_us < to_us and from_us < end_us:
+                    return False
+            found.append(known)
+        self._forget(owner)
+        for known, (_, from_us, to_us) in zip(found, windows, strict=True):
+            insort(known, (from_us, to_us, owner))
+        self._segments[owner] = {window[0] for window in windows}
+        return True
+
     def release(self, owner: int) -> None:
         """Remove all windows and uses of ``owner``."""
         self._forget(owner)
@@ -113,14 +130,10 @@ class Reservations(Planned):
             self._uses[lift_track] = [use for use in uses if use.owner != owner]
         by_segment = self._windows
         for segment in self._segments.pop(owner, ()):
-            known = by_segment[segment]
-            if len(known) == 1 and known[0][2] == owner:
-                # As most are, and no list is to be made for that.
-                del by_segment[segment]
-            elif kept := [window for window in known if window[2] != owner]:
+            known = by_segment.pop(segment)
+            # Most are of one owner, and no list is to be made for that.
+            if len(known) > 1 and (kept := [window for window in known if window[2] != owner]):
                 by_segment[segment] = kept
-            else:
-                del by_segment[segment]
 
     def _forget(self, owner: int) -> None:
         if self.kept:

@@ -7,7 +7,7 @@ import pytest
 from onboard.systems.mapd.auction import Availability, Backlog, BidWeights, bids
 from onboard.systems.mapd.floor import grid_floor
 from onboard.systems.mapd.nearby import Nearby
-from onboard.systems.mapd.prospects import SPAN, Offers, Prospects
+from onboard.systems.mapd.prospects import SPAN, BidList, Prospects
 from onboard.systems.mapd.tasks import TransportTask, task_named
 
 FLOOR = grid_floor(["." * 24] * 12)
@@ -21,7 +21,7 @@ def by_itself(rule: BidWeights, offer: Availability, tasks: list[TransportTask],
     return bids(FLOOR, rule, offer, tasks, Backlog.of(nearby, tasks, ROBOTS, step))
 
 
-def looked_at(offers: Offers) -> list[tuple[int, int]]:
+def looked_at(offers: BidList) -> list[tuple[int, int]]:
     """All bids, as far as one looks."""
     found: list[tuple[int, int]] = []
     while some := offers.look_on():

@@ -75,6 +75,20 @@ def test_passing_order_is_read_from_the_first_window_that_is_not_over(
     assert reservations.is_free(HERE, now_us, excluding=owner) == (not others)
 
 
+@given(PLANS, st.lists(WINDOWS, max_size=4))
+def test_apart_is_reserved_all_that_meets_nobody_else_or_nothing(
+    plans: list[tuple[int, list[SlotWindow]]], windows: list[SlotWindow]
+) -> None:
+    (asked, before), new = [filled(plans)[0] for _ in range(2)], 4
+    is_apart = not before.conflicts(new, windows)
+    assert asked.reserve_apart(new, windows) is is_apart
+    if is_apart:
+        before.reserve(new, windows)
+    assert [asked.on(segment) or () for segment in (HERE, THERE)] == [before.on(one) for one in (HERE, THERE)]
+    asked.release(new)
+    assert not any(owner == new for segment in (HERE, THERE) for _, _, owner in asked.on(segment))
+
+
 def test_a_released_node_leaves_the_windows_of_others() -> None:
     reservations, _ = filled([(1, [SlotWindow(HERE, 10, 20)]), (2, [SlotWindow(HERE, 15, 30)]), (1, [])])
     assert reservations.safe_intervals(HERE, 9, 0) == [Interval(0, 15), Interval(30, FOREVER)]

@@ -13,7 +13,7 @@ from onboard.contract.messages import Bid, CallForProposals
 from onboard.core.negotiation import Proposal
 from onboard.core.site import Timing
 from onboard.systems.mapd.calls import task_of
-from onboard.systems.mapd.prospects import Offers
+from onboard.systems.mapd.prospects import BidList
 from onboard.work.plain import NoEstimator
 
 #: Half of the longest delay is owed by a bid of 30 steps, us: most pick-ups in a warehouse are nearer.
@@ -31,7 +31,7 @@ def bid_timing(timing: Timing, window_us: int) -> Timing:
 class UnitGeneration(NoEstimator):
     """A robot's task-generation function: what each open task costs it in the round ``mark``, as it saw it then."""
 
-    offers: Offers | None = None
+    offers: BidList | None = None
     mark: int = 0
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
@@ -50,7 +50,7 @@ class Round:
 
     node_id: int
     begun_us: int
-    offers: Offers
+    offers: BidList
     #: The task whose call it takes part in.
     looked_at: int | None = None
     bids: dict[int, list[Bid]] = field(default_factory=dict)

@@ -65,13 +65,12 @@ class Paths:
         """Publish a path in place of the robot's former one. Raises ``ValueError`` where it meets another's."""
         self.take(robot)
         windows = _windows(self.network, path.start, path.cells)
-        if self.reservations.conflicts(robot, windows):
+        if not self.reservations.reserve_apart(robot, windows):
             for step, cell in path.steps():
                 other = self.holder(cell, step)
                 if other is not None:
                     raise ValueError(f"robot {robot} meets robot {other} in cell {cell} at step {step}")
             raise ValueError(f"robot {robot} cannot stay in cell {path.rest} from step {path.end}")
-        self.reservations.reserve(robot, windows)
         self.by_robot[robot] = path
 
     def take(self, robot: int) -> Path | None:

@@ -29,7 +29,7 @@ class Beginning(NamedTuple):
 
 
 @dataclass
-class Offers:
+class BidList:
     """One robot's bids, worked out no farther than they are looked at: of a great many tasks few ever are.
 
     ``fixed`` is in each of them, and ``weight`` for each step from ``cell`` to where its task begins.
@@ -90,7 +90,7 @@ class Prospects:
     def __post_init__(self) -> None:
         self._nearby = Nearby(self.floor)
 
-    def offers(self, rule: BidWeights, offer: Availability, tasks: Sequence[TransportTask], step: int) -> Offers:
+    def offers(self, rule: BidWeights, offer: Availability, tasks: Sequence[TransportTask], step: int) -> BidList:
         """The bids for ``tasks``, all that are open in this ``step`` as the bidder knows them; nobody changes them."""
         asked = step, rule, tasks
         if asked != self._asked:
@@ -100,7 +100,7 @@ class Prospects:
             self._shares, self._beginnings = {share.number: share for share in known}, _beginnings(tasks, known)
             self._asked = asked
         wait = until_free(rule, offer, self._backlog)
-        return Offers(offer.cell, rule.empty, wait, self._shares, self._beginnings)
+        return BidList(offer.cell, rule.empty, wait, self._shares, self._beginnings)
 
 
 def _beginnings(tasks: Sequence[TransportTask], known: Sequence[Share]) -> list[Beginning]:

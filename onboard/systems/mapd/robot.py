@@ -37,7 +37,7 @@ from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.memory import path_record, read_past
 from onboard.systems.mapd.moves import path_frames
 from onboard.systems.mapd.paths import Path
-from onboard.systems.mapd.prospects import Offers
+from onboard.systems.mapd.prospects import BidList
 from onboard.systems.mapd.search import find_path, is_sooner
 from onboard.systems.mapd.site import Mapd
 from onboard.systems.mapd.steps import LAST, STEP_TABLE, GridStepPhase, StepDeed, StepFinding
@@ -58,6 +58,9 @@ _OF_DESK = (StepTurn, Award, CallForProposals, StepRound)
 #: What ends a round, and what makes a robot look for another call in it.
 _OF_END: frozenset[type[Message]] = frozenset((StepTurn, Award))
 _OF_CHOICE: frozenset[type[Message]] = frozenset((Bid, CallForProposals))
+#: Looked up for every word that a robot hears: CPython 3.11 runs a function for each member of an enumeration.
+_GATHER, _BID, _TURNS, _MOVE = GridStepPhase
+_IDLE, _WORKING = MachineState.IDLE, MachineState.WORKING
 
 
 @dataclass
@@ -194,7 +197,7 @@ class UnitRobot(Plain):
         if self.driving.cart.state is None or not (self._is_new or self._is_due(now_us)):
             return []
         self._is_new = False
-        self.state = MachineState.IDLE if self.task == NO_TASK else MachineState.WORKING
+        self.state = _IDLE if self.task == NO_TASK else _WORKING
         effects: list[Effect] = []
         goes_on = True
         while goes_on:
@@ -213,21 +216,22 @@ class UnitRobot(Plain):
     def heeds(self, message: Message) -> bool:
         """Whether a word may let it go on, by the phase that it is in; see ``_found`` for what each phase reads."""
         said, phase = type(message), self.phase
-        if self.state is not (MachineState.IDLE if self.task == NO_TASK else MachineState.WORKING):
+        if self.state is not (_IDLE if self.task == NO_TASK else _WORKING):
             return said in _OF_INTEREST
-        if isinstance(message, (Bid, Award)) and self._takes_part(message):
+        if (said is Bid or said is Award) and self._takes_part(message):
             return True
-        if phase is GridStepPhase.GATHER:
+        if phase is _GATHER:
             # Before the round is told nothing else counts.
             return self.round is not None and said in _OF_INTEREST
-        if phase is GridStepPhase.BID:
+        if phase is _MOVE:
+            return said is CallForProposals or self._me not in self.knowledge.paths.by_robot
+        if phase is _BID:
             return self.turns.is_complete if said in _OF_END else said in _OF_CHOICE and self._prefers_another()
-        if phase is GridStepPhase.TURNS:
-            return self.turns.next_to_plan(self.knowledge.heads) in (0, self._me)
-        return said is CallForProposals or self._me not in self.knowledge.paths.by_robot
+        return self.turns.next_to_plan(self.knowledge.heads) in (0, self._me)
 
-    def _takes_part(self, word: Bid | Award) -> bool:
-        """Whether it takes part in the call that this is about."""
+    def _takes_part(self, word: Message) -> bool:
+        """Whether it takes part in the call that a bid or an award is about."""
+        assert isinstance(word, Bid | Award)
         initiator = word.initiator if isinstance(word, Bid) else word.sender
         return self.fleet.negotiation.knows(initiator, word.call)
 
@@ -415,7 +419,7 @@ class UnitRobot(Plain):
         body = self.driving.cart.state
         return body is not None and body.task != NO_TASK
 
-    def _offers(self) -> Offers:
+    def _offers(self) -> BidList:
         """What each open task would cost: the task-generation function of this system."""
         return self.site.prospects.offers(self.rule, self._offer(), self.knowledge.open_tasks, self.step)
 
