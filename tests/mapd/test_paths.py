@@ -50,6 +50,15 @@ def test_a_way_that_has_become_free_is_sooner_and_a_straight_one_is_not() -> Non
     assert not is_sooner(passage, stays, 0, 0, 4, ends), "who made it wait still does"
 
 
+def test_who_looks_for_a_sooner_way_is_in_nobodys_way_by_its_own_path() -> None:
+    # Robot 1 goes to c as robot 0 is to leave it for a: by another path it is not there, and follows robot 1 into b.
+    lines = [NetworkLine(one, other, 1) for one, other in ("ab", "bc", "ca", "da", "dc")]
+    floor = network_floor("abcd", lines, [])
+    a, b, c, d = range(4)
+    paths = paths_of(floor, Path(0, (d, c, a, b)), Path(0, (b, b, c)))
+    assert is_sooner(floor, paths, 0, 0, b, frozenset([b]))
+
+
 #: An open floor, one of narrow ways, and one with a zone and a way that leads in one direction only.
 FLOORS = (
     grid_floor(["......", ".@..@.", "......", ".@..@."]),
