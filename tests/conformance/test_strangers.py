@@ -5,6 +5,7 @@ import pytest
 from bus_sim.campaign.strangers import StrangerPlan, play_pair
 from bus_sim.cli import main
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.orders import OrderArrivals
 from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.stranger import Stranger
@@ -33,6 +34,13 @@ def test_two_desks_that_want_one_box_get_two() -> None:
     limit_s = system.patience_s(site, orders, 5)
     pair = play_pair(StrangerPlan("terminal", Stranger.LIAR, orders, limit_s), 5)
     assert pair.is_good, pair.line()
+
+
+def test_a_car_whose_custodian_waits_for_no_silent_winner_is_called_for_anew_by_its_own_compartment() -> None:
+    """Its initiator, which is not the custodian, said the award for two hours: three of twelve cars stayed inside."""
+    plan = StrangerPlan("standard", Stranger.SILENT, Arrivals(12, 30.0, 10.0, 200.0), 1_500.0)
+    pair = play_pair(plan, 50426)
+    assert (pair.strange.served, pair.strange.broken) == (12, ()), pair.line()
 
 
 @pytest.mark.parametrize("system", WITHOUT)

@@ -173,7 +173,7 @@ class BayCalls:
         if record is None or sender != record.custodian:
             return []
         if not task.winner:
-            return self.call_again(task, now_us) if self._is_unheard(task, now_us) else []
+            return self.call_again(task, now_us) if self._is_silent(task, now_us) else []
         heard = task.winner not in self.fleet.mirror.obstacles.machines
         if heard and task.version != 1 and task.reminders < REMINDERS:
             # It has not heard of the newest award yet.
@@ -182,8 +182,11 @@ class BayCalls:
         return self.call_again(task, now_us)
 
     def _is_unheard(self, task: BayTask, now_us: int) -> bool:
-        silent = self.fleet.negotiation.silent_winner(task.task, now_us)
-        return custody.is_mine(self.fleet, task.car) and silent != NOBODY
+        return custody.is_mine(self.fleet, task.car) and self._is_silent(task, now_us)
+
+    def _is_silent(self, task: BayTask, now_us: int) -> bool:
+        """Whether its winner has not said for long that it has it."""
+        return self.fleet.negotiation.silent_winner(task.task, now_us) != NOBODY
 
     # --- calls -------------------------------------------------------------------------------------------------
 
