@@ -131,8 +131,9 @@ class Reservations(Planned):
         by_segment = self._windows
         for segment in self._segments.pop(owner, ()):
             known = by_segment.pop(segment)
-            # Most are of one owner, and no list is to be made for that.
-            if len(known) > 1 and (kept := [window for window in known if window[2] != owner]):
+            # Most are its own alone, and no list is to be made for that; in a copy they may be gone, and others left.
+            is_all = len(known) == 1 and known[0][2] == owner
+            if not is_all and (kept := [window for window in known if window[2] != owner]):
                 by_segment[segment] = kept
 
     def _forget(self, owner: int) -> None:

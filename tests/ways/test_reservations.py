@@ -94,6 +94,15 @@ def test_a_released_node_leaves_the_windows_of_others() -> None:
     assert reservations.safe_intervals(HERE, 9, 0) == [Interval(0, 15), Interval(30, FOREVER)]
 
 
+def test_who_has_given_way_in_a_copy_leaves_the_windows_of_others_when_released() -> None:
+    reservations = Reservations()
+    reservations.reserve(1, [SlotWindow(HERE, 20, FOREVER)])
+    reservations.reserve(2, [SlotWindow(HERE, 0, 10)])
+    copy = reservations.with_way_given(15)
+    copy.release(1)
+    assert list(copy.on(HERE)) == [(0, 10, 2)]
+
+
 @pytest.mark.parametrize("to_us", [10, 9])
 def test_a_window_without_length_is_a_broken_invariant(to_us: int) -> None:
     with pytest.raises(ValueError, match=r"node 7 has no length"):
