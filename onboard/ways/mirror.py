@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import Any, ClassVar
 
-from onboard.contract.codes import Reason, TokenKind
+from onboard.contract.codes import LegAction, Reason, Side, TokenKind
 from onboard.contract.constants import MOBILE_KINDS, NOBODY
-from onboard.contract.messages import Blocked, Clear, Itinerary, Message, Progress
+from onboard.contract.messages import Blocked, Clear, Itinerary, Leg, Message, Progress
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect
 from onboard.core.mirror import Mirror, digest_words
@@ -47,13 +47,15 @@ class WayMirror(CarMirror):
     standing: Standing = field(init=False)
     bodies: Bodies = field(init=False)
     blocked_words: BlockedWords = field(init=False)
+    #: Who told a plan without a leg.
+    _without_leg: set[int] = field(default_factory=set)
     #: Whose plan is thought of for a while (``as_told``): what it really told hinders no run of mine.
     _as_told: int = NOBODY
 
     def __post_init__(self) -> None:
         self.order = PassingOrder(self.site)
         self.obstacles = Obstacles(self.site, lambda: self.reservations, self.aside)
-        self.standing = Standing(self.site, self.itineraries)
+        self.standing = Standing(self.site, self.itineraries, self.is_laden)
         self.bodies = Bodies(self.site)
         self.blocked_words = BlockedWords(self.site, self.node_id, self.obstacles)
 
@@ -83,8 +85,10 @@ class WayMirror(CarMirror):
     def on_itinerary(self, itinerary: Itinerary, now_us: int) -> bool:
         """Take up a firm itinerary, and what it occupies."""
         node, is_continued = itinerary.sender, itinerary.sender in self.itineraries
+        told, itinerary = itinerary, self._as_standing(itinerary)
         if not super().on_itinerary(itinerary, now_us):
             return False
+        (self._without_leg.discard if told.legs else self._without_leg.add)(node)
         if is_continued and node in self.plans:
             self.replaced[node] = self.plans[node]
         known = self.plans.get(node)
@@ -93,6 +97,22 @@ class WayMirror(CarMirror):
         if node not in self.aside:
             self._count_on(self.plans[node], now_us)
         return True
+
+    def _as_standing(self, itinerary: Itinerary) -> Itinerary:
+        """A plan without a leg leaves its machine where it is by its last word, which is in the way there."""
+        machine = self.site.machines.get(itinerary.sender)
+        if itinerary.legs or machine is None or machine.kind not in MOBILE_KINDS or not self.site.tracks:
+            return itinerary
+        seen, ends_ms = self.progress.get(machine.node_id), itinerary.stamp.award_ms
+        here = machine.home if seen is None else Segment(seen.track, seen.index)
+        return replace(itinerary, legs=(Leg(LegAction.STAND, *here, here.index, Side.NEAR, ends_ms),))
+
+    def _stands_elsewhere(self, node: int) -> None:
+        plan = self.plans[node]
+        self.itineraries[node] = self._as_standing(replace(plan.itinerary, legs=()))
+        self.plans[node] = plan._replace(itinerary=self.itineraries[node])
+        if node not in self.aside:
+            self._count_on(self.plans[node], plan.first_begin_us)
 
     def _count_on(self, plan: BegunItinerary, now_us: int) -> None:
         """Plan around a machine's plan, and keep its place in the order of passing."""
@@ -118,6 +138,8 @@ class WayMirror(CarMirror):
     def on_progress(self, progress: Progress) -> None:
         """Last known position of a machine, and how far it has come on its way."""
         super().on_progress(progress)
+        if progress.sender in self._without_leg & self.plans.keys():
+            self._stands_elsewhere(progress.sender)
         self.bodies.hear(progress)
         self.order.on_progress(progress)
 

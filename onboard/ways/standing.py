@@ -4,7 +4,7 @@ A machine that says what it waits for, or that its plan comes later, is given lo
 the end only its place counts.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import Grade, LegAction, ManualMode
@@ -62,6 +62,8 @@ class Standing:
 
     site: WaySite
     itineraries: Mapping[int, Itinerary]
+    #: Whether a machine has something aboard that nobody can take from it.
+    is_laden: Callable[[int], bool]
     _seen: dict[int, _Seen] = field(default_factory=dict)
 
     def hear(self, message: Message, now_us: int) -> None:
@@ -96,16 +98,20 @@ class Standing:
         self._seen.pop(node, None)
 
     def stands(self, node: int, now_us: int) -> bool:
-        """Whether a machine has stood for too long where its plan does not leave it; motion or a person ends that."""
+        """Whether a machine has stood for too long where its plan does not leave it.
+
+        Motion ends that, or a person; or a plan by which it stays where it is, with nothing aboard.
+        """
         seen = self._seen.get(node)
         machine = self.site.machines.get(node)
         if seen is None or machine is None or machine.kind not in MOBILE_KINDS:
             return False
-        if not seen.stands:
+        if not seen.stands or not self.is_laden(node):
             leaves_us = self._leaves_us(node, seen, now_us)
             if leaves_us is None:
-                seen.late_us = None
+                seen.late_us, seen.stands = None, False
                 return False
+        if not seen.stands:
             seen.late_us = now_us if seen.late_us is None else seen.late_us
             quiet_us = now_us - max(seen.moved_us, seen.spoke_us, leaves_us)
             seen.stands = quiet_us >= STANDS_AFTER_US or now_us - seen.late_us >= WAITS_AFTER_US + STANDS_AFTER_US

@@ -43,6 +43,13 @@ def test_a_car_whose_custodian_waits_for_no_silent_winner_is_called_for_anew_by_
     assert (pair.strange.served, pair.strange.broken) == (12, ()), pair.line()
 
 
+def test_nobody_plans_to_stand_where_a_stranger_stands_that_has_told_no_way() -> None:
+    """Its plan had no leg: another planned to end there, waited for ten minutes, and was given no task for good."""
+    pair = play_pair(StrangerPlan("standard", Stranger.SILENT, Arrivals(12, 60.0, 30.0), 3_600.0), 50452)
+    assert (pair.strange.served, pair.strange.broken) == (12, ()), pair.line()
+    assert pair.is_good, pair.line()
+
+
 @pytest.mark.parametrize("system", WITHOUT)
 def test_a_site_on_which_nobody_can_be_a_stranger_says_so(system: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["campaign", site_file(system), "--stranger", "stands", "--seeds", "1-1"]) == 2

@@ -4,7 +4,7 @@ import pytest
 
 from onboard.contract.codes import CallResult, KindCode, MachineState, Reason, RegenerationPhase, TaskPhase
 from onboard.contract.constants import ANY_STATION, OUTSIDE
-from onboard.contract.messages import BusTime, Halted, Heartbeat, Message, Reference, Regeneration
+from onboard.contract.messages import BusTime, Halted, Heartbeat, Message, Progress, Reference, Regeneration
 from tests.sites import one_floor
 from tests.trace.checking import (
     MR1,
@@ -70,6 +70,17 @@ WRONG: dict[str, tuple[int, list[Message], dict[str, int]]] = {
 def test_what_is_wrong_is_found_by_its_rule(step: int, messages: list[Message], broken: dict[str, int]) -> None:
     found = tell(told(step, messages)).broken(STORY[step][0] + 1.5)
     assert found == broken
+
+
+@pytest.mark.parametrize(("again_s", "in_hand", "broken"), [(400, True, 1), (700, True, 0), (700, False, 1)])
+def test_bids_of_who_waits_for_long_with_a_task_in_hand_need_not_count(again_s: int, in_hand: bool, broken: int) -> None:
+    """All may take it for one that stands: who has nothing in hand, or has just moved, is no such machine."""
+    at = Progress(MR1, 1, 0, 1, 6, 0, 0)
+    tape = tell([*STORY[:4], (21, [at]), *(() if in_hand else STORY[4:])])
+    other = Reference(1, 2)
+    tape.say(again_s, car_at(1, BAY, 1, other), call(2, again_s + 1, task=other))
+    tape.say(again_s + 0.5, bid(MR1, 50_000, 2)).say(again_s + 0.7, bid(MR2, 60_000, 2))
+    assert tape.broken().get("bids-go-down", 0) == broken
 
 
 def test_two_bids_may_cross_on_their_way() -> None:

@@ -6,7 +6,9 @@ from onboard.config.site import parse_site
 from onboard.contract.codes import Grade, KindCode, LegAction, MachineState, Reason, Side
 from onboard.contract.messages import Heartbeat, Itinerary, Leg, Progress, Stamp, Waiting
 from onboard.core.mirror import Mirror
+from onboard.core.site import Segment
 from onboard.ways.mirror import WayMirror
+from onboard.ways.reservations import SlotWindow
 from onboard.ways.site import way_site
 from onboard.ways.standing import STANDS_AFTER_US, WAITS_AFTER_US, Standing
 from tests.sites import one_floor
@@ -42,12 +44,17 @@ def goes(version: int = 1) -> Itinerary:
     return Itinerary(ROBOT, version, Grade.FIRM, Stamp(0, ME, 1), (run,))
 
 
+def stays(place: int, version: int) -> Itinerary:
+    """At a place, for ever."""
+    return Itinerary(ROBOT, version, Grade.FIRM, Stamp(0, ME, 1), (Leg(LegAction.STAND, 1, place, place, Side.NEAR, 1),))
+
+
 def seen(place: int = 3) -> Standing:
     """A robot at a place that has told where it goes."""
     site = one_floor()
     mirror = Mirror(site, ME)
     mirror.on_itinerary(goes(), 0)
-    standing = Standing(site, mirror.itineraries)
+    standing = Standing(site, mirror.itineraries, lambda node: False)
     standing.hear(Progress(ROBOT, 1, 0, 1, place, 0, 0), 0)
     return standing
 
@@ -63,6 +70,21 @@ def test_a_machine_that_stands_where_its_plan_does_not_leave_it_is_found() -> No
     assert not standing.stands(ROBOT, due_us + 2)
 
 
+def test_a_plan_by_which_it_stays_ends_it_but_not_with_a_car_aboard() -> None:
+    """A robot whose task was taken back for it stood, planned nothing, and was given no task to move with."""
+    site, laden = one_floor(), {ROBOT}
+    mirror = Mirror(site, ME)
+    standing = Standing(site, mirror.itineraries, laden.__contains__)
+    standing.hear(Progress(ROBOT, 1, 0, 1, 3, 0, 0), 0)
+    mirror.on_itinerary(goes(), 0)
+    late_us = RUN_MS * 1000 + STANDS_AFTER_US
+    assert standing.stands(ROBOT, late_us)
+    mirror.on_itinerary(stays(3, 2), late_us)
+    assert standing.stands(ROBOT, late_us), "a person has to come"
+    laden.clear()
+    assert not standing.stands(ROBOT, late_us)
+
+
 def test_a_machine_that_waits_and_says_so_is_given_longer() -> None:
     standing = seen()
     for now_us in range(0, WAITS_AFTER_US + STANDS_AFTER_US, 10_000_000):
@@ -74,7 +96,7 @@ def test_a_machine_that_waits_and_says_so_is_given_longer() -> None:
 def test_a_machine_that_has_stood_idle_for_long_has_all_the_time_for_a_new_plan() -> None:
     site = one_floor()
     mirror = Mirror(site, ME)
-    standing = Standing(site, mirror.itineraries)
+    standing = Standing(site, mirror.itineraries, lambda node: False)
     now_us = 2 * WAITS_AFTER_US
     standing.hear(Progress(ROBOT, 0, 0, 1, 3, 0, 0), 0)
     assert not standing.stands(ROBOT, now_us)
@@ -100,7 +122,7 @@ def test_who_works_where_it_came_by_before_stands_there_until_its_plan_turns_out
     )
     mirror = Mirror(site, ME)
     mirror.on_itinerary(Itinerary(ROBOT, 1, Grade.FIRM, Stamp(0, ME, 1), legs), 0)
-    standing = Standing(way_site(site), mirror.itineraries)
+    standing = Standing(way_site(site), mirror.itineraries, lambda node: False)
     standing.hear(Progress(ROBOT, 1, 2, BRANCH_TRACK, 1, 0, 0), 3 * RUN_MS * 1000)
     assert not standing.stands(ROBOT, 8 * RUN_MS * 1000)
     assert standing.stands(ROBOT, 9 * RUN_MS * 1000 + STANDS_AFTER_US)
@@ -130,3 +152,20 @@ def test_who_is_started_again_has_not_stood() -> None:
     mirror.on_heartbeat(replace(beat, boot=2, state=MachineState.STARTING), late_us)
     mirror.hear(Progress(ROBOT, 0, 0, 1, 3, 0, 0), late_us)
     assert not mirror.stands(ROBOT, late_us), "it would never be given anything to do again"
+
+
+def test_a_plan_without_a_leg_leaves_its_machine_where_it_is() -> None:
+    """Others planned to end where it stood, and asked it for its place for ten minutes."""
+    mirror = WayMirror(one_floor(), ME)
+    home = mirror.site.machines[ROBOT].home
+    mirror.on_itinerary(replace(goes(), legs=()), 0)
+    assert mirror.others_standing() == [home], "it has not said where it is"
+    for place in (3, 5):
+        mirror.hear(Progress(ROBOT, 1, 0, 1, place, 0, 0), 0)
+        mirror.on_progress(Progress(ROBOT, 1, 0, 1, place, 0, 0))
+        here = Segment(1, place)
+        assert mirror.others_standing() == [here]
+        assert mirror.reservations.standing_in(ME, [SlotWindow(here, RUN_MS, RUN_MS + 1)]) == [ROBOT]
+        assert not mirror.reservations.standing_in(ME, [SlotWindow(home, RUN_MS, RUN_MS + 1)])
+    mirror.on_itinerary(goes(2), 0)
+    assert mirror.others_standing() == [Segment(1, 7)]

@@ -4,9 +4,9 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import CallResult, Criterion
+from onboard.contract.codes import CallResult, Criterion, TaskPhase
 from onboard.contract.constants import NOBODY
-from onboard.contract.messages import Award, Bid, CallForProposals, Halted, LeftOut, Progress, Reference
+from onboard.contract.messages import Award, Bid, CallForProposals, Halted, LeftOut, Progress, Reference, TaskReport
 from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
@@ -25,6 +25,8 @@ SEALED_CROSSING_US = 120_000
 CLOCK_TOLERANCE_US = 5_000
 #: Who has won something and has not moved for so long may be an obstacle for all: its bids do not count then, us.
 STANDS_US = 15_000_000
+#: And so it may be once it has moved, with a task in hand that it waits to go on with, us.
+WAITS_US = 600_000_000
 #: Calls of which it is remembered who was left out.
 MOST_LEFT_OUT = 256
 _HALF_MS = 1 << 31
@@ -217,12 +219,16 @@ class BidsGoDown(_CallRule):
         self._places: dict[int, tuple[int, int, int]] = {}
         #: Since when a machine has not moved though it has won something.
         self._won_us: dict[int, int] = {}
+        #: When each machine moved last, and what it has won and not done yet.
+        self._moved_us: dict[int, int] = {}
+        self._in_hand: dict[int, set[Reference]] = {}
         #: Bids that do not go with what was said before them: initiator, call and bidder.
         self._unsound: OrderedDict[tuple[int, int, int], None] = OrderedDict()
 
     def handlers(self) -> Handlers:
         """Beside calls, whose bids do not count."""
-        return {**super().handlers(), LeftOut: self._on_left_out, Progress: self._on_progress}
+        own = {LeftOut: self._on_left_out, Progress: self._on_progress, TaskReport: self._on_report}
+        return {**super().handlers(), **own}
 
     def is_sound(self, bid: Bid, task: Reference) -> bool:
         """Whether a bid goes with what its bidder said before it, where a system's bids say more than a number."""
@@ -241,13 +247,27 @@ class BidsGoDown(_CallRule):
         if self._places.get(progress.sender) != place:
             self._places[progress.sender] = place
             self._won_us.pop(progress.sender, None)
+            self._moved_us[progress.sender] = event.time_us
+
+    def _on_report(self, event: LogEvent[TaskReport]) -> None:
+        report = event.message
+        if report.phase in (TaskPhase.DONE, TaskPhase.FORFEITED):
+            self._is_nobodys(report.task)
+
+    def _is_nobodys(self, task: Reference) -> None:
+        for tasks in self._in_hand.values():
+            tasks.discard(task)
+
+    def _stands(self, node: int, now_us: int) -> bool:
+        """Whether all may take a machine for one that does not do what it has won."""
+        if now_us - self._won_us.get(node, now_us) >= STANDS_US:
+            return True
+        return bool(self._in_hand.get(node)) and now_us - self._moved_us.get(node, now_us) >= WAITS_US
 
     def _counts(self, node: int, seen: CallSeen, now_us: int) -> bool:
         """Whether a bid counts: not of who is left out, nor of who has won something and stands."""
-        since_us = self._won_us.get(node)
-        stands = since_us is not None and now_us - since_us >= STANDS_US
         own, above = (seen.call.sender, seen.call.call), (seen.call.parent.origin, seen.call.parent.number)
-        if stands or (*own, node) in self._unsound:
+        if self._stands(node, now_us) or (*own, node) in self._unsound:
             return False
         # Whom a call leaves out, that is left out of what is asked for a bid in it.
         return all(node not in self._left_out.get(call, ()) for call in (own, above))
@@ -276,6 +296,9 @@ class BidsGoDown(_CallRule):
         award = event.message
         if award.result is CallResult.AWARDED and award.winner:
             self._won_us.setdefault(award.winner, event.time_us)
+            if award.task not in self._in_hand.setdefault(award.winner, set()):
+                self._is_nobodys(award.task)
+                self._in_hand[award.winner].add(award.task)
         if award.result not in (CallResult.AWARDED, CallResult.OPTION) or seen.is_reported or seen.due_us is None:
             return
         last_us = seen.due_us - CLOCK_TOLERANCE_US
