@@ -73,7 +73,9 @@ def test_what_is_wrong_is_found_by_its_rule(step: int, messages: list[Message], 
 
 
 @pytest.mark.parametrize(("again_s", "in_hand", "broken"), [(400, True, 1), (700, True, 0), (700, False, 1)])
-def test_bids_of_who_waits_for_long_with_a_task_in_hand_need_not_count(again_s: int, in_hand: bool, broken: int) -> None:
+def test_bids_of_who_waits_for_long_with_a_task_in_hand_need_not_count(
+    again_s: int, in_hand: bool, broken: int
+) -> None:
     """All may take it for one that stands: who has nothing in hand, or has just moved, is no such machine."""
     at = Progress(MR1, 1, 0, 1, 6, 0, 0)
     tape = tell([*STORY[:4], (21, [at]), *(() if in_hand else STORY[4:])])

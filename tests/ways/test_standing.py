@@ -46,7 +46,9 @@ def goes(version: int = 1) -> Itinerary:
 
 def stays(place: int, version: int) -> Itinerary:
     """At a place, for ever."""
-    return Itinerary(ROBOT, version, Grade.FIRM, Stamp(0, ME, 1), (Leg(LegAction.STAND, 1, place, place, Side.NEAR, 1),))
+    return Itinerary(
+        ROBOT, version, Grade.FIRM, Stamp(0, ME, 1), (Leg(LegAction.STAND, 1, place, place, Side.NEAR, 1),)
+    )
 
 
 def seen(place: int = 3) -> Standing:

@@ -13,17 +13,17 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.effects import Effect, Send
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Proposal
-from onboard.core.serial import from_bus_ms, successor, to_bus_ms
+from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Proposal, cost_difference
+from onboard.core.serial import BUS_MS_MODULUS, from_bus_ms, successor, to_bus_ms
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park.alternatives import Alternative, Solution
 from onboard.systems.car_park.generation import CarParkGeneration
+from onboard.systems.car_park.least_bids import SLACK_MS
 from onboard.systems.car_park.program import Program
 from onboard.systems.car_park.robot import ParkingRobotFactory
 from onboard.systems.car_park.site import car_park
 from onboard.systems.registry import factory_for
 from onboard.ways.mirror import way_mirror
-from onboard.ways.site import way_site
 from onboard.work.plain import Plain
 
 #: What it says that its first run takes, ms.
@@ -31,24 +31,34 @@ RUN_MS = 10_000
 
 
 class _LeastCarParkBid(CarParkGeneration):
-    """Bids what nobody can beat, and can do the task only as soon as any robot."""
+    """Bids the least that counts, and can do the task only as soon as any robot."""
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         """The least that counts, where it can do the task at all."""
-        return None if super().lower_bound(call, now_us) is None else self.floor(call, now_us)
+        return None if super().lower_bound(call, now_us) is None else self._that_counts(call, now_us)
 
     def proposal(self, call: CallForProposals, solution: Solution, alternatives: list[Alternative]) -> Proposal:
         """What it would do, for less than that takes."""
         honest = super().proposal(call, solution, alternatives)
-        return honest._replace(cost=self.floor(call, from_bus_ms(call.deadline_ms, solution.start_us)))
+        now_us = from_bus_ms(call.deadline_ms, solution.start_us) - self.site.timing.call_window_us
+        return honest._replace(cost=self._that_counts(call, now_us))
+
+    def _that_counts(self, call: CallForProposals, now_us: int) -> int:
+        """As its way from the end of what it has told would take with nobody in its way, and the slack less."""
+        floor, criterion = self.floor(call, now_us), call.criterion
+        _, here, from_us = self.program.branch(now_us)
+        least = self.least(call, now_us, here, from_us)
+        if least is None or cost_difference(least, floor, criterion) <= SLACK_MS:
+            return floor
+        return (least - SLACK_MS) % BUS_MS_MODULUS
 
 
 class _EmptyBid(_LeastCarParkBid):
-    """Bids what nobody can beat, for nothing."""
+    """Bids the least that counts, for nothing."""
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         """The least that counts."""
-        return self.floor(call, now_us) if call.operation in (Operation.PARK, Operation.RETRIEVE) else None
+        return self._that_counts(call, now_us) if call.operation in (Operation.PARK, Operation.RETRIEVE) else None
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
         """No solution, and a bid all the same."""
@@ -117,8 +127,10 @@ class _StrangeRobotFactory(BehaviourFactory):
         """What it bids."""
         if machine.node_id != self.target:
             return self.robots.estimator(site, machine, mirror)
-        bids = _LeastCarParkBid if self.how is Stranger.LIAR else _EmptyBid
-        return bids(car_park(site), machine, way_mirror(mirror), Program(way_site(site)))
+        park, bids = car_park(site), _LeastCarParkBid if self.how is Stranger.LIAR else _EmptyBid
+        # Who stands knows where from the first; the other finds its place as any robot does.
+        program = Program(park, None if self.how is Stranger.LIAR else machine.home)
+        return bids(park, machine, way_mirror(mirror), program)
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Behaviour:
         """What it does."""

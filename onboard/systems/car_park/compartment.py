@@ -51,10 +51,9 @@ from onboard.systems.car_park.bay_generation import BayGeneration
 from onboard.systems.car_park.bay_memory import BayMemory, job_over_record, job_record
 from onboard.systems.car_park.bay_task import DESK_INPUT, BayPhase, BayTask
 from onboard.systems.car_park.desk_calls import DeskCalls
-from onboard.systems.car_park.generation import CarParkGeneration
+from onboard.systems.car_park.least_bids import LeastBids
 from onboard.systems.car_park.outputs import BayOutputs
 from onboard.systems.car_park.pipeline import Pipeline
-from onboard.systems.car_park.program import Program
 from onboard.systems.car_park.promises import Promises
 from onboard.systems.car_park.site import ANY_CLASS, car_park
 from onboard.systems.car_park.stewardship import Stewardship
@@ -91,13 +90,13 @@ class Compartment:
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
         self.outputs = BayOutputs(self.fleet.node_id, self.fleet.motion, station_token(self.station), self.codes)
-        self._park = site = car_park(self.fleet.site)
-        self._use = site.bay_uses.get(self.fleet.node_id, BayUse.BOTH)
-        self._robots = CarParkGeneration(site, self.fleet.machine, self.fleet.mirror, Program(site))
+        self._park = car_park(self.fleet.site)
+        self._use = self._park.bay_uses.get(self.fleet.node_id, BayUse.BOTH)
+        bids = LeastBids(self.fleet)
         self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)
         self.stewardship.replay(self.memory)
         self.tickets.extend(self.memory.tickets)
-        self.calls = BayCalls(self.fleet, self.station, self.stewardship, self.memory, self._robots.floor, self._on_won)
+        self.calls = BayCalls(self.fleet, self.station, self.stewardship, self.memory, bids.floor, self._on_won)
         self.calls.take_up()
         self.pipeline = Pipeline(self.fleet, self._park, self.calls, self.memory, self.tickets, self.outputs)
         self.slot = TicketSlot(self.outputs, self.fleet.drops, self.pipeline.times.at_desk)

@@ -91,10 +91,16 @@ class CarParkGeneration:
 
     def floor(self, call: CallForProposals, now_us: int) -> int:
         """Least finishing time (bus ms) that any robot could name, from call and site alone: it stands at the start."""
-        start_us = self._deadline_us(call, now_us) + AWARD_LATENCY_US
-        bounds = self._lower_bounds(call, self._all_candidates(call), None, start_us)
+        least = self.least(call, now_us, None, now_us)
+        return to_bus_ms(FOREVER) if least is None else least
+
+    def least(self, call: CallForProposals, now_us: int, origin: Segment | None, from_us: int) -> int | None:
+        """The same of one that is at ``origin``, else at the start, from ``from_us`` on; None where there is no way."""
+        start_us = max(self._deadline_us(call, now_us) + AWARD_LATENCY_US, from_us)
+        bounds = self._lower_bounds(call, self._all_candidates(call), origin, start_us)
         self.effort.steps += len(bounds)
-        return to_bus_ms(min(bounds.values()))
+        least_us = min(bounds.values(), default=FOREVER)
+        return to_bus_ms(least_us) if least_us < FOREVER else None
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         """Least finishing time (bus ms) for me if nobody were in my way; None where I cannot do it at all."""

@@ -1,5 +1,6 @@
 """What a car park's log is judged by."""
 
+from onboard.systems.car_park.checks.bids import TrueBidsGoDown
 from onboard.systems.car_park.checks.cars import CarsConserved, OneCustodian
 from onboard.systems.car_park.checks.customers import CustomersServed, FullMeansFull, TasksServed
 from onboard.systems.car_park.checks.doors import Doors
@@ -7,7 +8,7 @@ from onboard.systems.car_park.checks.lifts import LiftByGate, LiftCrush, Platfor
 from onboard.systems.car_park.checks.liveness import NobodyStarves, NoRounds, SomethingHappens
 from onboard.systems.car_park.checks.motion import InsideAuthority, OneBody
 from onboard.systems.car_park.checks.shuttles import TornCar
-from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
+from onboard.trace.check.calls import BidsInTime, CallsClosed
 from onboard.trace.check.holds import LetGoAgain
 from onboard.trace.check.owners import OneOwner
 from onboard.trace.check.rights import OneHolder
@@ -28,7 +29,7 @@ RULES: tuple[type[Rule], ...] = (
     OneOwner,
     CallsClosed,
     BidsInTime,
-    BidsGoDown,
+    TrueBidsGoDown,
     TasksServed,
     CustomersServed,
     FullMeansFull,
