@@ -50,6 +50,13 @@ def test_nobody_plans_to_stand_where_a_stranger_stands_that_has_told_no_way() ->
     assert pair.is_good, pair.line()
 
 
+def test_a_robot_that_bids_less_than_it_can_does_not_win_what_others_do_sooner() -> None:
+    """It did what it won, one after the other, while the others stood: 12 cars waited two minutes longer."""
+    pair = play_pair(StrangerPlan("standard", Stranger.LIAR, Arrivals(12, 45.0, 22.5), 3_600.0), 50461)
+    assert (pair.strange.served, pair.strange.broken) == (12, ()), pair.line()
+    assert pair.is_good, pair.line()
+
+
 @pytest.mark.parametrize("system", WITHOUT)
 def test_a_site_on_which_nobody_can_be_a_stranger_says_so(system: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["campaign", site_file(system), "--stranger", "stands", "--seeds", "1-1"]) == 2

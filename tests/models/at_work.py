@@ -26,6 +26,7 @@ from onboard.core.authority import TokenBook
 from onboard.core.behaviour import Behaviour, BehaviourFactory
 from onboard.core.effects import Actuate, Effect, Halt, Record, Send
 from onboard.core.negotiation import EVENT_TYPES, negotiation_of
+from onboard.core.negotiation.initiator import is_any_sound
 from onboard.core.records import BootRecord, next_boot
 from onboard.holon.rights import RightsTalk
 from onboard.holon.witness import Witness
@@ -37,7 +38,7 @@ Entry = Mapping[str, str | int]
 #: By these nothing is decided: counts, what never changes, what is the same under another name.
 _NAMES = """
     site _park machine factory timing prepare entries counters drops claimants event changes gifts awards_sent number
-    is_obstacle is_sound delay slot policy silent alternatives searched rights
+    is_obstacle is_sound _calls delay slot policy silent alternatives searched rights
 """
 #: By these nothing is decided here: ways and their times, and when within a while something is said again.
 _WAYS = """
@@ -126,6 +127,8 @@ class AtWork:
         negotiation.slot = negotiation.slot._replace(length_us=0)
         self.fleet = WayFleet(site, machine, tokens, mirror, negotiation, self.entries)
         self.behaviour = self.factory.behaviour(self.fleet, estimator)
+        # What a task costs here is a price, and no way.
+        negotiation.is_sound = is_any_sound
         self.prepare(self.behaviour)
         witness = _Quiet(tokens, mirror, self.boot, True, self._statements, {})
         self.rights = RightsTalk(self.fleet, self.behaviour.may_grant, witness)

@@ -10,6 +10,7 @@ from onboard.systems.car_park import (
     bay_calls,
     bay_task,
     desk_calls,
+    least_bids,
     promises,
     sill,
     stall,
@@ -86,6 +87,7 @@ TIMES: dict[str, tuple[Time, ...]] = {
         Time("T_out", trust.OUT_OF_TASK_US, _FIXED, "out of calls for a task; doubled with each time"),
         Time("T_out_all", trust.OUT_OF_ALL_US, _FIXED, "out of all calls after two; four times as long with each more"),
         Time("T_out_most", trust.MOST_OUT_US, _FIXED, "nobody is out for longer"),
+        Time("T_sooner", least_bids.SLACK_MS * 1000, _FIXED, "a robot's bid so far below what it can do is void"),
         Time("T_late", trust.LATE_MS * 1000, _FIXED, "mean lateness beyond twice the others' that counts as a fail"),
     ),
     "plans": (

@@ -2,9 +2,30 @@
 
 import pytest
 
-from onboard.contract.codes import CallResult, KindCode, MachineState, Reason, RegenerationPhase, TaskPhase
+from onboard.contract.codes import (
+    CallResult,
+    Grade,
+    KindCode,
+    LegAction,
+    MachineState,
+    Reason,
+    RegenerationPhase,
+    Side,
+    TaskPhase,
+)
 from onboard.contract.constants import ANY_STATION, OUTSIDE
-from onboard.contract.messages import BusTime, Halted, Heartbeat, Message, Progress, Reference, Regeneration
+from onboard.contract.messages import (
+    BusTime,
+    Halted,
+    Heartbeat,
+    Itinerary,
+    Leg,
+    Message,
+    Progress,
+    Reference,
+    Regeneration,
+    Stamp,
+)
 from tests.sites import one_floor
 from tests.trace.checking import (
     MR1,
@@ -72,6 +93,16 @@ def test_what_is_wrong_is_found_by_its_rule(step: int, messages: list[Message], 
     assert found == broken
 
 
+@pytest.mark.parametrize(("until_s", "broken"), [(1.9, 1), (200, 0)])
+def test_a_bid_that_its_bidder_cannot_keep_does_not_count(until_s: float, broken: int) -> None:
+    """Who works until long after what it bids: another may bid more, and win."""
+    work = Leg(LegAction.WORK, 1, 6, 6, Side.NEAR, round(until_s * 1000))
+    plan = Itinerary(MR1, 1, Grade.FIRM, Stamp(0, 1, 1), (work,))
+    tape = tell([(0.5, [Progress(MR1, 1, 0, 1, 6, 0, 0), plan]), *STORY[:1]])
+    tape.say(1.5, bid(MR1, 50_000)).say(1.7, bid(MR2, 60_000)).say(2, award(MR2))
+    assert tape.broken().get("bids-go-down", 0) == 2 * broken
+
+
 @pytest.mark.parametrize(("again_s", "in_hand", "broken"), [(400, True, 1), (700, True, 0), (700, False, 1)])
 def test_bids_of_who_waits_for_long_with_a_task_in_hand_need_not_count(
     again_s: int, in_hand: bool, broken: int
@@ -81,7 +112,8 @@ def test_bids_of_who_waits_for_long_with_a_task_in_hand_need_not_count(
     tape = tell([*STORY[:4], (21, [at]), *(() if in_hand else STORY[4:])])
     other = Reference(1, 2)
     tape.say(again_s, car_at(1, BAY, 1, other), call(2, again_s + 1, task=other))
-    tape.say(again_s + 0.5, bid(MR1, 50_000, 2)).say(again_s + 0.7, bid(MR2, 60_000, 2))
+    ends_ms = (again_s + 60) * 1000
+    tape.say(again_s + 0.5, bid(MR1, ends_ms, 2)).say(again_s + 0.7, bid(MR2, ends_ms + 10_000, 2))
     assert tape.broken().get("bids-go-down", 0) == broken
 
 

@@ -13,7 +13,7 @@ from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.program import Program
-from onboard.systems.car_park.site import CarPark, car_park
+from onboard.systems.car_park.site import car_park
 from onboard.ways.mirror import WayFleet, WayMirror
 from onboard.ways.told_way import worked
 
@@ -25,12 +25,12 @@ MOST_CALLS = 16
 
 
 class LeastCosts:
-    """What robots of a site can bid at the least."""
+    """What robots of a site can bid at the least, as one with this ``mirror`` works it out."""
 
-    def __init__(self, site: CarPark) -> None:
-        machine = next(iter(site.machines.values()))
+    def __init__(self, mirror: WayMirror) -> None:
+        site = car_park(mirror.site)
         # What ways and handling take; nobody drives by it.
-        self._robots = CarParkGeneration(site, machine, WayMirror(site, machine.node_id), Program(site))
+        self._robots = CarParkGeneration(site, site.machines[mirror.node_id], mirror, Program(site))
 
     def floor(self, call: CallForProposals, now_us: int) -> int:
         """That of any of them, for a call that is opened now (bus ms)."""
@@ -61,7 +61,7 @@ class LeastBids:
     _calls: dict[int, CallForProposals] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._costs = LeastCosts(car_park(self.fleet.site))
+        self._costs = LeastCosts(self.fleet.mirror)
         self.fleet.negotiation.is_sound = self.is_sound
 
     def floor(self, call: CallForProposals, now_us: int) -> int:

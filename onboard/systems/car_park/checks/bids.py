@@ -10,6 +10,7 @@ from onboard.trace.check.calls import BidsGoDown
 from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers
+from onboard.ways.mirror import WayMirror
 
 JUDGED = (Operation.PARK, Operation.RETRIEVE)
 
@@ -22,7 +23,8 @@ class TrueBidsGoDown(BidsGoDown):
 
     def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
-        self._least = LeastCosts(car_park(picture.site))
+        site = car_park(picture.site)
+        self._least = LeastCosts(WayMirror(site, min(site.machines)))
         self._plans: dict[int, Itinerary] = {}
         self._progress: dict[int, Progress] = {}
 
