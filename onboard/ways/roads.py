@@ -299,6 +299,8 @@ class DirectedRoads(Roads):
 
     def nearest_us(self, origin: Segment, goals: frozenset[Segment]) -> int:
         """Least time to any of ``goals`` as in ``shortest_us``."""
+        if not self.knows(origin):
+            return FOREVER
         durations, track = self._run_us[origin.track], self.site.tracks[origin.track]
         ways = self._ways_to(goals).get(origin.track, ())
         ahead = [(index, rest_us) for index, rest_us in ways if track.goes(origin.index, index)]

@@ -204,9 +204,12 @@ def test_a_car_goes_where_every_car_of_its_class_fits() -> None:
     assert [class_of_end(open_end(one)) for one in (0, 1, 15)] == [0, 1, 15] and class_of_end(high.number) is None
 
 
-def test_from_where_no_carrier_rests_no_way_leads_and_nothing_is_raised() -> None:
-    """A robot that stopped amid its hop into a branch of one position stands at index 0 (drawn car parks, 3380)."""
-    site = branched()
+@pytest.mark.parametrize("site", [branched(), ring(one_way=1)], ids=["branched", "one way"])
+def test_from_where_no_carrier_rests_no_way_leads_and_nothing_is_raised(site: CarPark) -> None:
+    """A robot that stopped amid its hop into a branch of one position stands at index 0 (drawn car parks, 3380).
+
+    Where ways are one-way each robot with nothing to do halted at that word (4359).
+    """
     roads, goal = roads_of(site), min(refuges(site))
     beyond = [Segment(track.number, index) for track in site.tracks.values() for index in (0, track.length + 1, 255)]
     outside = [one for one in beyond if not roads.knows(one)]

@@ -436,12 +436,15 @@ class GoingAround:
         return bool(remaining) and remaining[0].action is LegAction.RIDE and self._is_hindered(remaining[:1], now_us)
 
     def turning(self, tasks: Sequence[Reference], now_us: int) -> tuple[int, Segment, int]:
-        """As ``Program.turning``, but a run that stands at a mark before an obstacle, or work dropped, ends there."""
+        """As ``Program.turning``, but a run that stands at a mark before an obstacle, or work dropped, ends there.
+
+        No plan begins in a mouth on the axis of the track inside: it begins at the mouth, turned or not.
+        """
         remaining, here = self.program.remaining, self.carriage.standing_at
         if remaining and here is not None and lift_at(self.fleet.site, here) is None and self.carriage.target is None:
             step = remaining[0]
             if step.action is LegAction.TRAVEL or (step.work is not None and step.work.call.task in tasks):
-                return 0, here, now_us
+                return 0, self.carriage.nearest, now_us
         return self.program.turning(now_us)
 
     def _ahead(self, works: list[StationWork], kept: int) -> list[StationWork]:

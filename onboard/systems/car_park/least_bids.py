@@ -18,7 +18,7 @@ from onboard.ways.mirror import WayFleet, WayMirror
 from onboard.ways.told_way import worked
 
 #: A bid that is less than that by no more than this counts, ms: who moves tells its place every few seconds, and may be
-#: done half a second sooner than it told. Honest ones were 2.3 s below it at most (docs/figures.md).
+#: done half a second sooner than it told. Honest ones were 3.1 s below it at most, with faults (docs/figures.md).
 SLACK_MS = 10_000
 #: Calls that are remembered: of a compartment few are open at a time.
 MOST_CALLS = 16

@@ -212,8 +212,8 @@ class ParkingRobot:
         if not kept:
             self._begun = False
         if not rest and self.carriage.standing_at is not None:
-            self.program.standing = self.carriage.standing_at
-            self.carriage.go(self.carriage.standing_at)
+            self.program.standing = self.carriage.nearest
+            self.carriage.go(self.carriage.nearest)
         planned = [step.work for step in rest]
         self.program.replace(rest, self.program.stamp, [work for work in works if work not in planned])
         effects: list[Effect] = [Report("goes around: " + "; ".join(str(step) for step in steps))]
