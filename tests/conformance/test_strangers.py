@@ -57,6 +57,12 @@ def test_a_robot_that_bids_less_than_it_can_does_not_win_what_others_do_sooner()
     assert pair.is_good, pair.line()
 
 
+def test_a_car_that_drives_in_is_called_for_anew_as_soon_as_its_winner_is_silent() -> None:
+    """So long it was nobody's, its compartment waited: 16 s each time, and all waited 40 s longer."""
+    pair = play_pair(StrangerPlan("small", Stranger.SILENT, Arrivals(12, 30.0, 15.0), 3_600.0), 50504)
+    assert pair.is_good, pair.line()
+
+
 @pytest.mark.parametrize("system", WITHOUT)
 def test_a_site_on_which_nobody_can_be_a_stranger_says_so(system: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["campaign", site_file(system), "--stranger", "stands", "--seeds", "1-1"]) == 2

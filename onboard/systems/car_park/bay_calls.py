@@ -182,7 +182,8 @@ class BayCalls:
         return self.call_again(task, now_us)
 
     def _is_unheard(self, task: BayTask, now_us: int) -> bool:
-        return custody.is_mine(self.fleet, task.car) and self._is_silent(task, now_us)
+        # A car that is still to drive in is nobody's yet.
+        return (task.is_coming or custody.is_mine(self.fleet, task.car)) and self._is_silent(task, now_us)
 
     def _is_silent(self, task: BayTask, now_us: int) -> bool:
         """Whether its winner has not said for long that it has it."""
