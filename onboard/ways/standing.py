@@ -106,12 +106,12 @@ class Standing:
         machine = self.site.machines.get(node)
         if seen is None or machine is None or machine.kind not in MOBILE_KINDS:
             return False
-        if not seen.stands or not self.is_laden(node):
-            leaves_us = self._leaves_us(node, seen, now_us)
-            if leaves_us is None:
-                seen.late_us, seen.stands = None, False
-                return False
-        if not seen.stands:
+        if seen.stands and self.is_laden(node):
+            return True
+        leaves_us = self._leaves_us(node, seen, now_us)
+        if leaves_us is None:
+            seen.late_us, seen.stands = None, False
+        elif not seen.stands:
             seen.late_us = now_us if seen.late_us is None else seen.late_us
             quiet_us = now_us - max(seen.moved_us, seen.spoke_us, leaves_us)
             seen.stands = quiet_us >= STANDS_AFTER_US or now_us - seen.late_us >= WAITS_AFTER_US + STANDS_AFTER_US

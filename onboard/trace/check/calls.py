@@ -227,7 +227,7 @@ class BidsGoDown(_CallRule):
 
     def handlers(self) -> Handlers:
         """Beside calls, whose bids do not count."""
-        own = {LeftOut: self._on_left_out, Progress: self._on_progress, TaskReport: self._on_report}
+        own: Handlers = {LeftOut: self._on_left_out, Progress: self._on_progress, TaskReport: self._on_report}
         return {**super().handlers(), **own}
 
     def is_sound(self, bid: Bid, task: Reference) -> bool:
