@@ -106,7 +106,7 @@ class CarParkGeneration:
         """Least finishing time (bus ms) for me if nobody were in my way; None where I cannot do it at all."""
         if call.criterion is not Criterion.FINISH_TIME or call.operation not in (Operation.PARK, Operation.RETRIEVE):
             return None
-        if not self._is_able(now_us):
+        if not self._is_able(now_us) or self._is_behind_itself(call):
             return None
         limits = self.site.cars
         # On the bus a wheelbase is rounded down to 10 mm; the desk has measured it to the millimetre.
@@ -125,6 +125,11 @@ class CarParkGeneration:
         is_planned = program.standing is not None and not program.unplanned
         is_free = not self.is_held and len(program.remaining) + 4 <= MAX_STEPS
         return is_planned and is_free and self.charging.bids(now_us)
+
+    def _is_behind_itself(self, call: CallForProposals) -> bool:
+        """Whether it has to leave a car before in the very bay out of which it would take that of the call."""
+        leaves = [work for work in self.program.works() if work.handling is CarHandling.LEAVE]
+        return call.operation is Operation.PARK and any(one.station.number == call.from_station for one in leaves)
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | NeededAnswers | None:
         """First request: the best solution as a bid, or None: silence (row P45).
