@@ -29,7 +29,7 @@ from onboard.systems.car_park.handling import ShuttleWork, handle
 from onboard.systems.car_park.program import CarHandling, HandlingPhase, StationWork
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.tokens import car_token
-from tests.kinds.test_turning import MOUTH, MOUTH_MM, ROBOT, STEWARD, carriage, get, state
+from tests.kinds.test_turning import MOUTH, MOUTH_MM, PITCH_MM, ROBOT, STEWARD, carriage, get, state
 
 #: Beside the mark where the carrier stands, and what stands there.
 PLACE, CAR = Station(MOUTH.track, MOUTH.index, Side.NEAR), Reference(STEWARD, 1)
@@ -100,6 +100,24 @@ def test_pushed_as_it_reached_out_it_goes_back_to_the_mark_and_begins_anew(pair:
     assert sent(handle(one, work, 5)) == [MOUTH_MM]
     one.sense(state(MOUTH_MM, sequence=one.sequence), 6)
     assert sent(handle(one, work, 6)) == [ShuttleAction.REACH]
+
+
+def test_pushed_to_another_mark_as_it_reached_out_it_takes_its_shuttle_in_and_goes_back(
+    pair: tuple[Carriage, ShuttleWork],
+) -> None:
+    """Its drive saw a mark, and did not refuse: it stood there with its shuttle out for good (drawn car park 4698)."""
+    one, work = pair
+    one.sense(state(MOUTH_MM + PITCH_MM, sequence=one.sequence), 2)
+    work.sense(shuttle(ShuttleMode.MOVING, work.sequence, 900), 3)
+    assert sent(handle(one, work, 3)) == []
+    work.sense(shuttle(ShuttleMode.REACHED, work.sequence, 1_000), 4)
+    assert sent(handle(one, work, 4)) == [ShuttleAction.RETRACT]
+    assert sent(handle(one, work, 5)) == []
+    work.sense(shuttle(ShuttleMode.HOME, work.sequence), 6)
+    has(one, TokenKey(TokenKind.SEGMENT, MOUTH._replace(index=MOUTH.index + 1).number))
+    assert sent(handle(one, work, 7)) == [MOUTH_MM]
+    one.sense(state(MOUTH_MM, sequence=one.sequence), 8)
+    assert sent(handle(one, work, 8)) == [ShuttleAction.REACH]
 
 
 def test_its_drive_says_once_more_that_it_refused(pair: tuple[Carriage, ShuttleWork]) -> None:

@@ -444,7 +444,7 @@ class GoingAround:
         if remaining and here is not None and lift_at(self.fleet.site, here) is None and self.carriage.target is None:
             step = remaining[0]
             if step.action is LegAction.TRAVEL or (step.work is not None and step.work.call.task in tasks):
-                return 0, self.carriage.nearest, now_us
+                return 0, self.carriage.axis.mouths.get(here.index, here), now_us
         return self.program.turning(now_us)
 
     def _ahead(self, works: list[StationWork], kept: int) -> list[StationWork]:

@@ -131,6 +131,19 @@ class ShuttleWork:
         has_stayed = state.mode is ShuttleMode.FAULT and not state.extension_mm and state.sequence == self.sequence
         return has_stayed and self.phase is HandlingPhase.REACH and bool(self._permit()) and not self.at_mark()
 
+    def comes_back(self, now_us: int) -> list[Effect]:
+        """Where it has reached out beside its station: the carrier was pushed to another mark in that very moment.
+
+        Nothing is gripped or let go yet. It begins anew once the carrier is back.
+        """
+        state = self.sensed
+        if state is None or self._resuming or self.phase is not HandlingPhase.REACH:
+            return []
+        if state.mode is not ShuttleMode.REACHED or state.sequence != self.sequence or not self._permit():
+            return []
+        self.phase = HandlingPhase.REFUSED
+        return self._send(ShuttleAction.RETRACT, state.side, state.wheelbase_mm, now_us)
+
     def advance(self, now_us: int) -> list[Effect]:
         """Take the next step of the table where its condition is met."""
         if self.work is None or self.phase is HandlingPhase.DONE:
@@ -240,4 +253,4 @@ def handle(carriage: Carriage, shuttle: ShuttleWork, now_us: int) -> list[Effect
     """Carrier or shuttle, never both: who was pushed off the station goes back first, and not with the shuttle out."""
     if carriage.goal is None or carriage.arrived:
         return carriage.advance(now_us) + shuttle.advance(now_us)
-    return [] if shuttle.is_out else carriage.advance(now_us)
+    return shuttle.comes_back(now_us) if shuttle.is_out else carriage.advance(now_us)
