@@ -23,8 +23,9 @@ class TrueBidsGoDown(BidsGoDown):
 
     def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
-        site = car_park(picture.site)
-        self._least = LeastCosts(WayMirror(site, min(site.machines)))
+        # Without the site file nothing is known of ways: all bids count.
+        site = car_park(picture.site) if picture.has_site else None
+        self._least = None if site is None else LeastCosts(WayMirror(site, min(site.machines)))
         self._plans: dict[int, Itinerary] = {}
         self._progress: dict[int, Progress] = {}
 
@@ -43,7 +44,7 @@ class TrueBidsGoDown(BidsGoDown):
     def is_sound(self, bid: Bid, task: Reference) -> bool:
         """No sooner than its way from the end of its work, or from where it is, takes with nobody in its way."""
         seen = self.calls.get((bid.initiator, bid.call))
-        if seen is None or not _is_judged(seen.call):
+        if self._least is None or seen is None or not _is_judged(seen.call):
             return True
         node = bid.sender
         return self._least.is_possible(seen.call, bid.cost, self._plans.get(node), self._progress.get(node))
