@@ -258,6 +258,18 @@ def test_who_drove_away_when_its_power_failed_is_farther_by_now(speed_mm_s: int,
     assert Tape(one_alley(), started=False).say(1, gone, at(MR2, 1, 11)).broken() == broken
 
 
+def test_who_is_pushed_to_where_another_was_may_find_that_it_has_set_off() -> None:
+    """It drove, and had not said so yet (drawn car parks, 4785); who stands there says nothing more."""
+
+    def pushed() -> Tape:
+        stood = Tape(one_alley(), started=False).say(1, at(MR1, 1, 12), at(MR2, 1, 11))
+        return stood.say(2, at(MR1, 1, 12, -300))
+
+    assert pushed().say(3, at(MR2, 1, 10, 600, -1_500)).say(9, beat(MR1)).say(11, beat(MR1)).broken() == {}
+    assert pushed().say(3, beat(MR1)).say(9, beat(MR1)).say(11, beat(MR1)).broken() == {"one-body": 1}
+    assert pushed().say(3, at(MR2, 1, 11)).broken() == {"one-body": 1}
+
+
 def test_two_bodies_on_one_platform_are_found_whatever_their_floors() -> None:
     tape = Tape(two_floors(), started=False).say(1, at(ER1, LIFT, 1), at(MR1, 1, 0), at(MR2, 2, 0))
     assert tape.broken() == {"one-body": 1}

@@ -26,6 +26,8 @@ PUSHED_US = 60_000_000
 #: An order to a drive waits so long at most for the journal of the rights that permit it, us (seen: 20 ms for five): it
 #: crosses the word of the drive that it was pushed meanwhile.
 ORDER_CROSSES_US = 100_000
+#: Who sets off says where it is within this, us: a slot lasts no longer (seen: 1.6 s from its order to its word).
+SETS_OFF_US = 5_000_000
 
 
 class InsideAuthority(Rule):
@@ -166,6 +168,8 @@ class OneBody(Rule):
         #: Of each track that has linked ends, their mouths.
         self._mouths = {track.number: [mouth for _, mouth in track.ends] for track in tracks if track.ends}
         self._robots = {node for node in picture.site.machines if picture.kind(node) is KindCode.ROBOT}
+        #: Who was pushed to another, which may have set off since its last word: until when that is to say so.
+        self._crossed: dict[tuple[int, int], tuple[LogEvent[Progress], int]] = {}
 
     def handlers(self) -> Handlers:
         """Reads where bodies say that they are."""
@@ -175,11 +179,12 @@ class OneBody(Rule):
         ways, body = self.picture.ways, self.picture.body_told(event.message, event.time_us)
         if body is None or body.node not in self._robots:
             return
-        lifts, near_mm = lifts_under(ways, body), ways.carrier_length_mm - TOLERANCE_MM
+        lifts = lifts_under(ways, body)
+        self._crossed = {pair: word for pair, word in self._crossed.items() if pair[1] != body.node}
         for other in self.picture.bodies.values():
             if other.node == body.node or other.node not in self._robots:
                 continue
-            if other.track == body.track and abs(other.position_mm - body.position_mm) < near_mm:
+            if self._are_near(body, other):
                 self._judge_near(event, body, other)
             for lift in sorted(lifts & lifts_under(ways, other)) if lifts else ():
                 self.find(event, (body.node, other.node), f"both on the platform of lift {lift}")
@@ -190,11 +195,31 @@ class OneBody(Rule):
                     self.find(event, (body.node, other.node), f"{one.node} in the mouth of {self._name(two.track)}")
 
     def _judge_near(self, event: LogEvent[Progress], body: ReportedPosition, other: ReportedPosition) -> None:
-        apart_mm = other.position_mm - body.position_mm
+        apart_mm, pair = other.position_mm - body.position_mm, (body.node, other.node)
         # Who drove away when it last spoke is farther by now: its power may have failed before its next word.
         is_gone = apart_mm * other.speed_mm_s > 0
-        if not is_gone:
-            self.find(event, (body.node, other.node), f"{abs(apart_mm)} mm apart on track {body.track}")
+        before = self.picture.bodies.get(body.node)
+        if before is not None and not before.speed_mm_s and not body.speed_mm_s and not self._are_near(before, other):
+            self._crossed.setdefault(pair, (event, event.time_us + SETS_OFF_US))
+        if not is_gone and pair not in self._crossed:
+            self._find_near(event, body, other)
+
+    def tick(self, now_us: int) -> None:
+        """Who did not say that it has set off stands there."""
+        for pair, (event, due_us) in list(self._crossed.items()):
+            if now_us >= due_us:
+                del self._crossed[pair]
+                body, other = (self.picture.bodies.get(node) for node in pair)
+                if body is not None and other is not None and self._are_near(body, other):
+                    self._find_near(event, body, other)
+
+    def _are_near(self, one: ReportedPosition, two: ReportedPosition) -> bool:
+        near_mm = self.picture.ways.carrier_length_mm - TOLERANCE_MM
+        return one.track == two.track and abs(one.position_mm - two.position_mm) < near_mm
+
+    def _find_near(self, event: LogEvent[Progress], body: ReportedPosition, other: ReportedPosition) -> None:
+        apart_mm = abs(other.position_mm - body.position_mm)
+        self.find(event, (body.node, other.node), f"{apart_mm} mm apart on track {body.track}")
 
     def _name(self, track: int) -> str:
         kind = self.picture.ways.tracks[track].kind
