@@ -19,7 +19,7 @@ from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Itinerary, Leg, Progress, Stamp
 from onboard.core.serial import is_newer, ranks_before
 from onboard.core.site import Segment
-from onboard.ways.occupancy import LegWindows, body_mm, leg_windows, reach_segments
+from onboard.ways.occupancy import LegWindows, body_mm, leg_windows, reach_segments, standing_segments
 from onboard.ways.reservations import FOREVER
 from onboard.ways.retreats import is_aged
 from onboard.ways.site import WaySite
@@ -118,6 +118,9 @@ class PassingOrder:
         way.body = Segment(progress.track, progress.index)
         if leg.track == progress.track:
             way.left |= self._behind(leg, progress)
+        if progress.leg >= len(way.itinerary.legs) and progress.track in self.site.tracks:
+            # Who has come to its end has left all but where it stands, whoever heard it give that back.
+            way.left |= way.turns.keys() - standing_segments(self.site, way.body)
 
     def on_return(self, node: int, segment: Segment) -> None:
         """A machine gave a segment's token back: it has left it, unless it lies ahead of it in the leg in hand.

@@ -92,6 +92,23 @@ def test_progress_of_another_version_tells_nothing() -> None:
     assert order.predecessor(BOB, Segment(1, 7)) == ALICE
 
 
+def test_who_has_come_to_its_end_has_left_the_mouth_whoever_heard_it_give_that_back() -> None:
+    """A steward that was started again kept a mouth for who stood in the spur for 3 minutes (drawn car parks, 4657)."""
+    site = one_floor(2, extra='[[spurs]]\nat = "p(1,7)"\n')
+    spur, mouth = Segment(192, 1), Segment(1, 7)
+    legs = (Leg(LegAction.TRAVEL, 1, 2, 7, Side.NEAR, 20_000), Leg(LegAction.TRAVEL, 192, 1, 1, Side.NEAR, 30_000))
+    order = PassingOrder(site)
+    for told in (Itinerary(ALICE, 1, Grade.FIRM, Stamp(0, ALICE, 0), legs), plan(BOB, [(12, 12, 60), (12, 6, 80)])):
+        order.on_plan(told, leg_windows(site, told, 0), 0)
+    order.on_progress(Progress(ALICE, 1, 1, 192, 1, 0, 0))
+    assert order.predecessor(BOB, mouth) == ALICE, "its body may be in both"
+    order.on_progress(Progress(ALICE, 1, 2, 999, 1, 0, 0))
+    assert order.predecessor(BOB, mouth) == ALICE, "there is no such track"
+    order.on_progress(Progress(ALICE, 1, 2, 192, 1, 0, 0))
+    assert order.predecessor(BOB, mouth) == NOBODY
+    assert order.predecessor(ALICE, spur) == NOBODY, "there it stays"
+
+
 def test_a_plan_told_anew_drops_what_is_over() -> None:
     order = passing()
     order.on_progress(progress(ALICE, 1, 7))
