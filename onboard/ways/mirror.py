@@ -27,7 +27,7 @@ from onboard.ways.reservations import FOREVER, Reservations, SlotWindow
 from onboard.ways.site import WaySite
 from onboard.ways.standing import Standing
 from onboard.ways.tokens import tokens_of
-from onboard.ways.told_way import BegunItinerary, next_plan, reread_us
+from onboard.ways.told_way import TOLERANCE_US, BegunItinerary, next_plan, reread_us
 
 
 @dataclass
@@ -250,13 +250,13 @@ class WayMirror(CarMirror):
         Whose next run leads through here before that cannot make it: it stands where it is until this machine has gone.
         Not for who ``may_stay``, and need not go at all: it makes room.
         """
-        found = self.reservations
+        own = found = self.reservations.apart(self.node_id, TOLERANCE_US)
         for node in sorted(self.plans) if not may_stay else ():
             place, comes_us = self.order.place(node), self.order.comes_us(node, here)
             if node in (self.node_id, self._as_told) or place is None:
                 continue
             if comes_us is not None and comes_us < from_us:
-                found = found.copy() if found is self.reservations else found
+                found = found.copy() if found is own else found
                 found.release(node)
                 found.reserve(node, [SlotWindow(slot, 0, FOREVER) for slot in standing_segments(self.site, place)])
         return found

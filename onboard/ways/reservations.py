@@ -165,6 +165,62 @@ class Reservations(Planned):
             found._windows[segment] = [window for window in kept if window[0] < window[1]]
         return found
 
+    def apart(self, owner: int, tolerance_us: int) -> "Reservations":
+        """A copy in which others leave to ``owner`` what they have of its time, where that is so little; or this one.
+
+        Plans that are told in whole milliseconds meet by their rounding, which no plan counts as a conflict: who looks
+        for another way from where the next one follows at once would find none.
+        """
+        mine = {segment: self._times(segment, owner) for segment in self._segments.get(owner, ())}
+        rides = {lift_track: _rides(uses, owner) for lift_track, uses in self._uses.items()}
+        touching = self._touching(owner, mine, rides, tolerance_us)
+        if not touching:
+            return self
+        found = self.copy()
+        for node in sorted(touching):
+            windows = [
+                SlotWindow(segment, *_less(time, mine.get(segment, []), tolerance_us))
+                for segment in self._segments[node]
+                for time in self._times(segment, node)
+            ]
+            uses = [
+                Use(*use[:3], *_less(use[3:5], rides[lift_track], tolerance_us), node)
+                for lift_track, all_uses in self._uses.items()
+                for use in all_uses
+                if use.owner == node
+            ]
+            found.release(node)
+            found.reserve(
+                node,
+                (one for one in windows if one.from_us < one.to_us),
+                (one for one in uses if one.from_us < one.to_us),
+            )
+            if node in self._fixed:
+                found.fix(node)
+        return found
+
+    def _touching(
+        self,
+        owner: int,
+        mine: dict[Segment, list[tuple[int, int]]],
+        rides: dict[int, list[tuple[int, int]]],
+        tolerance_us: int,
+    ) -> set[int]:
+        """Others who have so little of the time of ``owner`` anywhere."""
+        found = set()
+        for segment, times in mine.items():
+            for start_us, end_us, holder in self._windows[segment]:
+                if holder != owner and _less((start_us, end_us), times, tolerance_us) != (start_us, end_us):
+                    found.add(holder)
+        for lift_track, times in rides.items():
+            for use in self._uses[lift_track]:
+                if use.owner != owner and _less(use[3:5], times, tolerance_us) != use[3:5]:
+                    found.add(use.owner)
+        return found
+
+    def _times(self, segment: Segment, owner: int) -> list[tuple[int, int]]:
+        return [(start_us, end_us) for start_us, end_us, holder in self._windows[segment] if holder == owner]
+
     def standing_in(self, owner: int, windows: Iterable[SlotWindow]) -> list[int]:
         """Nodes other than ``owner`` that stand for ever where one of ``windows`` is, in order."""
         found = set()
@@ -213,3 +269,16 @@ class Reservations(Planned):
 
 def _begin(use: Use) -> tuple[int, int, int]:
     return use.from_us, use.to_us, use.owner
+
+
+def _less(span: tuple[int, int], mine: list[tuple[int, int]], tolerance_us: int) -> tuple[int, int]:
+    """A time without what it has in common with any of ``mine``, where that is so little."""
+    from_us, to_us = span
+    for start_us, end_us in mine:
+        if 0 < min(end_us, to_us) - max(start_us, from_us) <= tolerance_us:
+            from_us, to_us = (end_us, to_us) if from_us > start_us else (from_us, start_us)
+    return from_us, to_us
+
+
+def _rides(uses: list[Use], owner: int) -> list[tuple[int, int]]:
+    return [(use.from_us, use.to_us) for use in uses if use.owner == owner]

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from onboard.core.site import Segment
-from onboard.ways.reservations import FOREVER, Interval, Reservations, SlotWindow
+from onboard.ways.reservations import FOREVER, Interval, Reservations, SlotWindow, Use
 
 HERE = Segment(1, 4)
 THERE = Segment(1, 5)
@@ -46,6 +46,21 @@ def test_safe_intervals_are_the_instants_that_no_other_node_holds(
         assert all(gap.from_us >= from_us for gap in gaps)
         # In order and as long as can be: two gaps never touch.
         assert all(one.from_us < one.to_us < two.from_us for one, two in pairwise(gaps))
+
+
+def test_who_follows_at_once_or_is_followed_is_apart_from_me_and_who_is_in_my_way_is_not() -> None:
+    """Told in whole milliseconds, they meet by their rounding (drawn car parks, 4693: a robot found no way)."""
+    reservations = Reservations()
+    reservations.reserve(1, [SlotWindow(HERE, 100, 200)], [Use(128, 1, 2, 100, 200, 1)])
+    assert reservations.apart(1, 10) is reservations
+    for node, from_us, to_us in ((2, 50, 105), (3, 195, 250), (4, 180, 300), (5, 196, 199)):
+        reservations.reserve(node, [SlotWindow(HERE, from_us, to_us)], [Use(128, 1, 2, from_us, to_us, node)])
+    left = [(50, 100, 2), (100, 200, 1), (180, 300, 4), (200, 250, 3)]
+    apart = reservations.apart(1, 10)
+    assert apart.on(HERE) == left
+    assert [(use.from_us, use.to_us, use.owner) for use in apart.uses(128, excluding=0)] == left
+    assert reservations.apart(6, 10) is reservations
+    assert len(reservations.on(HERE)) == len(left) + 1, "a copy"
 
 
 @given(PLANS, st.integers(1, 3), st.lists(WINDOWS, max_size=4))

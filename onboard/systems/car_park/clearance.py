@@ -16,7 +16,7 @@ from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import Reservations
 from onboard.ways.retreats import HeldBack, held_back
 from onboard.ways.sipp import NoRoute, planning
-from onboard.ways.told_way import BegunItinerary
+from onboard.ways.told_way import TOLERANCE_US, BegunItinerary
 
 #: Bound of one route search, in expansions (a wall-time bound would not replay).
 MAX_EXPANSIONS = 4_000
@@ -51,7 +51,7 @@ class Clearance:
 
     def without_retreats(self, held: Mapping[int, HeldBack], now_us: int) -> Reservations:
         """What all plans occupy, where those of ``held`` end in standing instead of their ways back."""
-        found = self.mirror.reservations.copy()
+        found = self.mirror.reservations.apart(self.node, TOLERANCE_US).copy()
         for node, one in held.items():
             _replace(self.site, found, node, one.plan, now_us)
         return found

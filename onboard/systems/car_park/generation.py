@@ -38,7 +38,7 @@ from onboard.ways.mirror import WayMirror
 from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import FOREVER, Reservations
 from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_ends, free_flow_us, planning
-from onboard.ways.told_way import BegunItinerary
+from onboard.ways.told_way import TOLERANCE_US, BegunItinerary
 
 #: From the deadline to the first motion: award frame, journal writes and the first tokens (measured in tests).
 AWARD_LATENCY_US = 150_000
@@ -241,12 +241,12 @@ class CarParkGeneration:
         there is no solution around machines that only stand there, one that counts on their giving way (design,
         section 5: idle machines yield); they hear of it with the firm itinerary.
         """
-        search = self._solve(call, now_us, self.mirror.reservations, behind_bids=behind_bids)
-        return self.effort.whole(search)
+        return self.effort.whole(self._solve(call, now_us, self.mirror.reservations, behind_bids=behind_bids))
 
     def _solve(
         self, call: CallForProposals, now_us: int, reservations: Reservations, *, behind_bids: bool = True
     ) -> Search[tuple[Solution | None, list[Alternative]]]:
+        reservations = reservations.apart(self.machine.node_id, TOLERANCE_US)
         start = self._start(call, now_us, behind_bids=behind_bids)
         best, alternatives = yield from self._search(call, now_us, start, reservations)
         if alternatives and (best is None or not behind_bids):
