@@ -187,6 +187,11 @@ def _strangers(args: argparse.Namespace, plan: CampaignSettings, site: Site) -> 
         raise DemandError(
             f"--stranger {args.stranger}: {site.name} is a {site.system}, where no machine bids by the calls of all"
         )
+    if sum(machine.kind is system.worker for machine in site.machines.values()) < 2:
+        raise DemandError(
+            f"--stranger {args.stranger}: {site.name} has one {system.worker.name.lower()}, and nobody else could do "
+            "what that wins; take a site with two"
+        )
     limit_s = plan.limit_s or system.patience_s(site, plan.demand, seeds[0])
     strange = StrangerPlan(args.site, Stranger(args.stranger), plan.demand, limit_s)
     pairs = sorted(play_pairs(strange, seeds, args.jobs or os.cpu_count() or 1), key=lambda one: one.seed)

@@ -67,3 +67,10 @@ def test_a_car_that_drives_in_is_called_for_anew_as_soon_as_its_winner_is_silent
 def test_a_site_on_which_nobody_can_be_a_stranger_says_so(system: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["campaign", site_file(system), "--stranger", "stands", "--seeds", "1-1"]) == 2
     assert "where no machine bids by the calls of all" in capsys.readouterr().err
+
+
+def test_a_site_on_which_nobody_else_could_do_the_work_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["campaign", "crescent", "--stranger", "silent", "--seeds", "1-1"]) == 2
+    told = capsys.readouterr().err
+    assert "crescent has one robot" in told
+    assert "take a site with two" in told

@@ -78,6 +78,13 @@ def test_cars_come_and_go_with_all_checkers_silent(name: str) -> None:
     assert (street.served, street.inside) == (cars, 0)
 
 
+def test_who_is_left_alone_rests_where_it_can_tell_the_way_to_the_car_and_home() -> None:
+    """From its spur, the only one that nobody stands in, a fetch has more legs than are told: no car came out."""
+    day = ParkingDay(random_s=(60, 15), cars=1)
+    stage = run_to_its_end(find_site("ring"), RunOptions(seed=1, demand=day, without=frozenset({"MR1"})))
+    assert (stage.violations(), stage.tally().served, stage.tally().waiting) == ([], 1, 0)
+
+
 def test_robots_of_the_tower_start_beside_its_compartments_and_cars_come_to_the_one_beside_them() -> None:
     tower = Building("tower")
     robots = [machine for machine in tower.site.machines.values() if machine.kind is KindCode.ROBOT]

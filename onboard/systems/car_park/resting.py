@@ -31,7 +31,7 @@ from onboard.systems.car_park.program import MAX_STEPS, Program, steps_of
 from onboard.systems.car_park.site import CarPark, RestAt, class_of_end
 from onboard.ways.mirror import WayFleet
 from onboard.ways.occupancy import final_position
-from onboard.ways.refuges import open_refuges
+from onboard.ways.refuges import open_refuges, refuges
 from onboard.ways.reservations import FOREVER
 from onboard.ways.roads import roads_of
 from onboard.ways.sipp import NoRoute, planning
@@ -143,8 +143,12 @@ class Resting:
         if charging.wants(here):
             return charging.chargers(here, now_us)
         if self.out_of_reach.refused:
-            refuges = open_refuges(self.park, self.fleet.mirror.others_standing())
-            there = self.out_of_reach.refuge(here, self._others(), refuges)
+            others = list(self._others())
+            open_ones = open_refuges(self.park, self.fleet.mirror.others_standing())
+            there = self.out_of_reach.refuge(here, others, open_ones)
+            if there is None and not others:
+                # Who is left alone is in nobody's way.
+                there = self.out_of_reach.refuge(here, others, refuges(self.park))
             if there is not None:
                 return frozenset((there,))
         best = None if self.park.rest_at is RestAt.NEAREST or charging.stays(here) else self._best(here)
