@@ -377,6 +377,14 @@ def test_an_alley_that_is_mistaken_hides_only_what_is_said_of_it() -> None:
     assert [line.split(":")[1] for line in problems_of(text)] == ["11", "21", "24", "30", "42"]
 
 
+def test_where_no_alley_hangs_on_a_sound_one_nothing_is_proved() -> None:
+    """The only alley left hung by its lifts on a mistaken one: a traceback, and none of what was wrong."""
+    twin = site_text("twin")
+    assert [line.split(":")[2].strip() for line in problems_of(twin.replace("positions = 14", "positions = 0", 1))] == [
+        "floors.positions = 0"
+    ]
+
+
 def test_what_is_proved_of_the_whole_is_told_beside_mistakes_that_say_nothing_of_the_ways() -> None:
     text = BRANCHED.replace("positions = 9", 'positions = 9\none_way = "rising"')
     text = text.replace("max_length_mm = 4_300", "max_length_mm = 43")

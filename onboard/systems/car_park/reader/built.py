@@ -27,17 +27,22 @@ def check_plan(root: TomlTable, site: CarPark, layout: Layout) -> CarPark:
     Of two such places that of the alley stays which was read first. Where each floor is one alley nothing lies on
     anything. What hangs together by an end that is not where it is written to be is not judged further.
     """
-    if not any(track.kind is TrackKind.ALLEY for track in site.tracks.values()):
+    if not _has_alleys(site):
         return site
     outlines = _outlines(site, layout)
     mistaken = _tell_mismatches(root, layout, outlines)
     if not _is_plan(site, layout):
         return site
-    sound = _hung_tracks(site.tracks, site.tracks.keys() - mistaken, layout.floors)
-    _check_ways(root, layout, outlines if sound == site.tracks.keys() else _outlines(only_tracks(site, sound), layout))
+    sound = only_tracks(site, _hung_tracks(site.tracks, site.tracks.keys() - mistaken, layout.floors))
+    if _has_alleys(sound):
+        _check_ways(root, layout, outlines if sound.tracks == site.tracks else _outlines(sound, layout))
     site = replace(site, places=tuple(_apart(outlines)))
     numbers = {place.number for place in site.places}
     return replace(site, place_class={at: one for at, one in site.place_class.items() if at in numbers})
+
+
+def _has_alleys(site: CarPark) -> bool:
+    return any(track.kind is TrackKind.ALLEY for track in site.tracks.values())
 
 
 def _is_plan(site: CarPark, layout: Layout) -> bool:
