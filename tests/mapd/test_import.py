@@ -89,7 +89,8 @@ def test_the_same_files_and_seed_give_the_same_text(tmp_path: Path) -> None:
 
 
 MISTAKES = {
-    "short.map": ("...\n..\n", ':2: row = "..": 2 cells; write 3, as in the first row'),
+    "short.map": ("...\n..\n", ':2: row = "..": 2 cells; write 3, as in other rows'),
+    "first.map": ("..\n...\n...\n", ':1: row = "..": 2 cells; write 3, as in other rows'),
     "odd.map": ("...\n.x.\n", ':2: cell = "x": unknown; write'),
     "size.map": ("type octile\nheight 3\nwidth 2\nmap\n..\n..\n", ':2: height = "3": the map has 2; write height 2'),
     "no_homes.map": (".e.\n.e.\n", ": r: endpoints, but no robots' homes; mark the homes by r"),
@@ -216,6 +217,7 @@ channel = "can0"
 """
 SITE_MISTAKES = {
     ('home = "2,0"', 'home = "1,1"'): 'robots[0].home = "1,1": no free cell of the floor',
+    ('["e.e",', "[3,"): 'map.rows[0] = 3: not a row; write a text of cells',
     ('"r.e"]', '"r.e."]'): 'map.rows[2] = "r.e.": 4 cells; write 3',
     ('"0,0", "2,2"]]', '"0,0", "1,0"]]'): "not between endpoints",
     ("[[0,", "[[-1,"): "not a task; write [release step from 0",

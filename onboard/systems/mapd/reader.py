@@ -1,5 +1,7 @@
 """The site file of a pick-up and delivery site; docs/import.md describes every key."""
 
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 from onboard.config.fleet import FleetReader
@@ -100,15 +102,22 @@ def _read_rows(table: TomlTable) -> tuple[str, ...]:
     if not rows:
         table.bad("rows", rows, "no rows", "write the map, one text a row")
         return ()
+    width = usual_width(rows)
     for number, row in enumerate(rows):
         if not isinstance(row, str) or not row:
             table.bad("rows", row, "not a row", "write a text of cells", item=number)
-        elif len(row) != len(rows[0]):
-            table.bad("rows", row, f"{len(row)} cells", f"write {len(rows[0])}, as in the first row", item=number)
+        elif len(row) != width:
+            table.bad("rows", row, f"{len(row)} cells", f"write {width}, as in other rows", item=number)
         elif odd := sorted({*row} - FREE - {*BLOCKED}):
             words = f"write . e r S G for free cells, {' '.join(BLOCKED)} for blocked ones"
             table.bad("rows", odd[0], "unknown cell", words, item=number)
     return tuple(rows)
+
+
+def usual_width(rows: Sequence[object]) -> int:
+    """How many cells most rows of a map have, of as many the first; 0 where none is a text."""
+    widths = Counter(len(row) for row in rows if isinstance(row, str))
+    return max(widths, key=widths.__getitem__, default=0)
 
 
 def _read_network(table: TomlTable) -> _Network:

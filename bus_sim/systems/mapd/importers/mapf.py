@@ -12,7 +12,7 @@ from pathlib import Path
 from bus_sim.systems.mapd.importers.draft import Draft, Loss, TaskLine, draw_tasks
 from onboard.config.problems import Problems
 from onboard.systems.mapd.floor import FREE, Floor, grid_floor
-from onboard.systems.mapd.reader import BLOCKED, MAX_RELEASE
+from onboard.systems.mapd.reader import BLOCKED, MAX_RELEASE, usual_width
 from onboard.ways.rests import lasting_rests
 from onboard.ways.steps import FAR
 
@@ -41,9 +41,10 @@ def read_map(text: str, problems: Problems) -> list[str]:
     if not rows or not rows[0]:
         problems.add(first + 1, "", None, "no map", "write the rows of cells")
         return []
+    width = usual_width(rows)
     for number, row in enumerate(rows, start=first + 1):
-        if len(row) != len(rows[0]):
-            problems.add(number, "row", row, f"{len(row)} cells", f"write {len(rows[0])}, as in the first row")
+        if len(row) != width:
+            problems.add(number, "row", row, f"{len(row)} cells", f"write {width}, as in other rows")
         elif odd := sorted({*row} - FREE - {*BLOCKED}):
             free, blocked = " ".join(sorted(FREE)), " ".join(BLOCKED)
             problems.add(number, "cell", odd[0], "unknown", f"write {free} for free cells, {blocked} for blocked ones")
