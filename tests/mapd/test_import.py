@@ -217,12 +217,13 @@ channel = "can0"
 """
 SITE_MISTAKES = {
     ('home = "2,0"', 'home = "1,1"'): 'robots[0].home = "1,1": no free cell of the floor',
-    ('["e.e",', "[3,"): 'map.rows[0] = 3: not a row; write a text of cells',
+    ('["e.e",', "[3,"): "map.rows[0] = 3: not a row; write a text of cells",
     ('"r.e"]', '"r.e."]'): 'map.rows[2] = "r.e.": 4 cells; write 3',
     ('"0,0", "2,2"]]', '"0,0", "1,0"]]'): "not between endpoints",
     ("[[0,", "[[-1,"): "not a task; write [release step from 0",
     ('rows = ["e.e", ".@.", "r.e"]', 'rows = ["e@e", ".@.", "r@e"]'): "no way from and to",
     ('"0,2", "2,2"]', '"0,2", "0,2"]'): "named twice",
+    ('"0,2", "2,2"]', '{}, "2,2"]'): "demand.endpoints[1] = {}: no free cell",
     ("node = 11", "node = 1"): "node-ID of Desk already",
     ("[[robots]]", '[[desks]]\nname = "D2"\nnode = 2\n\n[[robots]]'): "more than one desk",
     ("[map]", "[hall]"): "neither or both of [map] and [network]",

@@ -241,7 +241,8 @@ def _check_ways(
     first = next(iter(homes.values()))
     ground = floor.network.ground((first,))
     what = f"no way from and to {floor.names[first]}"
-    cut_off = {floor.names[cell] for cell in (*endpoints, *homes.values()) if cell not in ground}
+    # A list: what is written may be anything, a table too.
+    cut_off = [floor.names[cell] for cell in (*endpoints, *homes.values()) if cell not in ground]
     for number, name in enumerate(demand.values["endpoints"]):
         if name in cut_off:
             demand.bad("endpoints", name, what, "join them", item=number)
