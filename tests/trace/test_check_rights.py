@@ -265,8 +265,8 @@ def test_who_is_pushed_to_where_another_was_may_find_that_it_has_set_off() -> No
         stood = Tape(one_alley(), started=False).say(1, at(MR1, 1, 12), at(MR2, 1, 11))
         return stood.say(2, at(MR1, 1, 12, -300))
 
-    assert pushed().say(3, at(MR2, 1, 10, 600, -1_500)).say(9, beat(MR1)).say(11, beat(MR1)).broken() == {}
-    assert pushed().say(3, beat(MR1)).say(9, beat(MR1)).say(11, beat(MR1)).broken() == {"one-body": 1}
+    assert pushed().say(3, at(MR2, 1, 10, 600, -1_500)).say(24, beat(MR1)).say(26, beat(MR1)).broken() == {}
+    assert pushed().say(3, beat(MR1)).say(24, beat(MR1)).say(26, beat(MR1)).broken() == {"one-body": 1}
     assert pushed().say(3, at(MR2, 1, 11)).broken() == {"one-body": 1}
 
 
