@@ -26,8 +26,8 @@ PUSHED_US = 60_000_000
 #: An order to a drive waits so long at most for the journal of the rights that permit it, us (seen: 20 ms for five): it
 #: crosses the word of the drive that it was pushed meanwhile.
 ORDER_CROSSES_US = 100_000
-#: Who sets off says where it is at its first border, so within this, us: 5.8 m from rest at 0.5 m/s take 13 s, and 3.1 s
-#: were seen.
+#: Who sets off says where it is at its first border, so within this, us: 5.8 m from rest at 0.5 m/s take 13 s (3.1 s
+#: were seen).
 SETS_OFF_US = 20_000_000
 
 
