@@ -117,7 +117,7 @@ class Inbox:
             for key, value in mine:
                 if body[key] != value:
                     return Incoming(kind, serial, named, "MALFORMED", f"$.{key}", f"must be that of the topic, {value}")
-            wrong = _too_long(body)
+            wrong = _too_long(kind, body)
             if wrong is not None:
                 return Incoming(kind, serial, named, "TOO_LONG", *wrong)
         if publication.retain:
@@ -141,14 +141,17 @@ class Inbox:
         return (name, serial) if is_order else ("", "")
 
 
-def _too_long(body: dict[str, Any]) -> tuple[str, str] | None:
-    """What the factsheet's limits forbid and the schema does not: path and reason."""
-    if len(body.get("orderId", "")) > MOST_ID:
-        return "$.orderId", f"must have at most {MOST_ID} characters"
-    actions = body.get("actions", [])
-    if len(actions) > MOST_ACTIONS:
+def _too_long(kind: str, body: dict[str, Any]) -> tuple[str, str] | None:
+    """What the factsheet's limits forbid and the schema of its kind does not: path and reason.
+
+    A name that this schema does not know may hold anything.
+    """
+    if kind == "order":
+        too_long = len(body["orderId"]) > MOST_ID
+        return ("$.orderId", f"must have at most {MOST_ID} characters") if too_long else None
+    if len(body["actions"]) > MOST_ACTIONS:
         return "$.actions", f"must have at most {MOST_ACTIONS} elements"
-    for number, action in enumerate(actions):
+    for number, action in enumerate(body["actions"]):
         if max(len(action["actionId"]), len(action["actionType"])) > MOST_ID:
             return f"$.actions[{number}].actionId", f"must have at most {MOST_ID} characters"
     return None

@@ -133,7 +133,8 @@ class OrderBook:
             raise RefusedError("NO_ORDER", "an update of an order that is not known", "$.orderUpdateId")
         if len(self.open) >= MOST_OPEN:
             raise RefusedError("TOO_MANY", f"{MOST_OPEN} orders are open")
-        before_us = moment_us(body["before"], "$.before") if "before" in body else None
+        is_due = incoming.kind == TRANSPORT and "before" in body
+        before_us = moment_us(body["before"], "$.before") if is_due else None
         if before_us is not None and before_us <= wall_us:
             raise RefusedError("TOO_LATE", "is past", "$.before")
         request = self._request(incoming, wall_us)

@@ -333,3 +333,14 @@ def test_in_a_car_park_a_robot_takes_no_orders_by_name() -> None:
     _, ordered = park_and_order(one_floor(), 0, [(20, topic(serial="MR1"), told)], extra_s=40)
     refused = ordered.told("test")
     assert [(one["id"], one["reason"]) for one in refused] == [("MR1/x", "UNSUPPORTED")]
+
+
+def test_a_name_that_the_schema_does_not_know_may_hold_anything() -> None:
+    """The gateway ended at each of these, and nobody could order before it had started again."""
+    orders = [
+        (18.0, topic("instantActions"), action("stateRequest", "s") | {"orderId": None}),
+        (20.0, topic(), order("a", (0, ""), (8, "drop"), actions=1.5, before=5)),
+    ]
+    played, ordered = run(orders)
+    assert played.is_good
+    assert ordered.lives("made", "R1/a")[-1] == "done"
