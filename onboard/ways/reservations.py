@@ -272,11 +272,13 @@ def _begin(use: Use) -> tuple[int, int, int]:
 
 
 def _less(span: tuple[int, int], mine: list[tuple[int, int]], tolerance_us: int) -> tuple[int, int]:
-    """A time without what it has in common with any of ``mine``, where that is so little."""
+    """A time without its begin or end where that is in one of ``mine``, and is so little."""
     from_us, to_us = span
     for start_us, end_us in mine:
-        if 0 < min(end_us, to_us) - max(start_us, from_us) <= tolerance_us:
-            from_us, to_us = (end_us, to_us) if from_us > start_us else (from_us, start_us)
+        if start_us <= from_us < end_us <= from_us + tolerance_us:
+            from_us = end_us
+        elif to_us - tolerance_us <= start_us < to_us <= end_us:
+            to_us = start_us
     return from_us, to_us
 
 

@@ -63,6 +63,21 @@ def test_who_follows_at_once_or_is_followed_is_apart_from_me_and_who_is_in_my_wa
     assert len(reservations.on(HERE)) == len(left) + 1, "a copy"
 
 
+@given(PLANS, st.integers(1, 3), st.integers(1, 3))
+def test_of_no_window_of_others_more_is_left_out_at_either_end_than_the_tolerance(
+    plans: list[tuple[int, list[SlotWindow]]], owner: int, tolerance_us: int
+) -> None:
+    """A stand of a millisecond amid another's time took all that came after it from that (a robot drove at another)."""
+    reservations, naive = filled(plans)
+    apart = reservations.apart(owner, tolerance_us)
+    for segment in (HERE, THERE):
+        held = {(at, node) for start, end, node in apart.on(segment) for at in range(start, min(end, 2 * HORIZON))}
+        for node, window in naive:
+            inner = range(window.from_us + tolerance_us, min(window.to_us, 2 * HORIZON) - tolerance_us)
+            kept = window.segment != segment or all((at, node) in held for at in inner)
+            assert kept
+
+
 @given(PLANS, st.integers(1, 3), st.lists(WINDOWS, max_size=4))
 def test_conflicts_are_all_overlaps_with_other_nodes(
     plans: list[tuple[int, list[SlotWindow]]], owner: int, windows: list[SlotWindow]
