@@ -275,3 +275,12 @@ def test_a_machine_without_a_behaviour_says_so(
     machine.write_text(MACHINE)
     assert onboard_main(["--machine", str(machine)]) == 2
     assert "R1: a VEHICLE of a mapd has no controller yet" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("word", ["x", "0", "1.5", "-3", "999999"])
+def test_a_count_that_is_none_is_told_so_in_words(
+    word: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(["import", str(HOTEL), "-o", str(tmp_path / "s.toml"), f"--every={word}"])
+    assert f"argument --every: {word}: write a whole number from 1 to 10000" in capsys.readouterr().err

@@ -1,6 +1,7 @@
 """``bus-sim import``: files of others to a site file, all or nothing, and a list of what could not be carried over."""
 
 import argparse
+import re
 import sys
 from pathlib import Path
 
@@ -41,7 +42,7 @@ def most_machines(bitrate: int) -> int:
 
 
 def _positive(text: str) -> int:
-    number = int(text)
+    number = int(text) if re.fullmatch(r"\d{1,5}", text) else 0
     if not 1 <= number <= 10_000:
         raise argparse.ArgumentTypeError(f"{text}: write a whole number from 1 to 10000")
     return number
