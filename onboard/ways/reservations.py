@@ -166,10 +166,10 @@ class Reservations(Planned):
         return found
 
     def apart(self, owner: int, tolerance_us: int) -> "Reservations":
-        """A copy in which others leave to ``owner`` what they have of its time, where that is so little; or this one.
+        """A copy without begins and ends of others' windows, up to ``tolerance_us``, that lie in those of ``owner``.
 
-        Plans that are told in whole milliseconds meet by their rounding, which no plan counts as a conflict: who looks
-        for another way from where the next one follows at once would find none.
+        This very one where there are none. Plans that are told in whole milliseconds meet by their rounding, which
+        counts as no conflict between plans ([P6], ``T_round``): who is followed at once would find no way around it.
         """
         mine = {segment: self._times(segment, owner) for segment in self._segments.get(owner, ())}
         rides = {lift_track: _rides(uses, owner) for lift_track, uses in self._uses.items()}
@@ -206,7 +206,7 @@ class Reservations(Planned):
         rides: dict[int, list[tuple[int, int]]],
         tolerance_us: int,
     ) -> set[int]:
-        """Others who have so little of the time of ``owner`` anywhere."""
+        """Others of whose windows a begin or end is left out."""
         found = set()
         for segment, times in mine.items():
             for start_us, end_us, holder in self._windows[segment]:
