@@ -1,12 +1,12 @@
 """All messages of a log, whichever bus they were on: every channel is a listener of its own with both contracts."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
-from onboard.contract.codes import Reason
-from onboard.contract.messages import Message
+from onboard.contract.codes import CONTRACT_VERSION, Reason
+from onboard.contract.messages import Heartbeat, Message
 from onboard.contract.runs import singles
 from onboard.trace.raw import RawFrame
 from onboard.wire.codec import Codecs
@@ -14,6 +14,8 @@ from onboard.wire.decoder import Decoder
 
 #: Channels of a log that are told apart; a name more is taken for one of them.
 MOST_CHANNELS = 300
+#: Machines of another contract that are named in one line.
+MOST_NAMED = 3
 
 
 class LoggedFrame(NamedTuple):
@@ -46,6 +48,8 @@ class Listener:
         self._whole = codecs.fleet.whole
         self.drops: Counter[Reason] = Counter()
         self.others: Counter[str] = Counter()
+        #: Who speaks another contract, with its number.
+        self.foreign: dict[int, int] = {}
         self._decoders: dict[str, tuple[Decoder, Decoder]] = {}
 
     def hear(self, frame: RawFrame) -> LoggedFrame:
@@ -54,6 +58,7 @@ class Listener:
             # Most frames are whole messages, and no listener needs to remember anything for those.
             message = self._whole(frame.can_id, frame.data)
             if message is not None:
+                self.note(message)
                 return _logged((frame, message, None, True))
         classic = frame.classic()
         if classic is None or classic.is_error or classic.is_remote:
@@ -71,6 +76,11 @@ class Listener:
             decoder.drops.clear()
         return LoggedFrame(frame, message, reason, is_fleet)
 
+    def note(self, message: Message) -> None:
+        """Remember who speaks another contract: layouts may be others there, and words that are no refusal wrong."""
+        if type(message) is Heartbeat and message.contract != CONTRACT_VERSION:
+            self.foreign[message.sender] = message.contract
+
     def messages(self, frames: Iterable[RawFrame]) -> Iterator[LoggedMessage]:
         """Whole messages only, in the order of the log."""
         for frame in frames:
@@ -81,7 +91,8 @@ class Listener:
 
     def lines(self) -> list[str]:
         """What came to nothing, one line for each reason."""
-        words = [f"{kind}: {count}" for kind, count in sorted(self.others.items())]
+        words = [foreign_line(self.foreign)] if self.foreign else []
+        words += [f"{kind}: {count}" for kind, count in sorted(self.others.items())]
         words += [
             f"frames that are no message ({reason.name.lower().replace('_', ' ')}): {count}"
             for reason, count in sorted(self.drops.items())
@@ -97,3 +108,11 @@ class Listener:
             fleet, device = (Decoder(codec, is_only_one=True) for codec in self.codecs)
             found = self._decoders[channel] = fleet, device
         return found
+
+
+def foreign_line(contracts: Mapping[int, int], name: Callable[[int], str] = "node {}".format) -> str:
+    """That machines speak other contracts than this program reads: which, by sender, and what to do."""
+    those = ", ".join(f"{name(node)} {number}" for node, number in sorted(contracts.items())[:MOST_NAMED])
+    more = f" and {len(contracts) - MOST_NAMED} more" if len(contracts) > MOST_NAMED else ""
+    told = f"contracts that this program does not read ({CONTRACT_VERSION} is its own): {those}{more}"
+    return f"{told}; read the log with the version that wrote it"

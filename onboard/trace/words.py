@@ -11,7 +11,7 @@ from functools import cache, lru_cache, partial
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-from onboard.contract.codes import Criterion, LegAction, Side, TokenKind
+from onboard.contract.codes import CONTRACT_VERSION, Criterion, LegAction, Side, TokenKind
 from onboard.contract.messages import Bid, CallForProposals, Leg, Message, Reference, Stamp
 from onboard.core.site import Site
 from onboard.systems.words import SiteWords, plain, words_of
@@ -157,6 +157,8 @@ class Words:
             return f"{said} {_seconds(value)}"
         if name.endswith("digest"):
             return f"{said} {value:04X}"
+        if name == "contract" and value != CONTRACT_VERSION:
+            return f"{said} {value} (this program reads {CONTRACT_VERSION})"
         return f"{said} {value}{unit_of(name)}"
 
     def _legs(self, legs: tuple[Leg, ...]) -> str:

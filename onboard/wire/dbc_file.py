@@ -42,6 +42,11 @@ class SignalLayout:
     comment: str
     choices: tuple[tuple[int, str], ...]
 
+    @property
+    def is_scaled(self) -> bool:
+        """Whether a value is another number than the raw one."""
+        return (self.scale, self.offset) != (1, 0)
+
 
 @dataclass(frozen=True, slots=True)
 class MessageLayout:

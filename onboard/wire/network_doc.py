@@ -83,7 +83,7 @@ def _value_tables() -> dict[tuple[tuple[int, str], ...], str]:
 def _values(signal: SignalLayout) -> str:
     if signal.choices:
         return _link(_table_name(signal))
-    scale = "" if (signal.scale, signal.offset) == (1, 0) else f"; raw x {signal.scale} + {signal.offset}"
+    scale = f"; raw x {signal.scale} + {signal.offset}" if signal.is_scaled else ""
     return f"{signal.minimum} to {signal.maximum}{f' {signal.unit}' if signal.unit else ''}{scale}"
 
 

@@ -16,12 +16,12 @@ from tests.protocol.examples import EXAMPLES, RUN, lines_of
 
 #: Options of `bus-sim run`, and the first 64 bits of SHA-256 over the log that it writes.
 RUNS = {
-    "level1 --random 40 15 --cars 3": "ee0308c1f884f5a4",
-    "small --random 40 15 --cars 3 --fault crash:target=MR1,at_s=80,restart_s=5": "4d0a57f691ad636f",
-    "standard --random 30 15 --cars 3": "261f63eae6dce974",
-    "large --random 30 15 --cars 2": "7e632badcedc6abc",
-    "graph --for 150": "4949031e170ebb8e",
-    "terminal --for 150": "99cccf65bcc7a6c0",
+    "level1 --random 40 15 --cars 3": "0fd471935d46b19e",
+    "small --random 40 15 --cars 3 --fault crash:target=MR1,at_s=80,restart_s=5": "db90be9e29dd2552",
+    "standard --random 30 15 --cars 3": "93fdd49284e8ecbf",
+    "large --random 30 15 --cars 2": "d0d3f159afcd2c97",
+    "graph --for 150": "45fe780274d53640",
+    "terminal --for 150": "6c05570bbffd3135",
 }
 
 

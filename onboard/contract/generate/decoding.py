@@ -157,8 +157,9 @@ def _read(word: Word, signal: SignalLayout, *, is_bool: bool) -> Iterator[str]:
         if signal.signed:
             half = f"0x{1 << signal.bits - 1:X}"
             value = f"({value} ^ {half}) - {half}" if " " not in value else f"(({value}) ^ {half}) - {half}"
-    if signal.scale != 1:
-        value = f"({value}) * {signal.scale}" if " " in value else f"{value} * {signal.scale}"
+    if signal.is_scaled:
+        value = f"({value})" if " " in value else value
+        value = f"{value} * {signal.scale}" if signal.scale != 1 else value
         value = f"{value} + {signal.offset}" if signal.offset else value
     if value != name:
         yield f"    {name} = {value}"

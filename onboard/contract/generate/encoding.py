@@ -20,9 +20,6 @@ _LETTERS = {1: "B", 2: "H", 4: "I", 8: "Q"}
 _DIGIT_BITS = 30
 #: Signals as short have a dictionary for what they add to a word: 18 kB at most.
 _TABLE_BITS = 8
-#: As few low bits of a signal have a tuple for what they add beyond a digit: a product more than one digit long takes
-#: 8 ns longer.
-_LOW_BITS = 4
 _FRAME_BYTES = 8
 #: What steps cost, in ns: least squares over the twelve likeliest cuts of every message. A word more, one of more than
 #: a digit put together, the whole frame as one number; ``&`` and ``>>``; ``*`` within a digit, to more than one and by
@@ -37,10 +34,6 @@ _CARRY_NS = 8
 _MEASURED = {
     "MissionKey": (1, 1, 4, 2),
     "OrderAnswer": (2, 1, 4, 1),
-    "Progress": (4, 4),
-    "Regeneration": (4, 4),
-    "RegenerationState": (8,),
-    "StepReport": (1, 2, 4, 1),
 }
 
 
@@ -127,7 +120,7 @@ def _carried(word: Word) -> dict[str, Piece]:
     for below, piece in pairwise(word.pieces):
         carrier = found.get(below.signal.name, below)
         signal = carrier.signal
-        can_carry = not (signal.signed or signal.choices or signal.scale != 1 or _is_from_table(word, carrier))
+        can_carry = not (signal.signed or signal.choices or signal.is_scaled or _is_from_table(word, carrier))
         is_next = piece.at == below.at + below.bits and carrier.has_sign
         if is_next and can_carry and piece.signal.choices == YES_NO:
             found[piece.signal.name] = carrier
@@ -178,7 +171,7 @@ def _piece_cost(word: Word, piece: Piece) -> int:
 def _is_free(signal: SignalLayout, *, is_low: bool) -> bool:
     """Whether one end of a signal's range is that of its bits."""
     low = -(1 << signal.bits - 1) if signal.signed else 0
-    if signal.scale != 1 or signal.offset:
+    if signal.is_scaled:
         return False
     return signal.minimum == low if is_low else signal.maximum == low + (1 << signal.bits) - 1
 
@@ -186,7 +179,7 @@ def _is_free(signal: SignalLayout, *, is_low: bool) -> bool:
 def _is_from_table(word: Word, piece: Piece) -> bool:
     """Whether a dictionary has what a piece adds to its word: it takes the place of a product and of a check."""
     signal = piece.signal
-    is_small = piece.is_whole and piece.bits <= _TABLE_BITS and not signal.signed and signal.scale == 1
+    is_small = piece.is_whole and piece.bits <= _TABLE_BITS and not signal.signed and not signal.is_scaled
     return is_small and piece.at > 0 and not signal.choices and (word.is_number or word.closing is not signal)
 
 
@@ -198,22 +191,10 @@ def _table(piece: Piece) -> tuple[str, str]:
     return name, f"{{value: value << {piece.at} for value in range({ends})}}"
 
 
-def _is_low_end(piece: Piece) -> bool:
-    """Whether a tuple has what the low bits of a signal add to a word that they take beyond a digit."""
-    is_short = not piece.first and not piece.has_sign and piece.bits <= _LOW_BITS
-    return is_short and piece.at < _DIGIT_BITS < piece.at + piece.bits and piece.signal.scale == 1
-
-
-def _low_table(piece: Piece) -> tuple[str, str]:
-    """Name and value of that tuple."""
-    size = 1 << piece.bits
-    return f"_LOW_{piece.bits}_AT_{piece.at}", f"tuple(value << {piece.at} for value in range({size}))"
-
-
 def _is_fixed(word: Word, piece: Piece) -> bool:
     """Whether a piece needs no product: it comes out of a table, or is yes or no above the lowest bit."""
     is_yes_no = piece.signal.choices == YES_NO and piece.at > 0
-    return is_yes_no or _is_from_table(word, piece) or _is_low_end(piece)
+    return is_yes_no or _is_from_table(word, piece)
 
 
 class _Lines:
@@ -226,6 +207,8 @@ class _Lines:
         self.names: dict[str, str] = {}
         #: Signals whose range, or one end of it, is not checked before they are packed.
         self.late: list[str] = []
+        #: Signals whose name has the raw number already.
+        self.scaled: set[str] = set()
         self.carried = {name: one for word in self.words for name, one in _carried(word).items()}
         for field in frame.fields:
             self._take(field)
@@ -251,12 +234,13 @@ class _Lines:
                 continue
             self.names[signal.name] = signal.name
             self.body.append(f"    {signal.name} = {source}")
-            if is_turned and checks and signal.scale == 1:
+            if is_turned and checks and not signal.is_scaled:
                 self.body += self._turned(signal)
                 continue
             self.body += checks
-            if signal.scale != 1 and len(pieces) > 1:
+            if signal.is_scaled and (len(pieces) > 1 or is_turned):
                 self.body.append(f"    {signal.name} = {_scaled(signal, signal.name)}")
+                self.scaled.add(signal.name)
             if is_turned:
                 self.body += [f"    if {signal.name} < 0:", f"        {signal.name} += 0x{1 << signal.bits:X}"]
 
@@ -333,8 +317,6 @@ class _Lines:
 
     def _fixed(self, piece: Piece) -> str:
         name = self.names[piece.signal.name]
-        if _is_low_end(piece):
-            return f"{_low_table(piece)[0]}[{name} & 0x{(1 << piece.bits) - 1:X}]"
         if piece.signal.choices:
             return f"(0x{1 << piece.at:X} if {name} else 0)"
         return f"{_table(piece)[0]}[{name}]"
@@ -344,19 +326,19 @@ class _Lines:
         signal = piece.signal
         name = self.names[signal.name]
         if piece.is_whole:
-            term = _scaled(signal, name)
+            term = name if signal.name in self.scaled else _scaled(signal, name)
             return f"({term})" if term != name and len(word.pieces) > 1 else term
         term = f"{name} >> {piece.first}" if piece.first else name
         if not piece.has_sign:
             term += f" & 0x{(1 << piece.bits) - 1:X}"
-        return f"({term})" if len(word.pieces) > 1 else term
+        # A product binds closer than the mask.
+        return f"({term})" if len(word.pieces) > 1 or piece.at else term
 
 
 def _scaled(signal: SignalLayout, name: str) -> str:
     """What a signal holds of a value."""
-    if signal.scale == 1:
-        return name
-    return f"({name} - {signal.offset}) // {signal.scale}" if signal.offset else f"{name} // {signal.scale}"
+    number = f"({name} - {signal.offset})" if signal.offset else name
+    return f"{number} // {signal.scale}" if signal.scale != 1 else number
 
 
 def _times(term: str, shift: int) -> str:
@@ -380,7 +362,6 @@ def tools(frame: DbcMessage) -> set[tuple[str, str]]:
     """Names and values of what a frame's function uses."""
     cut = words(frame)
     found = {_table(piece) for word in cut for piece in word.pieces if _is_from_table(word, piece)}
-    found |= {_low_table(piece) for word in cut for piece in word.pieces if _is_low_end(piece)}
     needs_none = any(word.is_number for word in cut) or not any(word.pieces for word in cut)
     return found if needs_none else found | {_packer(cut)}
 

@@ -12,38 +12,34 @@ _FROM_0_TO_1_AT_46 = {value: value << 46 for value in range(2)}
 _FROM_0_TO_250_AT_38 = {value: value << 38 for value in range(251)}
 _FROM_0_TO_255_AT_22 = {value: value << 22 for value in range(256)}
 _FROM_0_TO_255_AT_30 = {value: value << 30 for value in range(256)}
-_FROM_0_TO_255_AT_38 = {value: value << 38 for value in range(256)}
-_FROM_0_TO_255_AT_50 = {value: value << 50 for value in range(256)}
 _PACK_BBHI = struct.Struct("<BBHI").pack
+_PACK_BHBHH = struct.Struct("<BHBHH").pack
+_PACK_HBBI = struct.Struct("<HBBI").pack
+_PACK_HHI = struct.Struct("<HHI").pack
 _PACK_IXXXX = struct.Struct("<Ixxxx").pack
+_UNPACK_HBBI = struct.Struct("<HBBI").unpack_from
+_UNPACK_HHI = struct.Struct("<HHI").unpack_from
+_UNPACK_IHH = struct.Struct("<IHH").unpack_from
 _UNPACK_IXXXX = struct.Struct("<Ixxxx").unpack_from
 _UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_step_round(message: StepRound) -> bytes:
     step = message.step
-    if step < 0 or step > 4194303:
+    if step > 4194303:
         raise OutOfRangeError("StepRound.step", step, 0, 4194303)
-    open_tasks = message.open_tasks
-    if open_tasks < 0 or open_tasks > 65535:
-        raise OutOfRangeError("StepRound.open_tasks", open_tasks, 0, 65535)
     try:
-        return (
-            step
-            + open_tasks * 0x400000
-            + _FROM_0_TO_255_AT_38[message.attempt]
-            + (0x400000000000 if message.bidding else 0)
-        ).to_bytes(8, "little")
-    except KeyError as error:
-        raise refusal(message, ("StepRound.attempt", 0, 255)) from error
+        return _PACK_HBBI(message.open_tasks, message.attempt, message.bidding, step)
+    except struct.error as error:
+        raise refusal(
+            message, ("StepRound.step", 0, 4194303), ("StepRound.open_tasks", 0, 65535), ("StepRound.attempt", 0, 255)
+        ) from error
 
 
 def unpack_step_round(sender: int, data: bytes) -> StepRound | None:
-    (word_0,) = _UNPACK_Q(data)
-    step = word_0 & 0x3FFFFF
-    open_tasks = word_0 >> 22 & 0xFFFF
-    attempt = word_0 >> 38 & 0xFF
-    return StepRound(sender, step, open_tasks, attempt, word_0 & 0x400000000000 != 0)
+    open_tasks, attempt, bidding, step = _UNPACK_HBBI(data)
+    step = step & 0x3FFFFF
+    return StepRound(sender, step, open_tasks, attempt, bidding & 0x1 != 0)
 
 
 def pack_step_turn(message: StepTurn) -> bytes:
@@ -102,31 +98,29 @@ def pack_path_head(message: PathHead) -> bytes:
     if step < 0 or step > 4194303:
         raise OutOfRangeError("PathHead.step", step, 0, 4194303)
     cell = message.cell
-    if cell < 0 or cell > 63999:
+    if cell > 63999:
         raise OutOfRangeError("PathHead.cell", cell, 0, 63999)
     moves = message.moves
-    if moves < 0 or moves > 4095:
+    if moves > 4095:
         raise OutOfRangeError("PathHead.moves", moves, 0, 4095)
+    if message.kept:
+        step += 0x400000
     try:
-        return (
-            step
-            + (cell + moves * 0x10000) * 0x400000
-            + _FROM_0_TO_255_AT_50[message.version]
-            + (0x400000000000000 if message.kept else 0)
-        ).to_bytes(8, "little")
-    except KeyError as error:
-        raise refusal(message, ("PathHead.version", 0, 255)) from error
+        return _PACK_BHBHH(step & 0xFF, (step >> 8), message.version, cell, moves)
+    except struct.error as error:
+        raise refusal(
+            message, ("PathHead.cell", 0, 63999), ("PathHead.moves", 0, 4095), ("PathHead.version", 0, 255)
+        ) from error
 
 
 def unpack_path_head(sender: int, data: bytes) -> PathHead | None:
-    (word_0,) = _UNPACK_Q(data)
+    word_0, cell, moves = _UNPACK_IHH(data)
     step = word_0 & 0x3FFFFF
-    cell = word_0 >> 22 & 0xFFFF
+    version = word_0 >> 24
     if cell > 63999:
         return None
-    moves = word_0 >> 38 & 0xFFF
-    version = word_0 >> 50 & 0xFF
-    return PathHead(sender, step, cell, moves, version, word_0 & 0x400000000000000 != 0)
+    moves = moves & 0xFFF
+    return PathHead(sender, step, cell, moves, version, word_0 & 0x400000 != 0)
 
 
 def pack_path_moves(message: PathMoves) -> bytes:
@@ -152,26 +146,24 @@ def pack_step_state(message: StepState) -> bytes:
     if step < 0 or step > 4194303:
         raise OutOfRangeError("StepState.step", step, 0, 4194303)
     cell = message.cell
-    if cell < 0 or cell > 63999:
+    if cell > 63999:
         raise OutOfRangeError("StepState.cell", cell, 0, 63999)
-    task = message.task
-    if task < 0 or task > 65535:
-        raise OutOfRangeError("StepState.task", task, 0, 65535)
     if message.loaded:
-        task += 0x10000
+        step += 0x400000
     if message.served:
-        task += 0x20000
-    return (step + cell * 0x400000 + (task << 38)).to_bytes(8, "little")
+        step += 0x800000
+    try:
+        return _PACK_HHI(cell, message.task, step)
+    except struct.error as error:
+        raise refusal(message, ("StepState.cell", 0, 63999), ("StepState.task", 0, 65535)) from error
 
 
 def unpack_step_state(sender: int, data: bytes) -> StepState | None:
-    (word_0,) = _UNPACK_Q(data)
-    step = word_0 & 0x3FFFFF
-    cell = word_0 >> 22 & 0xFFFF
+    cell, task, word_4 = _UNPACK_HHI(data)
     if cell > 63999:
         return None
-    task = word_0 >> 38 & 0xFFFF
-    return StepState(sender, step, cell, task, word_0 & 0x40000000000000 != 0, word_0 & 0x80000000000000 != 0)
+    step = word_4 & 0x3FFFFF
+    return StepState(sender, step, cell, task, word_4 & 0x400000 != 0, word_4 & 0x800000 != 0)
 
 
 #: Every frame of this module.
@@ -198,4 +190,4 @@ FRAMES = (
     ),
 )
 #: CRC-32 over this system's DBC: part of the digest of its sites (docs/site-file.md).
-WORDS = 0x1B29B942
+WORDS = 0xC515DC35

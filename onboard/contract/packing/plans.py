@@ -25,25 +25,21 @@ _LEG_ACTION = tuple(LegAction)
 _REASON = tuple(Reason)
 _SIDE = tuple(Side)
 _TASK_PHASE = tuple(TaskPhase)
-_FROM_0_TO_255_AT_21 = {value: value << 21 for value in range(256)}
 _FROM_0_TO_30_AT_2 = {value: value << 2 for value in range(31)}
-_FROM_0_TO_31_AT_8 = {value: value << 8 for value in range(32)}
-_FROM_1_TO_254_AT_13 = {value: value << 13 for value in range(1, 255)}
-_LOW_3_AT_29 = tuple(value << 29 for value in range(8))
 _PACK_BBBBBBH = struct.Struct("<BBBBBBH").pack
+_PACK_BBBBSHSH = struct.Struct("<BBBBhh").pack
 _PACK_BBBBXXXX = struct.Struct("<BBBBxxxx").pack
 _PACK_BBHXXXX = struct.Struct("<BBHxxxx").pack
 _PACK_BBIBB = struct.Struct("<BBIBB").pack
 _PACK_BHHHB = struct.Struct("<BHHHB").pack
 _PACK_BHIX = struct.Struct("<BHIx").pack
-_PACK_II = struct.Struct("<II").pack
 _UNPACK_BBBBI = struct.Struct("<BBBBI").unpack_from
+_UNPACK_BBBBSHSH = struct.Struct("<BBBBhh").unpack_from
 _UNPACK_BBBBXXXX = struct.Struct("<BBBBxxxx").unpack_from
 _UNPACK_BBBXXXXX = struct.Struct("<BBBxxxxx").unpack_from
 _UNPACK_BBIBB = struct.Struct("<BBIBB").unpack_from
 _UNPACK_BHHHB = struct.Struct("<BHHHB").unpack_from
 _UNPACK_BHIX = struct.Struct("<BHIx").unpack_from
-_UNPACK_Q = struct.Struct("<Q").unpack_from
 
 
 def pack_itinerary_head(message: ItineraryHead) -> bytes:
@@ -118,48 +114,32 @@ def unpack_itinerary_leg(sender: int, data: bytes) -> ItineraryLeg | None:
 
 
 def pack_progress(message: Progress) -> bytes:
-    itinerary_version = message.itinerary_version
-    if itinerary_version < 0 or itinerary_version > 255:
-        raise OutOfRangeError("Progress.itinerary_version", itinerary_version, 0, 255)
-    offset_mm = message.offset_mm
-    if offset_mm < 0:
-        if offset_mm < -32768:
-            raise OutOfRangeError("Progress.offset_mm", offset_mm, -32768, 32767)
-        offset_mm += 0x10000
-    elif offset_mm > 32767:
-        raise OutOfRangeError("Progress.offset_mm", offset_mm, -32768, 32767)
-    speed_mm_s = message.speed_mm_s
-    if speed_mm_s < 0:
-        if speed_mm_s < -32768:
-            raise OutOfRangeError("Progress.speed_mm_s", speed_mm_s, -32768, 32767)
-        speed_mm_s += 0x10000
-    elif speed_mm_s > 32767:
-        raise OutOfRangeError("Progress.speed_mm_s", speed_mm_s, -32768, 32767)
+    leg = message.leg
+    if leg > 31:
+        raise OutOfRangeError("Progress.leg", leg, 0, 31)
+    track = message.track
+    if track < 1 or track > 254:
+        raise OutOfRangeError("Progress.track", track, 1, 254)
     try:
-        return _PACK_II(
-            itinerary_version
-            + _FROM_0_TO_31_AT_8[message.leg]
-            + _FROM_1_TO_254_AT_13[message.track]
-            + _FROM_0_TO_255_AT_21[message.index]
-            + _LOW_3_AT_29[offset_mm & 0x7],
-            (offset_mm >> 3) + speed_mm_s * 0x2000,
+        return _PACK_BBBBSHSH(
+            message.itinerary_version, track, message.index, leg, message.offset_mm, message.speed_mm_s
         )
-    except (KeyError, struct.error) as error:
+    except struct.error as error:
         raise refusal(
-            message, ("Progress.leg", 0, 31), ("Progress.track", 1, 254), ("Progress.index", 0, 255)
+            message,
+            ("Progress.itinerary_version", 0, 255),
+            ("Progress.leg", 0, 31),
+            ("Progress.index", 0, 255),
+            ("Progress.offset_mm", -32768, 32767),
+            ("Progress.speed_mm_s", -32768, 32767),
         ) from error
 
 
 def unpack_progress(sender: int, data: bytes) -> Progress | None:
-    (word_0,) = _UNPACK_Q(data)
-    itinerary_version = word_0 & 0xFF
-    leg = word_0 >> 8 & 0x1F
-    track = word_0 >> 13 & 0xFF
+    itinerary_version, track, index, leg, offset_mm, speed_mm_s = _UNPACK_BBBBSHSH(data)
     if track < 1 or track > 254:
         return None
-    index = word_0 >> 21 & 0xFF
-    offset_mm = ((word_0 >> 29 & 0xFFFF) ^ 0x8000) - 0x8000
-    speed_mm_s = ((word_0 >> 45 & 0xFFFF) ^ 0x8000) - 0x8000
+    leg = leg & 0x1F
     return Progress(sender, itinerary_version, leg, track, index, offset_mm, speed_mm_s)
 
 

@@ -23,40 +23,40 @@ from onboard.contract.rights import (
 _REASON = tuple(Reason)
 _REGENERATION_PHASE = tuple(RegenerationPhase)
 _TOKEN_KIND = tuple(TokenKind)
-_FROM_0_TO_250_AT_12 = {value: value << 12 for value in range(251)}
-_FROM_0_TO_250_AT_20 = {value: value << 20 for value in range(251)}
-_FROM_0_TO_255_AT_4 = {value: value << 4 for value in range(256)}
-_FROM_1_TO_255_AT_4 = {value: value << 4 for value in range(1, 256)}
-_FROM_1_TO_255_AT_56 = {value: value << 56 for value in range(1, 256)}
-_LOW_4_AT_28 = tuple(value << 28 for value in range(16))
-_PACK_IHBB = struct.Struct("<IHBB").pack
+_PACK_BHBBHB = struct.Struct("<BHBBHB").pack
+_PACK_HHBBBB = struct.Struct("<HHBBBB").pack
+_PACK_HHBBH = struct.Struct("<HHBBH").pack
+_PACK_IBHB = struct.Struct("<IBHB").pack
 _PACK_II = struct.Struct("<II").pack
-_UNPACK_Q = struct.Struct("<Q").unpack_from
+_UNPACK_HHBBBB = struct.Struct("<HHBBBB").unpack_from
+_UNPACK_HHBBBX = struct.Struct("<HHBBBx").unpack_from
+_UNPACK_II = struct.Struct("<II").unpack_from
 
 
 def pack_token_grant(message: TokenGrant) -> bytes:
     token = message.token
-    if token < 0 or token > 16777215:
-        raise OutOfRangeError("TokenGrant.token", token, 0, 16777215)
-    version = message.version
-    if version < 0 or version > 268435455:
-        raise OutOfRangeError("TokenGrant.version", version, 0, 268435455)
+    holder = message.holder
+    if holder < 1:
+        raise OutOfRangeError("TokenGrant.holder", holder, 1, 255)
     try:
-        return (
-            message.token_kind + token * 0x10 + version * 0x10000000 + _FROM_1_TO_255_AT_56[message.holder]
-        ).to_bytes(8, "little")
-    except (KeyError, OverflowError) as error:
-        raise refusal(message, ("TokenGrant.holder", 1, 255)) from error
+        return _PACK_IBHB(message.token_kind + message.version * 0x10, token & 0xFF, token >> 8, holder)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("TokenGrant.token", 0, 16777215),
+            ("TokenGrant.version", 0, 268435455),
+            ("TokenGrant.holder", 1, 255),
+        ) from error
 
 
 def unpack_token_grant(sender: int, data: bytes) -> TokenGrant | None:
-    (word_0,) = _UNPACK_Q(data)
+    word_0, word_4 = _UNPACK_II(data)
     token_kind = word_0 & 0xF
     if token_kind > 4:
         return None
-    token = word_0 >> 4 & 0xFFFFFF
-    version = word_0 >> 28 & 0xFFFFFFF
-    holder = word_0 >> 56
+    version = word_0 >> 4
+    token = word_4 & 0xFFFFFF
+    holder = word_4 >> 24
     if holder < 1:
         return None
     return TokenGrant(sender, _TOKEN_KIND[token_kind], token, version, holder)
@@ -64,54 +64,59 @@ def unpack_token_grant(sender: int, data: bytes) -> TokenGrant | None:
 
 def pack_token_held(message: TokenHeld) -> bytes:
     token = message.token
-    if token < 0 or token > 16777215:
+    if token > 16777215:
         raise OutOfRangeError("TokenHeld.token", token, 0, 16777215)
-    version = message.version
-    if version > 268435455:
-        raise OutOfRangeError("TokenHeld.version", version, 0, 268435455)
     try:
-        return (message.token_kind + token * 0x10 + version * 0x10000000).to_bytes(8, "little")
-    except OverflowError as error:
-        raise refusal(message, ("TokenHeld.version", 0, 268435455)) from error
+        return _PACK_II(message.token_kind + message.version * 0x10, token)
+    except struct.error as error:
+        raise refusal(message, ("TokenHeld.token", 0, 16777215), ("TokenHeld.version", 0, 268435455)) from error
 
 
 def unpack_token_held(sender: int, data: bytes) -> TokenHeld | None:
-    (word_0,) = _UNPACK_Q(data)
+    word_0, token = _UNPACK_II(data)
     token_kind = word_0 & 0xF
     if token_kind > 4:
         return None
-    token = word_0 >> 4 & 0xFFFFFF
-    version = word_0 >> 28 & 0xFFFFFFF
+    version = word_0 >> 4
+    token = token & 0xFFFFFF
     return TokenHeld(sender, _TOKEN_KIND[token_kind], token, version)
 
 
 def pack_token_refusal(message: TokenRefusal) -> bytes:
     token = message.token
-    if token < 0 or token > 16777215:
-        raise OutOfRangeError("TokenRefusal.token", token, 0, 16777215)
     version = message.version
     requester = message.requester
     if requester < 1:
         raise OutOfRangeError("TokenRefusal.requester", requester, 1, 255)
     try:
-        return _PACK_IHBB(
-            message.token_kind + token * 0x10 + _LOW_4_AT_28[version & 0xF], version >> 4, requester, message.reason
+        return _PACK_BHBBHB(
+            message.token_kind + (version & 0xF) * 0x10,
+            version >> 4,
+            requester,
+            token & 0xFF,
+            token >> 8,
+            message.reason,
         )
     except struct.error as error:
-        raise refusal(message, ("TokenRefusal.version", 0, 1048575), ("TokenRefusal.requester", 1, 255)) from error
+        raise refusal(
+            message,
+            ("TokenRefusal.token", 0, 16777215),
+            ("TokenRefusal.version", 0, 1048575),
+            ("TokenRefusal.requester", 1, 255),
+        ) from error
 
 
 def unpack_token_refusal(sender: int, data: bytes) -> TokenRefusal | None:
-    (word_0,) = _UNPACK_Q(data)
+    word_0, word_4 = _UNPACK_II(data)
     token_kind = word_0 & 0xF
     if token_kind > 4:
         return None
-    token = word_0 >> 4 & 0xFFFFFF
-    version = word_0 >> 28 & 0xFFFFF
-    requester = word_0 >> 48 & 0xFF
+    version = word_0 >> 4 & 0xFFFFF
+    requester = word_0 >> 24
     if requester < 1:
         return None
-    reason = word_0 >> 56
+    token = word_4 & 0xFFFFFF
+    reason = word_4 >> 24
     if reason > 47:
         return None
     return TokenRefusal(sender, _TOKEN_KIND[token_kind], token, version, requester, _REASON[reason])
@@ -119,19 +124,20 @@ def unpack_token_refusal(sender: int, data: bytes) -> TokenRefusal | None:
 
 def pack_token_request(message: TokenRequest) -> bytes:
     token = message.token
-    if token < 0 or token > 16777215:
-        raise OutOfRangeError("TokenRequest.token", token, 0, 16777215)
     version_seen = message.version_seen
     try:
-        return _PACK_IHBB(
-            message.token_kind + token * 0x10 + _LOW_4_AT_28[version_seen & 0xF],
+        return _PACK_BHBBHB(
+            message.token_kind + (version_seen & 0xF) * 0x10,
             version_seen >> 4,
             message.itinerary_version,
+            token & 0xFF,
+            token >> 8,
             message.predecessor,
         )
     except struct.error as error:
         raise refusal(
             message,
+            ("TokenRequest.token", 0, 16777215),
             ("TokenRequest.version_seen", 0, 1048575),
             ("TokenRequest.itinerary_version", 0, 255),
             ("TokenRequest.predecessor", 0, 255),
@@ -139,40 +145,41 @@ def pack_token_request(message: TokenRequest) -> bytes:
 
 
 def unpack_token_request(sender: int, data: bytes) -> TokenRequest | None:
-    (word_0,) = _UNPACK_Q(data)
+    word_0, word_4 = _UNPACK_II(data)
     token_kind = word_0 & 0xF
     if token_kind > 4:
         return None
-    token = word_0 >> 4 & 0xFFFFFF
-    version_seen = word_0 >> 28 & 0xFFFFF
-    itinerary_version = word_0 >> 48 & 0xFF
-    predecessor = word_0 >> 56
+    version_seen = word_0 >> 4 & 0xFFFFF
+    itinerary_version = word_0 >> 24
+    token = word_4 & 0xFFFFFF
+    predecessor = word_4 >> 24
     return TokenRequest(sender, _TOKEN_KIND[token_kind], token, version_seen, itinerary_version, predecessor)
 
 
 def pack_token_dispute(message: TokenDispute) -> bytes:
     token = message.token
-    if token < 0 or token > 16777215:
-        raise OutOfRangeError("TokenDispute.token", token, 0, 16777215)
-    version = message.version
-    if version < 0 or version > 268435455:
-        raise OutOfRangeError("TokenDispute.version", version, 0, 268435455)
+    believed = message.believed
+    if believed < 1:
+        raise OutOfRangeError("TokenDispute.believed", believed, 1, 255)
     try:
-        return (
-            message.token_kind + token * 0x10 + version * 0x10000000 + _FROM_1_TO_255_AT_56[message.believed]
-        ).to_bytes(8, "little")
-    except (KeyError, OverflowError) as error:
-        raise refusal(message, ("TokenDispute.believed", 1, 255)) from error
+        return _PACK_IBHB(message.token_kind + message.version * 0x10, token & 0xFF, token >> 8, believed)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("TokenDispute.token", 0, 16777215),
+            ("TokenDispute.version", 0, 268435455),
+            ("TokenDispute.believed", 1, 255),
+        ) from error
 
 
 def unpack_token_dispute(sender: int, data: bytes) -> TokenDispute | None:
-    (word_0,) = _UNPACK_Q(data)
+    word_0, word_4 = _UNPACK_II(data)
     token_kind = word_0 & 0xF
     if token_kind > 4:
         return None
-    token = word_0 >> 4 & 0xFFFFFF
-    version = word_0 >> 28 & 0xFFFFFFF
-    believed = word_0 >> 56
+    version = word_0 >> 4
+    token = word_4 & 0xFFFFFF
+    believed = word_4 >> 24
     if believed < 1:
         return None
     return TokenDispute(sender, _TOKEN_KIND[token_kind], token, version, believed)
@@ -180,27 +187,28 @@ def unpack_token_dispute(sender: int, data: bytes) -> TokenDispute | None:
 
 def pack_token_given(message: TokenGiven) -> bytes:
     token = message.token
-    if token < 0 or token > 16777215:
-        raise OutOfRangeError("TokenGiven.token", token, 0, 16777215)
-    version = message.version
-    if version < 0 or version > 268435455:
-        raise OutOfRangeError("TokenGiven.version", version, 0, 268435455)
+    holder = message.holder
+    if holder < 1:
+        raise OutOfRangeError("TokenGiven.holder", holder, 1, 255)
     try:
-        return (
-            message.token_kind + token * 0x10 + version * 0x10000000 + _FROM_1_TO_255_AT_56[message.holder]
-        ).to_bytes(8, "little")
-    except (KeyError, OverflowError) as error:
-        raise refusal(message, ("TokenGiven.holder", 1, 255)) from error
+        return _PACK_IBHB(message.token_kind + message.version * 0x10, token & 0xFF, token >> 8, holder)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("TokenGiven.token", 0, 16777215),
+            ("TokenGiven.version", 0, 268435455),
+            ("TokenGiven.holder", 1, 255),
+        ) from error
 
 
 def unpack_token_given(sender: int, data: bytes) -> TokenGiven | None:
-    (word_0,) = _UNPACK_Q(data)
+    word_0, word_4 = _UNPACK_II(data)
     token_kind = word_0 & 0xF
     if token_kind > 4:
         return None
-    token = word_0 >> 4 & 0xFFFFFF
-    version = word_0 >> 28 & 0xFFFFFFF
-    holder = word_0 >> 56
+    version = word_0 >> 4
+    token = word_4 & 0xFFFFFF
+    holder = word_4 >> 24
     if holder < 1:
         return None
     return TokenGiven(sender, _TOKEN_KIND[token_kind], token, version, holder)
@@ -208,27 +216,25 @@ def unpack_token_given(sender: int, data: bytes) -> TokenGiven | None:
 
 def pack_token_seen(message: TokenSeen) -> bytes:
     token = message.token
-    if token < 0 or token > 16777215:
-        raise OutOfRangeError("TokenSeen.token", token, 0, 16777215)
-    version = message.version
-    if version < 0 or version > 268435455:
-        raise OutOfRangeError("TokenSeen.version", version, 0, 268435455)
+    holder = message.holder
+    if holder < 1:
+        raise OutOfRangeError("TokenSeen.holder", holder, 1, 255)
     try:
-        return (
-            message.token_kind + token * 0x10 + version * 0x10000000 + _FROM_1_TO_255_AT_56[message.holder]
-        ).to_bytes(8, "little")
-    except (KeyError, OverflowError) as error:
-        raise refusal(message, ("TokenSeen.holder", 1, 255)) from error
+        return _PACK_IBHB(message.token_kind + message.version * 0x10, token & 0xFF, token >> 8, holder)
+    except struct.error as error:
+        raise refusal(
+            message, ("TokenSeen.token", 0, 16777215), ("TokenSeen.version", 0, 268435455), ("TokenSeen.holder", 1, 255)
+        ) from error
 
 
 def unpack_token_seen(sender: int, data: bytes) -> TokenSeen | None:
-    (word_0,) = _UNPACK_Q(data)
+    word_0, word_4 = _UNPACK_II(data)
     token_kind = word_0 & 0xF
     if token_kind > 4:
         return None
-    token = word_0 >> 4 & 0xFFFFFF
-    version = word_0 >> 28 & 0xFFFFFFF
-    holder = word_0 >> 56
+    version = word_0 >> 4
+    token = word_4 & 0xFFFFFF
+    holder = word_4 >> 24
     if holder < 1:
         return None
     return TokenSeen(sender, _TOKEN_KIND[token_kind], token, version, holder)
@@ -236,105 +242,88 @@ def unpack_token_seen(sender: int, data: bytes) -> TokenSeen | None:
 
 def pack_token_assigned(message: TokenAssigned) -> bytes:
     token = message.token
-    if token < 0 or token > 16777215:
-        raise OutOfRangeError("TokenAssigned.token", token, 0, 16777215)
-    version = message.version
-    if version < 0 or version > 268435455:
-        raise OutOfRangeError("TokenAssigned.version", version, 0, 268435455)
+    holder = message.holder
+    if holder < 1:
+        raise OutOfRangeError("TokenAssigned.holder", holder, 1, 255)
     try:
-        return (
-            message.token_kind + token * 0x10 + version * 0x10000000 + _FROM_1_TO_255_AT_56[message.holder]
-        ).to_bytes(8, "little")
-    except (KeyError, OverflowError) as error:
-        raise refusal(message, ("TokenAssigned.holder", 1, 255)) from error
+        return _PACK_IBHB(message.token_kind + message.version * 0x10, token & 0xFF, token >> 8, holder)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("TokenAssigned.token", 0, 16777215),
+            ("TokenAssigned.version", 0, 268435455),
+            ("TokenAssigned.holder", 1, 255),
+        ) from error
 
 
 def unpack_token_assigned(sender: int, data: bytes) -> TokenAssigned | None:
-    (word_0,) = _UNPACK_Q(data)
+    word_0, word_4 = _UNPACK_II(data)
     token_kind = word_0 & 0xF
     if token_kind > 4:
         return None
-    token = word_0 >> 4 & 0xFFFFFF
-    version = word_0 >> 28 & 0xFFFFFFF
-    holder = word_0 >> 56
+    version = word_0 >> 4
+    token = word_4 & 0xFFFFFF
+    holder = word_4 >> 24
     if holder < 1:
         return None
     return TokenAssigned(sender, _TOKEN_KIND[token_kind], token, version, holder)
 
 
 def pack_regeneration(message: Regeneration) -> bytes:
-    tokens = message.tokens
-    if tokens < 0 or tokens > 65535:
-        raise OutOfRangeError("Regeneration.tokens", tokens, 0, 65535)
-    digest = message.digest
-    if digest > 65535:
-        raise OutOfRangeError("Regeneration.digest", digest, 0, 65535)
+    epoch = message.epoch
+    if epoch < 1:
+        raise OutOfRangeError("Regeneration.epoch", epoch, 1, 255)
+    lost = message.lost
+    if lost > 250:
+        raise OutOfRangeError("Regeneration.lost", lost, 0, 250)
+    absent = message.absent
+    if absent > 250:
+        raise OutOfRangeError("Regeneration.absent", absent, 0, 250)
     try:
-        return _PACK_II(
-            message.regeneration_phase
-            + _FROM_1_TO_255_AT_4[message.epoch]
-            + _FROM_0_TO_250_AT_12[message.lost]
-            + _FROM_0_TO_250_AT_20[message.absent]
-            + _LOW_4_AT_28[tokens & 0xF],
-            (tokens >> 4) + digest * 0x1000,
-        )
-    except (KeyError, struct.error) as error:
+        return _PACK_HHBBBB(message.tokens, message.digest, epoch, lost, absent, message.regeneration_phase)
+    except struct.error as error:
         raise refusal(
             message,
             ("Regeneration.epoch", 1, 255),
             ("Regeneration.lost", 0, 250),
             ("Regeneration.absent", 0, 250),
+            ("Regeneration.tokens", 0, 65535),
             ("Regeneration.digest", 0, 65535),
         ) from error
 
 
 def unpack_regeneration(sender: int, data: bytes) -> Regeneration | None:
-    (word_0,) = _UNPACK_Q(data)
-    regeneration_phase = word_0 & 0xF
-    if regeneration_phase > 5:
-        return None
-    epoch = word_0 >> 4 & 0xFF
+    tokens, digest, epoch, lost, absent, regeneration_phase = _UNPACK_HHBBBB(data)
     if epoch < 1:
         return None
-    lost = word_0 >> 12 & 0xFF
     if lost > 250:
         return None
-    absent = word_0 >> 20 & 0xFF
     if absent > 250:
         return None
-    tokens = word_0 >> 28 & 0xFFFF
-    digest = word_0 >> 44 & 0xFFFF
+    regeneration_phase = regeneration_phase & 0xF
+    if regeneration_phase > 5:
+        return None
     return Regeneration(sender, _REGENERATION_PHASE[regeneration_phase], epoch, lost, absent, tokens, digest)
 
 
 def pack_regeneration_state(message: RegenerationState) -> bytes:
-    tokens = message.tokens
-    if tokens < 0 or tokens > 65535:
-        raise OutOfRangeError("RegenerationState.tokens", tokens, 0, 65535)
-    digest = message.digest
-    if digest < 0 or digest > 65535:
-        raise OutOfRangeError("RegenerationState.digest", digest, 0, 65535)
     try:
-        return (
-            message.regeneration_phase
-            + _FROM_0_TO_255_AT_4[message.epoch]
-            + tokens * 0x1000
-            + (digest + message.reason * 0x10000) * 0x10000000
-        ).to_bytes(8, "little")
-    except KeyError as error:
-        raise refusal(message, ("RegenerationState.epoch", 0, 255)) from error
+        return _PACK_HHBBH(message.tokens, message.digest, message.epoch, message.reason, message.regeneration_phase)
+    except struct.error as error:
+        raise refusal(
+            message,
+            ("RegenerationState.epoch", 0, 255),
+            ("RegenerationState.tokens", 0, 65535),
+            ("RegenerationState.digest", 0, 65535),
+        ) from error
 
 
 def unpack_regeneration_state(sender: int, data: bytes) -> RegenerationState | None:
-    (word_0,) = _UNPACK_Q(data)
-    regeneration_phase = word_0 & 0xF
-    if regeneration_phase > 5:
-        return None
-    epoch = word_0 >> 4 & 0xFF
-    tokens = word_0 >> 12 & 0xFFFF
-    digest = word_0 >> 28 & 0xFFFF
-    reason = word_0 >> 44 & 0xFF
+    tokens, digest, epoch, reason, regeneration_phase = _UNPACK_HHBBBX(data)
     if reason > 47:
+        return None
+    regeneration_phase = regeneration_phase & 0xF
+    if regeneration_phase > 5:
         return None
     return RegenerationState(sender, _REGENERATION_PHASE[regeneration_phase], epoch, tokens, digest, _REASON[reason])
 

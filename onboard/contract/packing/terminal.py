@@ -22,17 +22,17 @@ from onboard.contract.terminal import (
 _new = tuple.__new__
 _ACTION = tuple(Action)
 _STEP_RESULT = tuple(StepResult)
-_FROM_0_TO_255_AT_21 = {value: value << 21 for value in range(256)}
-_FROM_1_TO_255_AT_7 = {value: value << 7 for value in range(1, 256)}
-_LOW_3_AT_29 = tuple(value << 29 for value in range(8))
 _PACK_BBBBHBB = struct.Struct("<BBBBHBB").pack
+_PACK_BBHBHB = struct.Struct("<BBHBHB").pack
 _PACK_BBHHBX = struct.Struct("<BBHHBx").pack
 _PACK_BBIH = struct.Struct("<BBIH").pack
 _PACK_BBIXX = struct.Struct("<BBIxx").pack
 _PACK_BHHBH = struct.Struct("<BHHBH").pack
 _PACK_BHIX = struct.Struct("<BHIx").pack
+_UNPACK_BBHBHB = struct.Struct("<BBHBHB").unpack_from
 _UNPACK_BBHHBX = struct.Struct("<BBHHBx").unpack_from
 _UNPACK_BBIBB = struct.Struct("<BBIBB").unpack_from
+_UNPACK_BBIBX = struct.Struct("<BBIBx").unpack_from
 _UNPACK_BBIXX = struct.Struct("<BBIxx").unpack_from
 _UNPACK_BHHBH = struct.Struct("<BHHBH").unpack_from
 _UNPACK_BHIX = struct.Struct("<BHIx").unpack_from
@@ -205,49 +205,39 @@ def pack_plan_task(message: PlanTask) -> bytes:
     if part < 0 or part > 6:
         raise OutOfRangeError("PlanTask.part", part, 0, 6)
     put = message.put
-    if put < 0 or put > 30:
+    if put > 30:
         raise OutOfRangeError("PlanTask.put", put, 0, 30)
     box = message.box
-    if box < 1 or box > 65535:
+    if box < 1:
         raise OutOfRangeError("PlanTask.box", box, 1, 65535)
     task = message.task
-    task_number = task[1]
-    if task_number > 65535:
-        raise OutOfRangeError("PlanTask.task_number", task_number, 0, 65535)
     try:
-        return _PACK_BBIH(
-            version,
-            part + message.pick * 0x8,
-            put + box * 0x20 + _FROM_0_TO_255_AT_21[task[0]] + _LOW_3_AT_29[task_number & 0x7],
-            task_number >> 3,
-        )
-    except (KeyError, struct.error) as error:
+        return _PACK_BBHBHB(version, part + message.pick * 0x8, box, task[0], task[1], put)
+    except struct.error as error:
         raise refusal(
             message,
             ("PlanTask.version", 1, 255),
             ("PlanTask.pick", 0, 31),
+            ("PlanTask.put", 0, 30),
+            ("PlanTask.box", 1, 65535),
             ("PlanTask.task.origin", 0, 255),
             ("PlanTask.task.number", 0, 65535),
         ) from error
 
 
 def unpack_plan_task(sender: int, data: bytes) -> PlanTask | None:
-    (word_0,) = _UNPACK_Q(data)
-    version = word_0 & 0xFF
+    version, word_1, box, task_origin, task_number, put = _UNPACK_BBHBHB(data)
     if version < 1:
         return None
-    part = word_0 >> 8 & 0x7
+    part = word_1 & 0x7
     if part > 6:
         return None
-    pick = word_0 >> 11 & 0x1F
-    put = word_0 >> 16 & 0x1F
-    if put > 30:
-        return None
-    box = word_0 >> 21 & 0xFFFF
+    pick = word_1 >> 3
     if box < 1:
         return None
-    task_origin = word_0 >> 37 & 0xFF
-    task_number = word_0 >> 45 & 0xFFFF
+    put = put & 0x1F
+    if put > 30:
+        return None
     return PlanTask(sender, version, part, pick, put, box, _new(Reference, (task_origin, task_number)))
 
 
@@ -258,36 +248,29 @@ def pack_step_report(message: StepReport) -> bytes:
     step = message.step
     if step < 0 or step > 30:
         raise OutOfRangeError("StepReport.step", step, 0, 30)
-    at_ms = message.at_ms
-    if at_ms > 4294967295:
-        raise OutOfRangeError("StepReport.at_ms", at_ms, 0, 4294967295)
+    entity = message.entity
+    if entity < 1:
+        raise OutOfRangeError("StepReport.entity", entity, 1, 255)
     try:
-        return _PACK_BHIX(
-            version,
-            step + message.result * 0x20 + _FROM_1_TO_255_AT_7[message.entity] + (at_ms & 0x1) * 0x8000,
-            at_ms >> 1,
-        )
-    except (KeyError, struct.error) as error:
+        return _PACK_BBIH(version, entity, message.at_ms, step + message.result * 0x20)
+    except struct.error as error:
         raise refusal(
             message, ("StepReport.version", 1, 255), ("StepReport.entity", 1, 255), ("StepReport.at_ms", 0, 4294967295)
         ) from error
 
 
 def unpack_step_report(sender: int, data: bytes) -> StepReport | None:
-    (word_0,) = _UNPACK_Q(data)
-    version = word_0 & 0xFF
+    version, entity, at_ms, word_6 = _UNPACK_BBIBX(data)
     if version < 1:
         return None
-    step = word_0 >> 8 & 0x1F
-    if step > 30:
-        return None
-    result = word_0 >> 13 & 0x3
-    if result > 2:
-        return None
-    entity = word_0 >> 15 & 0xFF
     if entity < 1:
         return None
-    at_ms = word_0 >> 23 & 0xFFFFFFFF
+    step = word_6 & 0x1F
+    if step > 30:
+        return None
+    result = word_6 >> 5 & 0x3
+    if result > 2:
+        return None
     return StepReport(sender, version, step, _STEP_RESULT[result], entity, at_ms)
 
 
@@ -331,4 +314,4 @@ FRAMES = (
     FrameCode("LaneState", 0x0E640000, 8, pack_lane_state, unpack_lane_state, LaneState, LaneState, ("Desk",), False),
 )
 #: CRC-32 over this system's DBC: part of the digest of its sites (docs/site-file.md).
-WORDS = 0xC3D417C5
+WORDS = 0x13186359

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from onboard.contract.codes import KindCode, MachineState, Reason
+from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, Reason
 from onboard.contract.messages import BusTime, Heartbeat, Message
 from onboard.contract.runs import singles
 from onboard.core.frame import Frame
@@ -17,6 +17,7 @@ from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.picture import SETTLING_US, BusPicture
 from onboard.trace.check.rule import Rule
 from onboard.trace.check.systems import rules_for
+from onboard.trace.listener import foreign_line
 from onboard.trace.raw import RawFrame, data_frame
 from onboard.wire.codec import Codec
 from onboard.wire.decoder import Decoder
@@ -51,7 +52,10 @@ _Route = tuple[tuple[Callable[[Any], None], ...], Callable[[Any, int], None] | N
 
 @dataclass
 class LogVerdict:
-    """What came of a log. ``unknown`` counts frames that came to no message, by reason; ``waits_us`` by node-ID."""
+    """What came of a log. ``unknown`` counts frames that came to no message, by reason; ``waits_us`` by node-ID.
+
+    ``foreign`` has who speaks another contract, with its number.
+    """
 
     rules: tuple[type[Rule], ...]
     left_out: dict[str, str] = field(default_factory=dict)
@@ -59,6 +63,7 @@ class LogVerdict:
     counts: Counter[str] = field(default_factory=Counter)
     seen: Counter[str] = field(default_factory=Counter)
     unknown: Counter[str] = field(default_factory=Counter)
+    foreign: dict[int, int] = field(default_factory=dict)
     frames: int = 0
     messages: int = 0
     runs: int = 1
@@ -84,6 +89,8 @@ class LogVerdict:
             found.append(f"longest waits: {waits}; limit {self.wait_limit_us / 1e6:.0f} s")
         if self.unknown:
             found.append("no message: " + ", ".join(f"{why} {count}" for why, count in sorted(self.unknown.items())))
+        if self.foreign:
+            found.append(foreign_line(self.foreign, name))
         if self.backwards:
             found.append(f"times going back: {self.backwards}")
         if self.unjudged:
@@ -104,6 +111,7 @@ class LogVerdict:
             },
             "left_out": self.left_out,
             "unknown": dict(self.unknown),
+            "foreign": self.foreign,
             "unjudged": self.unjudged,
             "waits_us": self.waits_us,
             "wait_limit_us": self.wait_limit_us,
@@ -342,6 +350,8 @@ class Checks:
                 for node, waited_us in rule.longest_us.items():
                     self.verdict.waits_us[node] = max(self.verdict.waits_us.get(node, 0), waited_us)
         self.verdict.unjudged += self._picture.unjudged
+        beats = self._picture.beats.items()
+        self.verdict.foreign |= {node: beat.contract for node, beat in beats if beat.contract != CONTRACT_VERSION}
 
     def _orderly(self, time_us: int, message: Message) -> int:
         """The time to go by: a little back is held, much back is another run, as is bus time that starts anew."""

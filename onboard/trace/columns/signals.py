@@ -89,7 +89,7 @@ def _values(
         if signal.signed:
             half = 1 << signal.bits - 1
             value, low, high = (value ^ half) - half, -half, half - 1
-        if (signal.scale, signal.offset) != (1, 0):
+        if signal.is_scaled:
             value = value * signal.scale + signal.offset
         if signal.minimum > low * signal.scale + signal.offset:
             is_right &= value >= signal.minimum

@@ -110,9 +110,12 @@ class MessageLines(_Lines):
         return None, False
 
     def _say_whole(self, can_id: int, data: bytes, *, is_extended: bool) -> tuple[str, bool] | None:
-        """Most frames are whole messages, for which no listener remembers anything (``Listener.hear``)."""
+        """Most frames are whole messages, of which a listener remembers nothing else (``Listener.hear``)."""
         message = self._whole(can_id, data) if is_extended else None
-        return None if message is None else self._words.said(message)
+        if message is None:
+            return None
+        self._listener.note(message)
+        return self._words.said(message)
 
 
 class DbcLines(_Lines):
