@@ -152,6 +152,8 @@ def test_a_customer_without_a_word_is_found() -> None:
     told = Tape(one_alley()).say(1, bay(1400), key()).say(2, word(DeskText.TAKE_TICKET)).say(3, key())
     assert told.broken(70) == {}, "the second press asks nothing new"
     assert Tape(one_alley()).say(1, bay(0), key()).broken(70) == {}, "a key without a car asks nothing"
+    fetched = Tape(one_alley()).say(1, bay(1400)).say(2, word(DeskText.CAR_READY)).say(3, key())
+    assert fetched.broken(70) == {}, "nor does one before a car that was brought for its owner"
 
 
 def test_a_ticket_that_leads_to_nothing_is_found() -> None:

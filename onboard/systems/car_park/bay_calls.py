@@ -4,6 +4,7 @@ The next one is a car that is to be fetched. It is called for with the time from
 its robot is on its way, or there, when the bay is empty; what it is and who won it is journalled like the other.
 """
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -24,8 +25,16 @@ from onboard.core.negotiation import EVENT_TYPES
 from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park import bay_task, custody
-from onboard.systems.car_park.bay_memory import BayMemory, ahead_over_record, ahead_record, job_over_record, job_record
+from onboard.systems.car_park.bay_memory import (
+    BayMemory,
+    ahead_over_record,
+    ahead_record,
+    job_over_record,
+    job_record,
+    ticket_record,
+)
 from onboard.systems.car_park.bay_task import REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask
+from onboard.systems.car_park.in_vain import InVain
 from onboard.systems.car_park.site import open_end
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.systems.car_park.unsaid import UnsaidParkings
@@ -62,6 +71,7 @@ class BayCalls:
     move: BayTask | None = None
     #: Whether rights were made anew and customers are to hear that no ticket is known any more; None: they never were.
     forgot: bool | None = None
+    in_vain: InVain = field(default_factory=InVain)
     unsaid: UnsaidParkings = field(init=False)
 
     def __post_init__(self) -> None:
@@ -70,6 +80,11 @@ class BayCalls:
     def in_hand(self) -> list[BayTask]:
         """Both, as far as there are any."""
         return [task for task in (self.job, self.ahead) if task is not None]
+
+    @property
+    def has_any(self) -> bool:
+        """Whether there is a task, in hand or to be called for once more."""
+        return bool(self.in_hand()) or self.in_vain.is_any
 
     def named(self, reference: Reference) -> BayTask | None:
         """The task of this name, where it is in hand."""
@@ -104,6 +119,7 @@ class BayCalls:
         return [effect for task in found for effect in task.remind(self.fleet.node_id, request.sender)]
 
     def _may_be_served(self, now_us: int) -> None:
+        self.in_vain.may_be_served(now_us)
         for task in self.in_hand():
             task.may_be_served(now_us)
 
@@ -194,6 +210,7 @@ class BayCalls:
     def won_by(self, task: BayTask, winner: int, call: int) -> list[Effect]:
         """``winner`` has won a task of mine in ``call``, 0 where that is not known."""
         task.winner, task.call, task.retry_at_us, task.reminders, task.refusals = winner, call, None, 0, 0
+        self.in_vain.over(task.car)
         self.on_won(task)
         return self._note(task)
 
@@ -238,10 +255,11 @@ class BayCalls:
         """Nobody brings a car, or another than was thought: the task is over before it began."""
         job, self.job = self.job, None
         assert job is not None
-        return self._call_off(job, now_us)
+        return self.call_off(job, now_us)
 
-    def _call_off(self, task: BayTask, now_us: int) -> list[Effect]:
+    def call_off(self, task: BayTask, now_us: int) -> list[Effect]:
         """Nobody is to do a task any more: whoever has won it, or might, hears so."""
+        self.in_vain.over(task.car)
         outcome = self.fleet.negotiation.call_off(task.task, Reason.CANCELLED, now_us)
         over = bay_task.void_award(self.fleet.node_id, task.task)
         return [*(item for item in outcome if not isinstance(item, EVENT_TYPES)), Send(over)]
@@ -295,15 +313,41 @@ class BayCalls:
     def give_up(self, car: Reference | None, phase: BayPhase, now_us: int) -> tuple[list[Effect], bool]:
         """A car goes out at another bay: whoever has won to fetch it here hears so; whether the bay waited for it."""
         task = None if car is None else self.of_car(car)
-        is_job, waits = task is self.job, phase in (BayPhase.LOCKING, BayPhase.AWAITING)
-        if task is None or task.operation is not Operation.RETRIEVE or (is_job and (task.was_granted or not waits)):
+        is_job = task is self.job
+        if task is None or not self._is_still_to_come(task, phase):
             return [], False
         over = job_over_record() if is_job else ahead_over_record(task.task)
         if is_job:
             self.job = None
         else:
             self.ahead = None
-        return [over, *self._call_off(task, now_us)], is_job
+        return [over, *self.call_off(task, now_us)], is_job
+
+    def _is_still_to_come(self, task: BayTask, phase: BayPhase) -> bool:
+        """Whether a task is about a car that goes out, and its robot has not had the bay."""
+        waits = task is not self.job or (not task.was_granted and phase in (BayPhase.LOCKING, BayPhase.AWAITING))
+        return task.operation is Operation.RETRIEVE and waits
+
+    def refused(self, task: BayTask, reason: Reason, now_us: int) -> list[Effect]:
+        """Nobody could: what is said of it."""
+        task.refused(reason, now_us)
+        what = f"{task.operation.name.lower()} car {task.car.number}"
+        return [Report(f"nobody can {what}: {reason.name}; called again later")]
+
+    def put_behind(self, task: BayTask, phase: BayPhase, tickets: deque[Reference]) -> tuple[list[Effect], bool]:
+        """Nobody can fetch a car: its ticket waits behind all others; whether the bay waited for it.
+
+        The ticket is noted before the task is over, so that no crash loses it.
+        """
+        if not self._is_still_to_come(task, phase):
+            return [], False
+        bay_task.queue_ticket(tickets, task.car, urgent=False)
+        self.in_vain.put(task, tickets)
+        noted: list[Effect] = [ticket_record(task.car, urgent=False)]
+        if task is self.job:
+            return noted, True
+        self.ahead = None
+        return [*noted, ahead_over_record(task.task)], False
 
     def bay_came_back(self, now_us: int, *, is_loaded: bool) -> tuple[BayPhase | None, list[Effect]]:
         """The robot that had the bay gives it back: the next phase, None while it has the car or sensors are behind.

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from onboard.contract.codes import Criterion, Operation
-from onboard.contract.messages import CallForProposals
+from onboard.contract.messages import CallForProposals, Reference
 from onboard.core.negotiation import Awarded, CallKey, NegotiationEvent, PreAssigned, Proposal, Released
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine
@@ -27,6 +27,8 @@ BEFORE_US = 5_000_000
 MOST_TAKEN = 4
 #: Where cars come out at which they came in, any other bay is worse by this than whatever is between two, us.
 NOT_OWN_US = 3_600_000_000
+#: A bay to which nobody could bring the car is worse than any to which nobody has tried to.
+GIVEN_UP_US = 2 * NOT_OWN_US
 #: The operating sequence for a car that is to be given out, in the order of its steps.
 PROGRAM = (
     "turn the light red",
@@ -55,6 +57,8 @@ class BayGeneration:
     #: Cars to be handed out here, and calls in which a bid for one more stands.
     taken: int = 0
     tentative: set[CallKey] = field(default_factory=set)
+    #: Cars that nobody could bring here.
+    given_up: set[Reference] = field(default_factory=set)
 
     def floor(self, call: CallForProposals, now_us: int) -> int:
         """A free bay has only to lock its input door, and is the one that the car comes to soonest (bus ms)."""
@@ -76,10 +80,11 @@ class BayGeneration:
             return None
         if not self._is_by_way(call):
             return to_bus_ms(self._ready_us(call, now_us) + before * self.cycle_us())
-        me = self.machine.node_id
-        if self.site.desk is DeskPolicy.OWN and call.car.origin == me:
+        me, is_given_up = self.machine.node_id, call.car in self.given_up
+        if self.site.desk is DeskPolicy.OWN and call.car.origin == me and not is_given_up:
             return self.floor(call, now_us)
-        return to_bus_ms(self._there_us(call, me, now_us) + before * BEFORE_US)
+        worse_us = before * BEFORE_US + (GIVEN_UP_US if is_given_up else 0)
+        return to_bus_ms(self._there_us(call, me, now_us) + worse_us)
 
     def cost(self, call: CallForProposals, now_us: int) -> int:
         """The bid of this bay in an own call of its desk (bus ms); only where it gives cars out."""

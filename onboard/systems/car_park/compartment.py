@@ -171,7 +171,7 @@ class Compartment:
         if isinstance(message, TaskReport):
             is_starting, heard = self.phase is BayPhase.STARTING, self.stewardship.hear(message, now_us)
             return heard + self.calls.on_report(message, now_us, is_starting=is_starting)
-        if isinstance(message, TokenRequest | SyncRequest) and self.calls.in_hand():
+        if isinstance(message, TokenRequest | SyncRequest) and self.calls.has_any:
             return self.calls.on_request(message, now_us)
         answer = self.calls.refused_to_winner(message, now_us) if isinstance(message, TokenRefusal) else None
         return self.stewardship.hear(message, now_us) if answer is None else answer
@@ -472,14 +472,17 @@ class Compartment:
     # --- inner works -------------------------------------------------------------------------------------------
 
     def _refused(self, job: BayTask, reason: Reason, now_us: int) -> list[Effect]:
-        """Nobody could: it is called for again; meanwhile a car to be parked is its driver's to take, who is told."""
+        """Nobody could, and it is tried again: a car to be parked is its driver's, one to be fetched waits behind."""
         if job.is_coming:
             self._go(BayPhase.FREE)
             return self.calls.not_come(now_us)
-        job.refused(reason, now_us)
-        is_over = job.operation is Operation.PARK and not self.calls.is_put_off(job)
-        said = f"nobody can {job.operation.name.lower()} car {job.car.number}: {reason.name}; called again later"
-        return [Report(said), *(self._give_back(job) if is_over else [])]
+        said = self.calls.refused(job, reason, now_us)
+        if self.calls.is_put_off(job):
+            return said
+        if job.operation is Operation.PARK:
+            return said + self._give_back(job)
+        behind, waited = self.calls.put_behind(job, self.phase, self.tickets)
+        return [*said, *behind, *self.desks.give_up(job, self.calls, now_us), *(self._to_free() if waited else [])]
 
     def _give_back(self, job: BayTask) -> list[Effect]:
         if self.phase is BayPhase.HANDOVER:

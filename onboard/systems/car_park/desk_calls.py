@@ -33,7 +33,7 @@ from onboard.systems.car_park import bay_task, custody
 from onboard.systems.car_park.bay_calls import BayCalls
 from onboard.systems.car_park.bay_generation import MOST_TAKEN, BayGeneration
 from onboard.systems.car_park.bay_memory import BayMemory, ticket_record
-from onboard.systems.car_park.bay_task import SETTLING_US
+from onboard.systems.car_park.bay_task import SETTLING_US, BayTask
 from onboard.systems.car_park.outputs import BayOutputs
 from onboard.systems.car_park.records import DeskForRecord, ReceivedRecord, TicketGoneRecord
 from onboard.systems.car_park.site import CarPark, DeskPolicy
@@ -92,6 +92,8 @@ class DeskCalls:
     _open_us: dict[tuple[int, int], int] = field(default_factory=dict)
     _room_us: int | None = 0
     _looked_us: int = 0
+    #: Machines that were out when this machine last looked.
+    _out: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
         in_hand = {one[index] for one, index in ((self.memory.job, 2), (self.memory.ahead, 1)) if one is not None}
@@ -184,6 +186,7 @@ class DeskCalls:
         for car in [car for car in (*self.asked, *self.received) if self._has_left(car)]:
             self.asked.pop(car, None)
             self.received.pop(car, None)
+        self._remember_given_up()
         effects += self._asked_for_elsewhere()
         rooms = self._rooms(now_us) if self.asked else 0
         if rooms <= 0:
@@ -206,6 +209,12 @@ class DeskCalls:
                 effects += called
                 rooms -= bool(called)
         return effects
+
+    def _remember_given_up(self) -> None:
+        """Until a car has left, or a machine is back: there may be a way again."""
+        given_up, out = self.generation.given_up, frozenset(self.fleet.mirror.obstacles.machines)
+        given_up -= given_up if self._out - out else {car for car in given_up if self._has_left(car)}
+        self._out = out
 
     def _call_at_us(self, one: AskedTicket) -> int | None:
         """When a ticket is called for; None while it is, or somebody has it, or there is no room, bus us."""
@@ -359,6 +368,25 @@ class DeskCalls:
         self.received[event.call.car] = event.call.task, version
         return [Record(ReceivedRecord(event.call.car, event.call.task, version))]
 
+    def give_up(self, task: BayTask, calls: BayCalls, now_us: int) -> list[Effect]:
+        """Nobody can bring a car here whose ticket waits: its desk calls for another bay, or this if all have tried.
+
+        Once for each car until a machine is back: where no bay can be reached its customer is not sent round and round.
+        """
+        car, node, obstacles = task.car, self.fleet.node_id, self.fleet.mirror.obstacles.machines
+        others = [bay for bay in self.generation.exits() if bay != node and bay not in obstacles]
+        asked, received = self.asked.get(car), self.received.get(car)
+        is_mine = received is not None or (asked is not None and asked.winner == node)
+        if not (self.is_on and others and is_mine and car in self.tickets) or car in self.generation.given_up:
+            return []
+        self.generation.given_up.add(car)
+        self.tickets.remove(car)
+        gone = [*calls.call_off(task, now_us), Record(TicketGoneRecord(car))]
+        if received is not None:
+            del self.received[car]
+            gone.append(self.accepts(received[0], TaskPhase.FORFEITED, Reason.NO_BID))
+        return gone + ([] if asked is None else self._free(car, asked, Reason.NO_BID, now_us))
+
     def statements(self) -> list[Effect]:
         """Who was away hears which tickets are whose: mine of other desks, and those that were read here."""
         mine = [self.accepts(task) for task, _ in self.received.values()]
@@ -401,6 +429,9 @@ class DeskCalls:
         car = self._cars_of_calls.get((award.sender, award.call))
         if car is not None:
             self._tell(car, award.winner)
+        if car in self.generation.given_up and award.winner != self.fleet.node_id:
+            # Its customer was sent to this bay, and stands here.
+            return [self._word(car, award.winner)], None
         mine = next((one for one, (task, _) in self.received.items() if task == award.task), None)
         if mine is not None and award.winner != self.fleet.node_id:
             if not is_newer(award.task_version, self.received[mine][1], TASK_VERSION_BITS):

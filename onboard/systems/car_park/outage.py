@@ -1,4 +1,7 @@
-"""Who waits at the desk for a robot that does not come hears so: it stands, and a person may need hours to mend it."""
+"""Who waits at the desk for a robot that does not come hears so: it stands, and a person may need hours to mend it.
+
+So does who waits for a car that no robot can bring while some machine is out, a lift, or a way is blocked.
+"""
 
 from collections import deque
 from collections.abc import Collection
@@ -58,23 +61,30 @@ class Outage:
     def _due_us(self, phase: BayPhase) -> dict[Reference, int | None]:
         """From when on nobody comes to each who waits: who has the bay's task stands, or has his, or is before it.
 
-        Or whose car is aboard of who stands.
+        Or whose car is aboard of who stands, or where there is no way to.
         """
         job = self.calls.job
         fetched = [task for task in self.calls.in_hand() if task.operation is Operation.RETRIEVE]
         if job is None or phase not in _WAITS:
             return {
-                **dict.fromkeys(task.car for task in fetched),
-                **{car: self._aboard_us(car) for car in self.tickets},
+                **{task.car: self._no_way_us(task.car) for task in fetched},
+                **{car: _first(self._aboard_us(car), self._no_way_us(car)) for car in self.tickets},
             }
         robots = [one.node_id for one in self.fleet.site.machines.values() if one.kind is KindCode.ROBOT]
         bay_us = _first(
             self._out_from_us([job.winner] if job.winner else robots), self._out_from_us([self._in_front()])
         )
-        due = {car: _first(bay_us, self._aboard_us(car)) for car in self.tickets}
+        due = {car: _first(bay_us, self._aboard_us(car), self._no_way_us(car)) for car in self.tickets}
         for task in fetched:
-            due[task.car] = _first(bay_us, self._out_from_us([task.winner] if task.winner else robots))
+            out_us = self._out_from_us([task.winner] if task.winner else robots)
+            due[task.car] = _first(bay_us, out_us, self._no_way_us(task.car))
         return due
+
+    def _no_way_us(self, car: Reference) -> int | None:
+        """When the first machine counts as out, or a way as blocked, where nobody could fetch a car."""
+        if self.calls.in_vain.task(car) is None:
+            return None
+        return _first(*(one.since_us + OUT_AFTER_US for one in self.fleet.mirror.obstacles.machines.values()))
 
     def _in_front(self) -> int:
         """Who has the right to the slot in front of the bay: while it stands there nobody else comes."""

@@ -86,7 +86,8 @@ class Pipeline:
 
     def next_wake(self, phase: BayPhase) -> int | None:
         """When whoever comes in has not pressed the key, an invited driver has not come, no robot does, or all rest."""
-        due = (self._next_look(phase), self.moves.next_wake(), self.times.next_wake())
+        again_us = self.calls.in_vain.next_wake(self._looked_us)
+        due = (self._next_look(phase), again_us, self.moves.next_wake(), self.times.next_wake())
         return min((one for one in due if one is not None), default=None)
 
     def _next_look(self, phase: BayPhase) -> int | None:
@@ -156,10 +157,15 @@ class Pipeline:
             self.is_queued, self.outs = False, 0
         # After a restart the journal may know of a task whose bay was not noted yet.
         called = self.call(now_us, now_us) if self.is_on and self.calls.ahead is None else []
-        is_out = self.calls.ahead is not None or (not self.is_on and self._first_that_stands() is not None)
+        is_out = self._is_to_come() or (not self.is_on and self._first_that_stands(now_us) is not None)
         self.outs += is_out
         self.ins = 0 if is_out else self.ins
         return is_out, brought + called
+
+    def _is_to_come(self) -> bool:
+        """Whether the bay is to be locked for the next car, or for one that nobody could fetch, if it was won now."""
+        ahead = self.calls.ahead
+        return ahead is not None and bool(ahead.winner or not ahead.refusals)
 
     def wants(self, robot: int) -> Reason:
         """A robot asks for the bay, of which it has no task here; it may have had one before the journal was lost."""
@@ -207,15 +213,25 @@ class Pipeline:
     def call(self, ready_us: int, now_us: int) -> list[Effect]:
         """Call for the first car that is asked for and stands; the bay can take it from ``ready_us`` on."""
         bay_task.forget_tickets(self.tickets, self.fleet.mirror)
-        car = self._first_that_stands()
+        car = self._first_that_stands(now_us)
         if car is None:
             return []
         self.tickets.remove(car)
-        task, number = self.memory.next_reference(self.fleet)
-        wheelbase_mm = self.fleet.mirror.cars[car].wheelbase_mm
-        ahead = self.calls.ahead = BayTask(task, Operation.RETRIEVE, car, wheelbase_mm, ready_us=ready_us)
-        return [number, ahead_record(task, car, wheelbase_mm), *self.calls.call_for(ahead, now_us)]
+        noted: list[Effect] = []
+        ahead = self.calls.in_vain.task(car)
+        if ahead is None:
+            task, number = self.memory.next_reference(self.fleet)
+            ahead = BayTask(task, Operation.RETRIEVE, car, self.fleet.mirror.cars[car].wheelbase_mm)
+            noted.append(number)
+        ahead.ready_us, self.calls.ahead = ready_us, ahead
+        noted.append(ahead_record(ahead.task, car, ahead.wheelbase_mm))
+        return noted + self.calls.call_for(ahead, now_us)
 
-    def _first_that_stands(self) -> Reference | None:
-        """The car that was asked for first, but for those aboard: a robot that has stopped keeps its own for long."""
-        return next((car for car in self.tickets if custody.place_of(self.fleet, car) is not None), None)
+    def _first_that_stands(self, now_us: int) -> Reference | None:
+        """The car that was asked for first, but for those aboard: a robot that has stopped keeps its own for long.
+
+        And but for those that nobody could fetch a moment ago.
+        """
+        in_vain = self.calls.in_vain
+        stands = (car for car in self.tickets if custody.place_of(self.fleet, car) is not None)
+        return next((car for car in stands if not in_vain.waits(car, now_us)), None)

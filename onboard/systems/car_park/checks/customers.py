@@ -30,7 +30,9 @@ WORD_WITHIN_US = 60_000_000
 #: A customer gets the car, or the place, within this, us: some thirty cars before one on the shipped sites.
 SERVED_WITHIN_US = 3_600_000_000
 
+#: Whose car has been brought, or is given back, needs no other word, whoever presses a key then.
 _ANSWERS_TO_KEY = (
+    DeskText.CAR_READY,
     DeskText.TAKE_TICKET,
     DeskText.FULL,
     DeskText.CAR_TOO_LARGE,
