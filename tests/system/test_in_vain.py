@@ -44,6 +44,8 @@ home = "p(2,6)"
 #: at last somebody with another car.
 OFF_S, BACK_S, UPSTAIRS_S, STREET_S, COMES_S = 300, 1_200, 360, 410, 510
 STREET, UPSTAIRS = 1, 2
+#: The lift fails while the robot is aboard of it that fetches the car upstairs, s.
+RIDES_S = 395
 
 
 def upstairs() -> CarPark:
@@ -60,9 +62,14 @@ def scene(site: CarPark, *faults: str) -> Scene:
     return play(site, days, before=break_it, limit_s=3_000)
 
 
+def shown_s(one: Scene, text: DeskText, car: int) -> float:
+    """When the desk says something of a car first, s."""
+    return one.first(DeskOrder, lambda word: word.text is text and word.car.number == car)[0] / 1e6
+
+
 def ready_s(one: Scene, car: int) -> float:
     """When the desk says that a car is there, s."""
-    return one.first(DeskOrder, lambda word: word.text is DeskText.CAR_READY and word.car.number == car)[0] / 1e6
+    return shown_s(one, DeskText.CAR_READY, car)
 
 
 @pytest.mark.parametrize("site", [upstairs(), at_the_key(upstairs())], ids=["on arrival", "with the key"])
@@ -85,8 +92,7 @@ def test_who_cannot_reads_so_until_the_lift_is_back() -> None:
         DeskText.PLEASE_WAIT,
         DeskText.CAR_READY,
     ]
-    told_us, _ = one.first(DeskOrder, lambda word: word.text is DeskText.OUT_OF_ORDER and word.car.number == UPSTAIRS)
-    assert told_us < (UPSTAIRS_S + 60) * 1_000_000
+    assert shown_s(one, DeskText.OUT_OF_ORDER, UPSTAIRS) < UPSTAIRS_S + 60
     assert DeskText.OUT_OF_ORDER not in texts(one, STREET)
 
 
@@ -96,6 +102,18 @@ def test_its_ticket_outlives_a_restart_of_the_desk(at_s: int) -> None:
     assert one.simulation.plant.street.summary().served == 3
     assert ready_s(one, UPSTAIRS) < BACK_S + 250
     assert one.simulation.plant.oracle.finish() == []
+
+
+def test_whose_robot_waits_for_a_lift_that_is_off_is_told_so() -> None:
+    """Aboard of it, with the car: the desk said PLEASE_WAIT to all who waited at that bay until the lift was back."""
+    late_s = 20
+    days = stays((0, STREET_S - 10), (90, UPSTAIRS_S - 10))
+    off = parse_injection(f"crash:target=ER1,at_s={RIDES_S},restart_s=600")
+    one = play(upstairs(), days, before=lambda simulation: arm(simulation, (off,)), limit_s=2_000)
+    for car in (STREET, UPSTAIRS):
+        assert abs(shown_s(one, DeskText.OUT_OF_ORDER, car) - (RIDES_S + 30)) < late_s
+        assert texts(one, car)[-3:] == [DeskText.OUT_OF_ORDER, DeskText.PLEASE_WAIT, DeskText.CAR_READY]
+    assert one.simulation.plant.street.summary().served == 2
 
 
 #: Two compartments, one on each side of a lift; the only place, upstairs, is nearer to the second, but by that lift.

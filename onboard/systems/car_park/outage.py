@@ -1,17 +1,19 @@
 """Who waits at the desk for a robot that does not come hears so: it stands, and a person may need hours to mend it.
 
-So does who waits for a car that no robot can bring while some machine is out, a lift, or a way is blocked.
+So does who waits for a car that no robot can bring while some machine is out, a lift, or a way is blocked; or for one
+whose robot waits for such a lift, aboard of it or at its sill.
 """
 
 from collections import deque
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import DeskText, KindCode, Operation
+from onboard.contract.codes import DeskText, KindCode, LegAction, Operation
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import Reference
 from onboard.core.authority import segment_token
 from onboard.core.effects import Effect
+from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment
 from onboard.systems.car_park.bay_calls import BayCalls
 from onboard.systems.car_park.bay_task import BayPhase
@@ -33,9 +35,11 @@ class Outage:
     outputs: BayOutputs
     tickets: deque[Reference]
     _told: set[Reference] = field(default_factory=set)
+    _looked_us: int = 0
 
     def review(self, phase: BayPhase, now_us: int) -> list[Effect]:
         """Tell each who waits once that nobody comes, and again that it is to be waited for once somebody may."""
+        self._looked_us = now_us
         due = self._due_us(phase)
         is_out = {car: due_us is not None and now_us >= due_us for car, due_us in due.items()}
         again = [car for car, out in is_out.items() if car in self._told and not out and not self._is_being_served(car)]
@@ -72,12 +76,14 @@ class Outage:
             }
         robots = [one.node_id for one in self.fleet.site.machines.values() if one.kind is KindCode.ROBOT]
         bay_us = _first(
-            self._out_from_us([job.winner] if job.winner else robots), self._out_from_us([self._in_front()])
+            self._out_from_us([job.winner] if job.winner else robots),
+            self._out_from_us([self._in_front()]),
+            self._rides_us(job.winner),
         )
         due = {car: _first(bay_us, self._aboard_us(car), self._no_way_us(car)) for car in self.tickets}
         for task in fetched:
             out_us = self._out_from_us([task.winner] if task.winner else robots)
-            due[task.car] = _first(bay_us, out_us, self._no_way_us(task.car))
+            due[task.car] = _first(bay_us, out_us, self._rides_us(task.winner), self._no_way_us(task.car))
         return due
 
     def _no_way_us(self, car: Reference) -> int | None:
@@ -85,6 +91,18 @@ class Outage:
         if self.calls.in_vain.task(car) is None:
             return None
         return _first(*(one.since_us + OUT_AFTER_US for one in self.fleet.mirror.obstacles.machines.values()))
+
+    def _rides_us(self, node: int) -> int | None:
+        """When a lift counts as out by which a machine rides, or is to ride, on its way to the bay by its plan."""
+        plan, near_us = self.fleet.mirror.itineraries.get(node), self._looked_us
+        here, lifts = tuple(self.calls.station), []
+        for leg in plan.legs if plan is not None else ():
+            if (leg.track, leg.to_index, leg.side) == here:
+                break
+            # A ride that is over was over before its lift was out for so long.
+            if leg.action is LegAction.RIDE and from_bus_ms(leg.end_ms, near_us) > near_us - OUT_AFTER_US:
+                lifts.append(self.fleet.site.stewards[leg.track])
+        return _first(*(self._out_from_us([lift]) for lift in lifts))
 
     def _in_front(self) -> int:
         """Who has the right to the slot in front of the bay: while it stands there nobody else comes."""
