@@ -77,7 +77,7 @@ class Listener:
         return LoggedFrame(frame, message, reason, is_fleet)
 
     def note(self, message: Message) -> None:
-        """Remember who speaks another contract: layouts may be others there, and words that are no refusal wrong."""
+        """Remember who speaks another contract: where layouts are others there, its words are read wrongly."""
         if type(message) is Heartbeat and message.contract != CONTRACT_VERSION:
             self.foreign[message.sender] = message.contract
 
