@@ -15,6 +15,7 @@ from onboard import bounded_file
 from onboard.bounded_file import read_bounded
 from tests.hostile.files import hostile, made
 from tests.hostile.play import Outcome, Play
+from tests.once import once
 from tests.tools import DEADLINE_S
 
 ROOT = Path(__file__).parents[2]
@@ -74,8 +75,12 @@ WRITTEN = {
 
 
 @pytest.fixture(scope="module")
-def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Outcome]:
-    folder = tmp_path_factory.mktemp("hostile")
+def outcomes() -> dict[str, Outcome]:
+    told = json.loads((once("hostile", _play_all) / "outcomes.json").read_text(encoding="utf-8"))
+    return {one.name: Outcome(*outcome) for one, outcome in zip(TABLE, told, strict=True)}
+
+
+def _play_all(folder: Path) -> None:
     (folder / "log").write_bytes(b"(1795219200.000000) fleet 18FF0201#08C3\n")
     (folder / "sessions.csv").write_text("arrival,departure\n", encoding="ascii")
     (folder / "small.map").write_text("type octile\nheight 1\nwidth 3\nmap\n...\n", encoding="ascii")
@@ -96,7 +101,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Outcome]:
         check=True,
         timeout=20 * DEADLINE_S,
     )
-    return {one.name: Outcome(*told) for one, told in zip(TABLE, json.loads(ran.stdout), strict=True)}
+    (folder / "outcomes.json").write_text(ran.stdout, encoding="utf-8")
 
 
 def test_there_are_forty_and_each_has_a_name() -> None:
