@@ -2,7 +2,7 @@
 
 import pytest
 
-from onboard.contract.codes import CallResult, Grade, LegAction, Reason, TaskPhase
+from onboard.contract.codes import CallResult, Grade, LegAction, Operation, Reason, TaskPhase
 from onboard.contract.constants import ANY_STATION, NOBODY
 from onboard.contract.messages import (
     Award,
@@ -17,10 +17,11 @@ from onboard.contract.messages import (
     TokenRefusal,
     TokenRequest,
 )
+from onboard.core.effects import Send
 from onboard.core.records import TokenGivenRecord, TokenGoneRecord
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.bay_memory import winner_record
-from onboard.systems.car_park.bay_task import REMINDERS, BayPhase
+from onboard.systems.car_park.bay_task import REMINDERS, BayPhase, BayTask
 from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.program import CarHandling, StationWork
 from onboard.systems.car_park.recovery import award_record, handled_record
@@ -123,6 +124,20 @@ def test_what_nobody_could_do_is_called_for_as_soon_as_a_robot_may(word: SyncReq
     assert called(after_a_while(bay)[1]) == [], "that waits for half a minute"
     bay.hears(word)
     assert called(after_a_while(bay)[1]) == [TASK]
+
+
+def test_a_car_is_not_called_for_while_another_stands_in_the_bay_that_nobody_parks() -> None:
+    """Its robot had waited before the bay, and left it at a place: it was brought again, and back, for an hour."""
+    bay = waiting()
+    assert isinstance(bay.behaviour, Compartment)
+    calls = bay.behaviour.calls
+    calls.ahead, calls.job = calls.job, BayTask(Reference(BAY, 99), Operation.PARK, Reference(BAY, 99), WHEELBASE_MM)
+    left_it = TaskReport(CHEAP, TASK, TaskPhase.DONE, PLACE.number, Reason.NONE)
+    said = calls.on_report(left_it, NOW_US, is_starting=False) + calls.review(NOW_US)
+    assert called([one.message for one in said if isinstance(one, Send)]) == []
+    calls.job.winner = DEAR
+    anew = called([one.message for one in calls.review(NOW_US) if isinstance(one, Send)])
+    assert len(anew) == 1 and calls.ahead is not None and calls.ahead.task == anew[0] != TASK
 
 
 def test_what_a_robot_does_not_know_it_gives_back_and_it_is_called_for_anew() -> None:

@@ -168,7 +168,7 @@ def test_who_is_told_before_anything_is_known_is_told_by_the_site_s_own_constant
     effects = desk.until(told_us)
     one, two = promises_in(effects)
     assert (one.car, two.car) == (CAR, OTHER)
-    cycle_us = BayGeneration(PROMISING, PROMISING.machines[BAY], lambda _, now_us: now_us).cycle_us()
+    cycle_us = BayGeneration(PROMISING, PROMISING.machines[BAY], lambda _, now_us: now_us, ()).cycle_us()
     assert one.ready_ms + one.spread_ms == to_bus_ms(told_us + MOST_CYCLES * cycle_us)
     early_us = told_us + LEAST_CYCLES * cycle_us - 1_000 * (one.ready_ms - one.spread_ms)
     assert 0 <= early_us <= 2 * STEP_US, "to the early side it is rounded up"

@@ -10,7 +10,7 @@ from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
 from onboard.contract.codes import CallResult, DeskInput, DeskText, Operation, TaskPhase
 from onboard.contract.messages import Award, Bid, CallForProposals, DeskEvent, DeskOrder, TaskReport
-from onboard.systems.car_park.bay_generation import MOST_TAKEN
+from onboard.systems.car_park.bay_generation import MOST_TAKEN, BayGeneration
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.trace.story.why import WaitingStory, task_lines
 from onboard.trace.words import Words
@@ -215,3 +215,12 @@ def test_who_asks_at_two_desks_before_the_car_stands_is_told_at_both_where_it_co
     calls = [one for _, one in scene.all(CallForProposals) if one.operation is Operation.RECEIVE]
     told = {one.sender: one.compartment for _, one in scene.all(DeskOrder) if one.text is DeskText.GO_TO}
     assert (len(calls), told, ready_at(scene)) == (1, {1: 2, 2: 2}, [2])
+
+
+def test_a_bay_bids_for_no_car_of_which_it_knows_nothing() -> None:
+    """Started again while the car's custodian was off it won, told its customer UNKNOWN_TICKET, and won again."""
+    _, call = fetched("nearest").first(CallForProposals, lambda one: one.operation is Operation.RECEIVE)
+    park = two("nearest")
+    for known in ((), (call.car,)):
+        bay = BayGeneration(park, park.machines[2], lambda _, now_us: now_us // 1_000, known)
+        assert (bay.lower_bound(call, 0) is None) is not bool(known)

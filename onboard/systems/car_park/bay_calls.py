@@ -179,6 +179,10 @@ class BayCalls:
         else:
             self.ahead = anew
             over += [ahead_over_record(task.task), ahead_record(name, task.car, task.wheelbase_mm)]
+            if self._is_full:
+                # It would be carried before a full bay, and back, time after time.
+                anew.retry_at_us = now_us
+                return over
         return over + self.call_for(anew, now_us)
 
     def _on_forfeit(self, task: BayTask, sender: int, now_us: int) -> list[Effect]:

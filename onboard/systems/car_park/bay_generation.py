@@ -4,7 +4,7 @@ Independent of the others' plans (row P21), unlike the robot's: it knows only it
 the site lets the car come to the compartment that suits it (``DeskPolicy``) the way of the car to each bay.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -46,12 +46,14 @@ PROGRAM = (
 class BayGeneration:
     """Estimates for calls of operation RECEIVE. ``is_free`` and ``queue`` are kept up to date by the compartment.
 
-    ``least_ms`` is when a car can be at a bay at the earliest (bus ms), by a call to fetch it there.
+    ``least_ms`` is when a car can be at a bay at the earliest (bus ms), by a call to fetch it there; ``cars`` are those
+    of which this machine knows where they are: after a restart it does not of one whose custodian is off.
     """
 
     site: CarPark
     machine: Machine
     least_ms: Callable[[CallForProposals, int], int]
+    cars: Container[Reference]
     is_free: bool = False
     queue: int = 0
     #: Cars to be handed out here, and calls in which a bid for one more stands.
@@ -80,6 +82,8 @@ class BayGeneration:
             return None
         if not self._is_by_way(call):
             return to_bus_ms(self._ready_us(call, now_us) + before * self.cycle_us())
+        if call.car not in self.cars:
+            return None
         me, is_given_up = self.machine.node_id, call.car in self.given_up
         if self.site.desk is DeskPolicy.OWN and call.car.origin == me and not is_given_up:
             return self.floor(call, now_us)

@@ -28,9 +28,9 @@ class CompartmentFactory(BehaviourFactory):
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> BayGeneration:
         """What a task at the bay costs: a compartment bids to receive cars."""
-        park = car_park(site)
-        robots = CarParkGeneration(park, machine, way_mirror(mirror), Program(park))
-        return BayGeneration(park, machine, robots.floor)
+        park, known = car_park(site), way_mirror(mirror)
+        robots = CarParkGeneration(park, machine, known, Program(park))
+        return BayGeneration(park, machine, robots.floor, known.cars)
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Compartment:
         """The compartment's steps; ``estimator`` is the one made above."""

@@ -439,7 +439,8 @@ class DeskCalls:
             del self.received[mine]
             if mine in self.tickets:
                 self.tickets.remove(mine)
-            return [Record(TicketGoneRecord(mine))], mine
+            # Its customer was sent here.
+            return [Record(TicketGoneRecord(mine)), self._word(mine, award.winner)], mine
         is_known = self.fleet.negotiation.knows(award.sender, award.call) or (award.call and mine is None)
         if award.winner != self.fleet.node_id or is_known:
             return [], None

@@ -42,8 +42,11 @@ class Outage:
         self._looked_us = now_us
         due = self._due_us(phase)
         is_out = {car: due_us is not None and now_us >= due_us for car, due_us in due.items()}
-        again = [car for car, out in is_out.items() if car in self._told and not out and not self._is_being_served(car)]
-        self._told = {car for car in self._told if is_out.get(car)}
+        in_doubt = {car for car in self._told if car in is_out and not is_out[car] and self._is_open(car)}
+        again = [
+            car for car in sorted(self._told - in_doubt) if is_out.get(car) is False and not self._is_being_served(car)
+        ]
+        self._told = {car for car in self._told if is_out.get(car)} | in_doubt
         # Who puts the ticket in again reads first that it was taken.
         asks = self.outputs.shown
         untold = [
@@ -56,6 +59,10 @@ class Outage:
     def next_wake(self, phase: BayPhase) -> int | None:
         """When those who wait are to be told, bus us; None where they were, or none waits, or a robot may come."""
         return _first(*(due_us for car, due_us in self._due_us(phase).items() if car not in self._told))
+
+    def _is_open(self, car: Reference) -> bool:
+        """Whether nobody has won its task, or the bay's: who wins that now may give it back in a moment."""
+        return any(task is not None and not task.winner for task in (self.calls.of_car(car), self.calls.job))
 
     def _is_being_served(self, car: Reference) -> bool:
         """Whether its robot has had the bay: the next that its customer reads is that it is ready."""
