@@ -8,9 +8,10 @@ from bus_sim.faults.controllers import machine_named
 from bus_sim.systems.car_park.plant.customer import VisitOutcome
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
-from onboard.contract.codes import CallResult, DeskInput, DeskText, Operation, TaskPhase
+from onboard.contract.codes import CallResult, DeskInput, DeskText, Operation, Reason, TaskPhase
 from onboard.contract.messages import Award, Bid, CallForProposals, DeskEvent, DeskOrder, TaskReport
 from onboard.systems.car_park.bay_generation import MOST_TAKEN, BayGeneration
+from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.trace.story.why import WaitingStory, task_lines
 from onboard.trace.words import Words
@@ -224,3 +225,17 @@ def test_a_bay_bids_for_no_car_of_which_it_knows_nothing() -> None:
     for known in ((), (call.car,)):
         bay = BayGeneration(park, park.machines[2], lambda _, now_us: now_us // 1_000, known)
         assert (bay.lower_bound(call, 0) is None) is not bool(known)
+
+
+def test_a_ticket_that_a_bay_has_given_up_and_won_again_is_dropped_for_another_all_the_same() -> None:
+    scene = play(two("nearest"), stays((0, 200)))
+    bay = scene.simulation.controllers[2].holon.behaviour
+    assert isinstance(bay, Compartment)
+    _, call = scene.first(CallForProposals, lambda one: one.operation is Operation.RECEIVE)
+    bay.desks.hear(call, 0)
+    bay.desks.received[call.car] = call.task, 1
+    bay.generation.given_up.add(call.car)
+    newer = Award(1, call.call, 1, call.task, 2, CallResult.AWARDED, Reason.NONE)
+    _, dropped = bay.desks.hear(newer, 0)
+    assert dropped == call.car and call.car not in bay.desks.received
+    assert bay.outputs.shown == (DeskText.GO_TO, call.car)

@@ -5,7 +5,7 @@ policy (``BayGeneration``), the desk too, and the winner queues the ticket like 
 robot still is called for once it stands: which bay suits it depends on where. A bay has at most ``MOST_TAKEN`` of them:
 with more customers than that a desk calls when by what is told somebody has room, who waits longest first. The desk
 answers for the ticket, in its journal, until the car has left: where whoever took it is lost, and no robot is at the
-car, it calls anew under a raised version.
+car, it calls anew under a raised version; and where nobody can bring the car to that bay, which gives the ticket back.
 """
 
 from collections import Counter, deque
@@ -429,10 +429,10 @@ class DeskCalls:
         car = self._cars_of_calls.get((award.sender, award.call))
         if car is not None:
             self._tell(car, award.winner)
-        if car in self.generation.given_up and award.winner != self.fleet.node_id:
+        mine = next((one for one, (task, _) in self.received.items() if task == award.task), None)
+        if mine is None and car in self.generation.given_up and award.winner != self.fleet.node_id:
             # Its customer was sent to this bay, and stands here.
             return [self._word(car, award.winner)], None
-        mine = next((one for one, (task, _) in self.received.items() if task == award.task), None)
         if mine is not None and award.winner != self.fleet.node_id:
             if not is_newer(award.task_version, self.received[mine][1], TASK_VERSION_BITS):
                 return [], None
