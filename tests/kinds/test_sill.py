@@ -123,6 +123,21 @@ def test_without_a_word_the_lift_is_asked_again_and_again() -> None:
     assert robot.carriage.sill.next_wake() is None
 
 
+def test_half_off_the_platform_without_a_word_the_lift_is_asked_too() -> None:
+    """An older word that came late: it stood across the sill, and nobody would have said the newer one again."""
+    robot = AtTheSill(45)
+    robot.lift_says(2, 45)
+    assert robot.goes_aboard()
+    robot.holon.sense(DriveState(ROBOT, robot.carriage.sequence, -PITCH_MM // 2, 0, DriveMode.STANDING, False), 100)
+    robot.carriage.go(Segment(FLOOR, 1))
+    robot.lift_says(1, 43)
+    times = [0, 1_500_000, 3_000_000]
+    asked = [said(robot.carriage.advance(now_us)).count(SyncRequest(ROBOT, LIFT)) for now_us in times]
+    assert asked == [0, 1, 1]
+    robot.lift_says(2, 45)
+    assert orders(robot.carriage.advance(4_000_000))
+
+
 def test_a_robot_that_the_lift_waits_for_elsewhere_gives_both_back() -> None:
     robot = AtTheSill(45)
     robot.lift_says(1, 45)

@@ -30,6 +30,7 @@ from onboard.core.negotiation.initiator import is_any_sound
 from onboard.core.records import BootRecord, next_boot
 from onboard.holon.rights import RightsTalk
 from onboard.holon.witness import Witness
+from onboard.systems.car_park import custody
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.mirror import WayFleet, WayMirror
 from tests.models.snapshot import NOW_US
@@ -164,9 +165,10 @@ class AtWork:
                 mirror.admit(node, NOW_US)
         effects = tokens.wake(NOW_US) + self.rights.serve_petitions(NOW_US)
         effects += self._negotiated(self.fleet.negotiation.wake(NOW_US))
-        # By digests all come to have one another's plans.
+        # By digests all come to have one another's plans and cars.
         plan = mirror.itineraries.get(self.node)
-        return self._deeds([*effects, *([] if plan is None else [Send(plan)])])
+        plans: list[Effect] = [] if plan is None else [Send(plan)]
+        return self._deeds([*effects, *plans, *custody.statements(self.fleet)])
 
     def sleeps(self) -> list[Deed]:
         """It did nothing for a while, as whose process was stopped: it asks what it has missed, and plans anew."""

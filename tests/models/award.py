@@ -8,7 +8,17 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from onboard.contract.codes import Operation
-from onboard.contract.messages import Bid, CarAt, Itinerary, Message, Progress, Reference, Waiting
+from onboard.contract.messages import (
+    Bid,
+    CarAt,
+    Itinerary,
+    Message,
+    Progress,
+    Reference,
+    TokenDispute,
+    TokenGiven,
+    Waiting,
+)
 from onboard.core.records import BootRecord, TokenHeldRecord
 from onboard.systems.car_park.bay_memory import car_record, job_record, winner_record
 from onboard.systems.car_park.compartment import Compartment
@@ -79,9 +89,13 @@ class AwardPart:
         return AtWork(SITE, node, factory, RobotBody(node, body, is_quick=False), journal, stand_still, is_said)
 
     def hears(self, node: int, word: Message) -> bool:
-        """A robot hears the compartment's words that are for all, or for it, and how much the other would take."""
-        if node == BAY or isinstance(word, Bid):
+        """A robot hears the compartment's words that are for all, or for it; of the other what it would take, doubts that
+        are about itself, and what it has given away.
+        """
+        if node == BAY or isinstance(word, Bid | TokenGiven):
             return True
+        if isinstance(word, TokenDispute):
+            return word.believed == node
         addressee = getattr(word, "holder", getattr(word, "requester", node))
         return word.sender == BAY and not isinstance(word, CarAt) and addressee == node
 

@@ -110,9 +110,9 @@ AWARD = {
 
 LEAVING = {
     "a grant is said before it is written": Planted(TokenBook, "give", _turned, TWO),
-    "the place of a car is not written": Planted(custody, "before_taking", _unwritten, TRAP),
+    "the place of a car is not written": Planted(custody, "before_taking", _unwritten, LOST),
     "a car is taken before its place is known": Planted(custody, "before_taking", _never_refused, LOST),
-    "where a car is left is said once": Planted(custody, "before_grant", _nothing, TRAP),
+    # That where a car is left is said once is healed: mirrors that differ are made equal.
     "a keeper forgets where its cars stand": Planted(custody, "replay", _nothing, TRAP),
     "a robot forgets what it has handled": Planted(JournalRecovery, "_take", _without(HandledRecord), TRAP),
     "a car that was left is not passed on": Planted(ShuttleWork, "_finish", _nothing, TRAP),

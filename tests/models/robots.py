@@ -90,6 +90,7 @@ class _StandingCarriage(Carriage):
         """Be there."""
         goal = self.goal
         if goal is None or goal == self.standing_at:
+            self.target = None
             return []
         self.target, position_mm = goal, self.axis.position_mm(goal.index)
         return [Actuate(DriveState(self.fleet.node_id, 0, position_mm, 0, DriveMode.STANDING, True), None)]

@@ -213,17 +213,18 @@ class GoingAround:
         """A task is another's by its initiator's word; nobody need hear of that from me."""
         return [forfeited_record(task), Report(f"task {task.origin}.{task.number} is another's now")]
 
-    def untouched(self, *, is_void: bool = False) -> list[Reference]:
+    def untouched(self, *, is_lost: bool = False) -> list[Reference]:
         """Tasks in the program whose car was not touched and is in others' custody, in order.
 
-        Of one that is void the right to the station does not count: it may have come for the next task there.
+        Of one that is lost, void or another's, the right to the station does not count: it may have come for the next
+        task there, and whose the task is now waits for it.
         """
         tokens = self.fleet.tokens
         found = []
         for work in self.program.works():
             begun = self.shuttle.work == work and self.shuttle.phase not in (HandlingPhase.ACQUIRE, HandlingPhase.DONE)
             has_right = tokens.holds(car_token(*work.car))
-            has_right |= tokens.holds(station_token(work.station)) and not is_void
+            has_right |= tokens.holds(station_token(work.station)) and not is_lost
             if work.handling is CarHandling.TAKE and not begun and not has_right:
                 found.append(work.call.task)
         return found
@@ -441,10 +442,12 @@ class GoingAround:
         No plan begins in a mouth on the axis of the track inside: it begins at the mouth, turned or not.
         """
         remaining, here = self.program.remaining, self.carriage.standing_at
-        if remaining and here is not None and lift_at(self.fleet.site, here) is None and self.carriage.target is None:
-            step = remaining[0]
-            if step.action is LegAction.TRAVEL or (step.work is not None and step.work.call.task in tasks):
-                return 0, self.carriage.axis.mouths.get(here.index, here), now_us
+        if remaining and remaining[0].work is not None and remaining[0].work.call.task in tasks:
+            # Where it was pushed to as well: of a step that is kept it would be told that it is done.
+            return 0, self.carriage.nearest, now_us
+        is_run = remaining and remaining[0].action is LegAction.TRAVEL and self.carriage.target is None
+        if is_run and here is not None and lift_at(self.fleet.site, here) is None:
+            return 0, self.carriage.axis.mouths.get(here.index, here), now_us
         return self.program.turning(now_us)
 
     def _ahead(self, works: list[StationWork], kept: int) -> list[StationWork]:

@@ -193,13 +193,13 @@ class ParkingRobot:
                 award.result is CallResult.REJECTED and award.call == call.call
             )
             others = award.winner != self.fleet.node_id and self.recovery.is_newer(award)
-            if (others or is_void) and call.task in self._untouched(is_void=is_void):
+            if (others or is_void) and call.task in self._untouched(is_lost=True):
                 return self._lose(call.task, now_us)
         return []
 
-    def _untouched(self, *, is_void: bool = False) -> list[Reference]:
+    def _untouched(self, *, is_lost: bool = False) -> list[Reference]:
         """Tasks in hand that can be given back, or be another's."""
-        return self.going_around.untouched(is_void=is_void) if self.starting.is_over else self.recovery.untouched()
+        return self.going_around.untouched(is_lost=is_lost) if self.starting.is_over else self.recovery.untouched()
 
     def _lose(self, task: Reference, now_us: int) -> list[Effect]:
         self.recovery.forget(task)

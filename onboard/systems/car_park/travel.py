@@ -310,11 +310,11 @@ class Carriage:
         return key in self.fleet.tokens.wanted or self.fleet.tokens.holds(key)
 
     def _ask_lifts(self, ahead: list[int], now_us: int) -> list[Effect]:
-        """Have the word of the lift at the end of this way while its gate is held; one that is elsewhere waits for us.
+        """Have the word of the lift at an end of this way while its gate is held; one that is elsewhere waits for us.
 
         Whoever is on the sill or the platform keeps them: it stands until the lift says that it may go on.
         """
-        line = {slot for slots in self.axis.rights(ahead) for slot in slots}
+        line = {slot for slots in self.axis.rights(ahead) for slot in slots}.union(self.occupied())
         lifts = [lift for lift in self.axis.lifts if gate(lift) in line]
         effects = self.sill.ask(lifts, now_us)
         for lift in lifts:

@@ -1,0 +1,53 @@
+"""A task that is another's by a newer word of its initiator: its robot lets go of it, and tells nothing as done."""
+
+import pytest
+
+from onboard.contract.codes import CallResult, DriveMode, Reason, TaskPhase
+from onboard.contract.messages import Award, CarAt, DriveState, TaskReport, TokenGrant
+from onboard.core.authority import station_token
+from tests.kinds.test_whose_task import after_a_while
+from tests.models.at_work import AtWork, Deed
+from tests.models.award import BAY, CAR, CHEAP, DEAR, PLACE, TASK, WHEELBASE_MM
+from tests.models.custody import CustodyPart
+from tests.models.robots import RobotBody
+from tests.models.snapshot import NOW_US
+
+#: By the version after that under which the robot has it.
+ANOTHERS = Award(BAY, 0, DEAR, TASK, 2, CallResult.AWARDED, Reason.NONE)
+RIGHT = station_token(PLACE)
+PART = CustodyPart(laden=False)
+
+
+@pytest.fixture
+def robot() -> AtWork:
+    """It stands beside the car, and waits for the rights to place and car."""
+    made = PART.made(CHEAP, PART.journal(CHEAP), PART.body(CHEAP))
+    made.starts()
+    made.hears(CarAt(BAY, CAR, PLACE.number, 1, WHEELBASE_MM))
+    for _ in range(2):
+        made, _ = after_a_while(made)
+    assert RIGHT in made.fleet.tokens.wanted
+    return made
+
+
+def reports(deeds: list[Deed]) -> list[TaskPhase]:
+    return [word.phase for word in deeds if isinstance(word, TaskReport) and word.task == TASK]
+
+
+def test_the_right_to_the_place_goes_back_though_the_car_never_came(robot: AtWork) -> None:
+    """Whose the task was by then waited for the place, and who had the place for the car: both for ever."""
+    robot.hears(TokenGrant(BAY, RIGHT.kind, RIGHT.number, 1, CHEAP))
+    assert robot.fleet.tokens.holds(RIGHT)
+    given = [(word.token, word.holder) for word in robot.hears(ANOTHERS) if isinstance(word, TokenGrant)]
+    assert given == [(RIGHT.number, BAY)]
+
+
+@pytest.mark.parametrize("by_mm", [0, 300], ids=["at its mark", "pushed off it"])
+def test_work_that_is_dropped_is_not_told_as_done(robot: AtWork, by_mm: int) -> None:
+    """It wrote that it had taken the car, told LOADED, and after a restart believed so."""
+    assert isinstance(robot.body, RobotBody)
+    at_mm = robot.body.now.position_mm + by_mm
+    robot.behaviour.sense(DriveState(CHEAP, 0, at_mm, 0, DriveMode.STANDING, not by_mm), NOW_US)
+    deeds = robot.hears(ANOTHERS) + robot.waits(())
+    assert reports(deeds) == []
+    assert not [deed for deed in deeds if isinstance(deed, tuple) and dict(deed)["record"] == "handled"]
