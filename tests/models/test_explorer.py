@@ -10,30 +10,47 @@ from onboard.core.belief import Belief, Beliefs
 from onboard.core.effects import Effect
 from onboard.holon.witness import Witness
 from tests.models.explorer import Explorer, Found, Limits
+from tests.models.packed import PackedSearch
 
 #: Limits of CPU time are for runs in which a bug is looked for; a clean run has to be complete.
 _HUNT_S = 10.0
 
 
 def explore(nodes: int, versions: int, crashes: int = 0, **more: Any) -> Found:
-    return Explorer(Limits(nodes, versions, crashes, **more)).run()
+    return PackedSearch(Explorer(Limits(nodes, versions, crashes, **more))).run()
 
 
 @pytest.mark.parametrize(
     ("limits", "at_least"),
     [
-        (Limits(nodes=3, versions=2, crashes=0), 50_000),
-        (Limits(nodes=2, versions=2, crashes=2), 10_000),
-        (Limits(nodes=2, versions=3, crashes=1, old_copies=1), 100_000),
-        (Limits(nodes=2, versions=2, crashes=0, has_ghost=True), 10_000),
+        (Limits(nodes=3, versions=2, crashes=0), 300_000),
+        (Limits(nodes=2, versions=3, crashes=2), 1_000_000),
+        (Limits(nodes=2, versions=3, crashes=1, old_copies=1), 400_000),
+        (Limits(nodes=2, versions=2, crashes=1, has_ghost=True), 1_500_000),
     ],
     ids=["three-nodes", "crashes", "an-old-copy", "a-ghost"],
 )
 def test_never_two_holders_and_never_a_trap(limits: Limits, at_least: int) -> None:
-    found = Explorer(limits).run()
+    """Three million transitions and more together: ``at_least`` so many of each."""
+    found = PackedSearch(Explorer(limits)).run()
     print(found)
     assert (found.two, found.trap, found.alarm) == (None, None, None)
-    assert found.is_complete and found.states >= at_least
+    assert found.is_complete and found.transitions >= at_least
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [
+        Limits(nodes=3, versions=1, crashes=0),
+        Limits(nodes=2, versions=2, crashes=1, old_copies=1),
+        Limits(nodes=2, versions=1, crashes=1, has_ghost=True),
+    ],
+    ids=["three-nodes", "an-old-copy", "a-ghost"],
+)
+def test_packed_the_same_is_seen(limits: Limits) -> None:
+    packed, plain = PackedSearch(Explorer(limits)).run(), Explorer(limits).run()
+    assert (packed.states, packed.transitions) == (plain.states, plain.transitions)
+    assert packed.is_complete and plain.is_complete and plain.states > 200
 
 
 def _reversed(method: Callable[..., list[Effect]]) -> Callable[..., list[Effect]]:
