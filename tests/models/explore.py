@@ -11,7 +11,6 @@ from tests.models.custody import CustodyPart
 from tests.models.explorer import Explorer, Limits
 from tests.models.gate import GatePart
 from tests.models.moving import engine_of
-from tests.models.packed import PackedSearch
 from tests.models.runs import RunPart
 from tests.models.sealed import explore_sealed
 
@@ -74,7 +73,7 @@ def explore_part(part: engine.Part, limits: engine.Limits, file: Path | None) ->
 def explore_tokens(limits: Limits) -> None:
     """Explore the book of rights and its witness."""
     explorer = Explorer(limits)
-    found = PackedSearch(explorer).run()
+    found = explorer.run()
     print(
         f"{limits}: {found.states:,} states, {found.transitions:,} transitions, {found.spent_s:.1f} s, "
         f"{'complete' if found.is_complete else 'not complete'}, for a person {found.held_for_a_person}"

@@ -10,7 +10,6 @@ more: to change a medium takes longer than any frame.
 ``python -m tests.models.explore --help`` explores more than the gate does.
 """
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -36,6 +35,7 @@ from onboard.core.mirror import Mirror, Peer
 from onboard.holon.witness import Doubt, Witness
 from onboard.systems.car_park.site import car_park
 from tests.core.token_words import hear
+from tests.models.packed import Search, Split, Verdict
 from tests.models.table import Table
 
 SITE = car_park(find_site("small"))
@@ -116,7 +116,7 @@ class Found:
 
 @dataclass
 class Explorer:
-    """Depth first, every reachable state once; what a node does with a word is worked out once for each memory."""
+    """What a node does with a word is worked out once for each memory; ``packed.Search`` goes through all states."""
 
     limits: Limits
     found: Found = field(default_factory=Found)
@@ -132,6 +132,7 @@ class Explorer:
     _ghosts: int = 0
 
     def __post_init__(self) -> None:
+        self.search: Search[State] | None = None
         first = genesis_holder(SITE, KEY)
         others = [node for node in sorted(SITE.machines) if node != first]
         self.nodes = [first, *others][: self.limits.nodes]
@@ -260,22 +261,61 @@ class Explorer:
                 yield self._words.things[number]
             bits, number = bits >> 1, number + 1
 
-    def steps(self, state: State) -> Iterator[State]:
-        """All states that may come next."""
-        words: list[Message | None] = [None, *self._on_bus(state), *self._requests]
+    # What may come next (``packed.Model``). The bus is left as it was, or with no more than a ghost says.
+    @property
+    def stays(self) -> tuple[int, int]:
+        """All of the bus, or none of it."""
+        return -1, 0
+
+    def heeds(self, i: int) -> int:
+        """Any word may be something to any node."""
+        return -1
+
+    def split(self, state: State) -> Split:
+        """Each node's memory, deeds, journal and gate."""
+        gates = state.gates or (None,) * len(self.nodes)
+        parts = tuple(zip(state.memory, state.to_do, state.journal, gates, strict=True))
+        return Split(parts, state.crashes | state.old_copies << 4, state.bus)
+
+    def join(self, split: Split) -> State:
+        """The state of these parts."""
+        parts: Any = split.parts
+        memory, to_do, journal, gates = zip(*parts, strict=True)
+        has_gates = None not in gates
+        return State(
+            memory, to_do, journal, split.bus, split.count & 0xF, split.count >> 4, gates if has_gates else ()
+        )
+
+    def moves(self, state: State, i: int) -> Iterator[State]:
+        """It does what it has yet to do, or hears a word, or that time has passed."""
+        memory = state.memory[i]
+        if memory is None:
+            return
+        if state.to_do[i]:
+            yield self._carry_out(state, i)
+        else:
+            yield from self._hearings(state, i, memory, [None, *self._on_bus(state), *self._requests])
+
+    def alone(self, state: State) -> Iterator[tuple[State, int]]:
+        """A node crashes, starts again, or answers another that asks."""
         for i, memory in enumerate(state.memory):
             if memory is None:
-                yield from self._restarts(state, i)
+                for one in self._restarts(state, i):
+                    yield one, self._left_on_bus(state, one)
                 continue
             if state.crashes < self.limits.crashes:
-                yield self._crash(state, i)
-            if state.to_do[i]:
-                yield self._carry_out(state, i)
-                continue
-            yield from self._hearings(state, i, memory, words)
+                yield self._crash(state, i), 0
             for j in range(len(self.nodes)):
-                if self._asks(state, j, i) and not state.to_do[j]:
-                    yield self._answers(state, i, j)
+                if not state.to_do[i] and self._asks(state, j, i) and not state.to_do[j]:
+                    yield self._answers(state, i, j), 0
+
+    def verdict(self, state: State) -> Verdict:
+        """All is seen, or two hold the token; the first trap and the first false alarm are kept."""
+        if self.found.trap is None and not self.ends_well(state):
+            self.found.trap = state
+        if self.found.alarm is None and not state.old_copies and self._is_doubtful(state):
+            self.found.alarm = state
+        return Verdict.STOP if len(self._holders(state)) > 1 else Verdict.GOES_ON
 
     def _hearings(self, state: State, i: int, memory: int, words: list[Message | None]) -> Iterator[State]:
         node = self.nodes[i]
@@ -301,7 +341,7 @@ class Explorer:
         if state.old_copies < self.limits.old_copies and sum(one is None for one in state.memory) == 1:
             journal = self._journals.things[state.journal[i]]
             for length in range(len(journal)):
-                old = state._replace(old_copies=state.old_copies + 1, bus=self._left_on_bus(state))
+                old = state._replace(old_copies=state.old_copies + 1, bus=state.bus | self._ghosts)
                 yield self._restarted(old, i, self._journals.number(journal[:length]))
 
     def _restarted(self, state: State, i: int, journal: int) -> State:
@@ -314,9 +354,9 @@ class Explorer:
         others[i] = self._memories.number(memory._replace(asked=live, is_synced=not live))
         return self._say(state._replace(memory=tuple(others), journal=_set(state.journal, i, journal)), i, said)
 
-    def _left_on_bus(self, state: State) -> int:
-        """What can still be heard once a medium was changed."""
-        return self._ghosts
+    def _left_on_bus(self, before: State, after: State) -> int:
+        """What can still be heard, by its place in ``stays``: of before a change of the medium nothing."""
+        return 1 if after.old_copies > before.old_copies else 0
 
     def _say(self, state: State, i: int, deeds: Deeds) -> State:
         """Node i says the words of these deeds."""
@@ -440,26 +480,10 @@ class Explorer:
 
     def run(self) -> Found:
         """Explore until all is seen, two hold the token, or the time is over."""
-        found, begin = self.found, self.begin()
-        seen, stack = {begin}, [begin]
-        began_s = time.process_time()
-        while stack and found.two is None and time.process_time() - began_s < self.limits.most_s:
-            state = stack.pop()
-            if found.trap is None and not self.ends_well(state):
-                found.trap = state
-            if found.alarm is None and not state.old_copies and self._is_doubtful(state):
-                found.alarm = state
-            for after in self.steps(state):
-                found.transitions += 1
-                if after in seen:
-                    continue
-                seen.add(after)
-                if len(self._holders(after)) > 1:
-                    found.two = after
-                    break
-                stack.append(after)
-        found.states, found.is_complete = len(seen), not stack and found.two is None
-        found.spent_s = time.process_time() - began_s
+        found, self.search = self.found, Search(self)
+        seen = self.search.run(most_s=self.limits.most_s)
+        found.states, found.transitions, found.is_complete, found.spent_s = seen
+        found.two = self.search.stopped
         return found
 
 

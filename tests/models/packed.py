@@ -1,72 +1,126 @@
-"""The search of ``Explorer`` with each state as one whole number: many times as fast, and a tenth of the memory.
+"""One search for all explorations: breadth first, every reachable state once, each as one whole number.
 
-A state is, from the lowest bit: each node's part (its memory, deeds and journal, by number), the counts, and the bus.
-What one node may do depends on its part and the bus alone, and changes no more than these: it is worked out once by
-``Explorer`` itself, and kept as what is to be added to the state. What more than one part decides is kept by all parts.
+From the lowest bit a state is each machine's part by number, a count, and the bus with a bit for each word. What a
+machine may do about the bus depends on its part and on the words that it heeds: that is worked out once by the model
+and kept, as what is to be added to the state and said. What more than one part decides is kept by all parts. So most
+transitions cost an addition and a look into a table, about 1 us.
 """
 
 import time
+from collections import deque
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from enum import Enum
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
-from tests.models.explorer import Explorer, Found, State
 from tests.models.table import Table
 
-#: Bits of a node's part, and of each of the two counts.
-_PART_BITS, _COUNT_BITS = 20, 2
+#: Bits of a machine's part, and of the count.
+_PART_BITS, _COUNT_BITS = 20, 8
 _PART, _COUNT = (1 << _PART_BITS) - 1, (1 << _COUNT_BITS) - 1
 
+State = TypeVar("State")
 
-class _Local(NamedTuple):
-    """One node's part of a state: its place among the nodes, and memory, deeds and journal by number."""
 
-    i: int
-    memory: int | None
-    to_do: int
-    journal: int
+class Verdict(Enum):
+    """What becomes of a state: what follows it is explored; it is at its goal; or it must not be, and all ends."""
+
+    GOES_ON = 1
+    OVER = 2
+    STOP = 3
+
+
+class Split(NamedTuple):
+    """A state taken apart: what is each machine's, a count below 256, and the words on the bus as bits."""
+
+    parts: tuple[Hashable, ...]
+    count: int
+    bus: int
+
+
+class Model(Protocol[State]):
+    """What is explored."""
+
+    nodes: Sequence[int]
+    #: What a step may leave of the bus, as bits; steps name these by their places.
+    stays: Sequence[int]
+
+    def begin(self) -> State:
+        """The first state."""
+
+    def split(self, state: State) -> Split:
+        """Its parts."""
+
+    def join(self, split: Split) -> State:
+        """The state of these parts."""
+
+    def heeds(self, i: int) -> int:
+        """The words that are anything to machine i, as bits of the bus."""
+
+    def moves(self, state: State, i: int) -> Iterable[State]:
+        """What machine i, which is up, may do about its own and the bus; only its own, the count and the bus change."""
+
+    def alone(self, state: State) -> Iterable[tuple[State, int]]:
+        """What else may come next whatever is on the bus, and by its place in ``stays`` what that leaves of it."""
+
+    def verdict(self, state: State) -> Verdict:
+        """What is to be made of it, whatever is on the bus."""
+
+
+class Explored(NamedTuple):
+    """How much was seen in how long, s of processor time; whether it was all."""
+
+    states: int
+    transitions: int
+    is_complete: bool
+    spent_s: float
+
+
+#: What one machine does, by the words it heeds: what is to be added to a state, and what is said then.
+_Moves = dict[int, tuple[tuple[int, int], ...]]
 
 
 class _Here(NamedTuple):
-    """What is so wherever all parts and counts are these, whatever is on the bus."""
+    """What is so wherever all parts and the count are these."""
 
-    #: More than one hold the token; nobody ever will again; a node with a sound journal holds for a person.
-    is_two: bool
-    is_trap: bool
-    is_alarm: bool
-    #: Parts of the nodes that are up, each with what it does about the bus.
-    moving: tuple[tuple[int, dict[int, tuple[int, ...]]], ...]
-    #: What comes next but by the bus: a state without one, what stays of the bus (-1: all), and what is said then.
-    after: tuple[tuple[int, int, int], ...]
+    verdict: Verdict
+    #: Of each machine that moves, the words that it heeds and what it does about them.
+    moving: tuple[tuple[int, _Moves], ...] = ()
+    #: What else comes next: a state without a bus, what stays of that, and what is said.
+    after: tuple[tuple[int, int, int], ...] = ()
 
 
 @dataclass
-class PackedSearch:
-    """One search of an explorer's states, all of them; as ``Explorer.run``."""
+class Search(Generic[State]):
+    """All states of a model, until one must not be or a limit is reached."""
 
-    explorer: Explorer
-    _locals: Table[_Local] = field(default_factory=Table)
-    _moves: list[dict[int, tuple[int, ...]]] = field(default_factory=list)
+    model: Model[State]
+    #: From which state each was come to first.
+    came_from: dict[int, int] = field(default_factory=dict)
+    #: The state that must not be.
+    stopped: State | None = None
+    _parts: Table[tuple[int, Any]] = field(default_factory=Table)
+    _moves: list[_Moves] = field(default_factory=list)
     _here: dict[int, _Here] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._count_at = _PART_BITS * len(self.explorer.nodes)
-        self._bus_at = self._count_at + 2 * _COUNT_BITS
-        limits = self.explorer.limits
-        assert max(limits.crashes, limits.old_copies) <= _COUNT, "a count has two bits"
+        self._count_at = _PART_BITS * len(self.model.nodes)
+        self._bus_at = self._count_at + _COUNT_BITS
+        self._ground = (1 << self._bus_at) - 1
 
     # --- states as numbers ---------------------------------------------------------------------------------------
 
     def pack(self, state: State) -> int:
         """A state as a number."""
-        packed = state.bus << self._bus_at
-        packed |= (state.crashes | state.old_copies << _COUNT_BITS) << self._count_at
-        parts = zip(state.memory, state.to_do, state.journal, strict=True)
-        for i, (memory, to_do, journal) in enumerate(parts):
-            packed |= self._part(_Local(i, memory, to_do, journal)) << i * _PART_BITS
+        parts, count, bus = self.model.split(state)
+        assert count <= _COUNT, "a count has eight bits"
+        packed = bus << self._bus_at | count << self._count_at
+        for i, part in enumerate(parts):
+            packed |= self._part(i, part) << i * _PART_BITS
         return packed
 
-    def _part(self, local: _Local) -> int:
-        number = self._locals.number(local)
+    def _part(self, i: int, part: Any) -> int:
+        number = self._parts.number((i, part))
         if number == len(self._moves):
             self._moves.append({})
             assert number <= _PART, "a part has 20 bits"
@@ -74,109 +128,75 @@ class PackedSearch:
 
     def unpack(self, packed: int) -> State:
         """The state that a number stands for."""
-        numbers = [packed >> i * _PART_BITS & _PART for i in range(len(self.explorer.nodes))]
-        _, memory, to_do, journal = zip(*(self._locals.things[number] for number in numbers), strict=True)
-        counts = packed >> self._count_at
-        crashes, old_copies = counts & _COUNT, counts >> _COUNT_BITS & _COUNT
-        return State(memory, to_do, journal, packed >> self._bus_at, crashes, old_copies)
+        numbers = [packed >> i * _PART_BITS & _PART for i in range(len(self.model.nodes))]
+        parts = tuple([self._parts.things[number][1] for number in numbers])
+        return self.model.join(Split(parts, packed >> self._count_at & _COUNT, packed >> self._bus_at))
+
+    def way(self, state: State) -> list[State]:
+        """The states on the shortest way to one, it at the end."""
+        packed, found = self.pack(state), [state]
+        while self.came_from.get(packed, packed) != packed:
+            packed = self.came_from[packed]
+            found.append(self.unpack(packed))
+        return found[::-1]
 
     # --- what may come next --------------------------------------------------------------------------------------
 
-    def _look(self, ground: int) -> _Here:
-        """All that parts and counts decide, without a bus."""
-        explorer, state = self.explorer, self.unpack(ground)
-        after: list[State] = []
-        moving = []
-        for i, memory in enumerate(state.memory):
-            if memory is None:
-                after += explorer._restarts(state, i)
-                continue
-            if state.crashes < explorer.limits.crashes:
-                after.append(explorer._crash(state, i))
-            part = ground >> i * _PART_BITS & _PART
-            moving.append((i, self._moves[part]))
-            if not state.to_do[i]:
-                asking = [j for j in range(len(explorer.nodes)) if explorer._asks(state, j, i) and not state.to_do[j]]
-                after += [explorer._answers(state, i, j) for j in asking]
-        return _Here(
-            len(explorer._holders(state)) > 1,
-            not explorer.ends_well(state),
-            not state.old_copies and explorer._is_doubtful(state),
-            tuple(moving),
-            tuple(
-                (
-                    self.pack(one._replace(bus=0)),
-                    0 if one.old_copies > state.old_copies else -1,
-                    one.bus << self._bus_at,
-                )
-                for one in after
-            ),
-        )
+    def _look(self, packed: int) -> _Here:
+        verdict = self.model.verdict(self.unpack(packed))
+        if verdict is not Verdict.GOES_ON:
+            return _Here(verdict)
+        ground = self.unpack(packed & self._ground)
+        after = []
+        for one, stays in self.model.alone(ground):
+            ahead = self.pack(one)
+            after.append((ahead & self._ground, stays, ahead >> self._bus_at))
+        moving = [self._moves[packed >> i * _PART_BITS & _PART] for i in range(len(self.model.nodes))]
+        return _Here(verdict, tuple(enumerate(moving)), tuple(after))
 
-    def _does(self, packed: int, i: int, bus: int) -> tuple[int, ...]:
-        """What node i may do with this bus, each as what is to be added to the state."""
-        explorer, state = self.explorer, self.unpack(packed)
-        memory = state.memory[i]
-        assert memory is not None
-        if state.to_do[i]:
-            found = [explorer._carry_out(state, i)]
-        else:
-            words = [None, *explorer._on_bus(state), *explorer._requests]
-            found = list(explorer._hearings(state, i, memory, words))
-        added = tuple([self.pack(one) - packed for one in found])
-        self._moves[packed >> i * _PART_BITS & _PART][bus] = added
-        return added
+    def _does(self, packed: int, i: int, bus: int) -> tuple[tuple[int, int], ...]:
+        """What machine i may do about the words that it heeds: what is added to the ground, and the bus then."""
+        ground = packed & self._ground
+        moves = [self.pack(one) for one in self.model.moves(self.unpack(bus << self._bus_at | ground), i)]
+        found = tuple([((one & self._ground) - ground, one >> self._bus_at << self._bus_at) for one in moves])
+        self._moves[packed >> i * _PART_BITS & _PART][bus] = found
+        return found
 
     # --- the search ----------------------------------------------------------------------------------------------
 
-    def run(self) -> Found:
-        """Explore until all is seen, two hold the token, or the time is over."""
-        explorer, found, known = self.explorer, self.explorer.found, self._here
-        first = self.pack(explorer.begin())
-        bus_at, ground_bits = self._bus_at, (1 << self._bus_at) - 1
-        seen, waiting = {first}, [first]
-        add, push = seen.add, waiting.append
+    def run(self, said: int = 0, most_states: int = 1 << 62, most_s: float = 1e9) -> Explored:
+        """Explore; words of ``said`` are on the bus from the first."""
+        first = self.pack(self.model.begin()) | said << self._bus_at
+        came_from, known, waiting = self.came_from, self._here, deque([first])
+        came_from[first] = first
+        bus_at, ground_bits, heeds, stays = self._bus_at, self._ground, self.model.heeds, self.model.stays
         began_s, taken, transitions = time.process_time(), 0, 0
-        while waiting:
-            state = waiting.pop()
+        while waiting and len(came_from) < most_states:
+            state = waiting.popleft()
             ground, bus = state & ground_bits, state >> bus_at
             here = known.get(ground)
             if here is None:
-                here = known[ground] = self._look(ground)
-                self._judge(here, state)
-                if here.is_two:
-                    break
-            said = state - ground
-            for i, moves in here.moving:
-                added = moves.get(bus)
-                if added is None:
-                    added = self._does(state, i, bus)
-                transitions += len(added)
-                for more in added:
-                    after = state + more
-                    if after not in seen:
-                        add(after)
-                        push(after)
-            transitions += len(here.after)
-            for ahead, stays, words in here.after:
-                after = ahead + (said & stays | words)
-                if after not in seen:
-                    add(after)
-                    push(after)
-            taken += 1
-            if not taken & 0xFFFF and time.process_time() - began_s >= explorer.limits.most_s:
+                here = known[ground] = self._look(state)
+            if here.verdict is Verdict.STOP:
+                self.stopped = self.unpack(state)
                 break
-        found.states, found.transitions = len(seen), transitions
-        found.is_complete = not waiting and found.two is None
-        found.spent_s = time.process_time() - began_s
-        return found
-
-    def _judge(self, here: _Here, packed: int) -> None:
-        """Keep the first state of each kind that must not be."""
-        found = self.explorer.found
-        if here.is_two:
-            found.two = self.unpack(packed)
-        if here.is_trap and found.trap is None:
-            found.trap = self.unpack(packed)
-        if here.is_alarm and found.alarm is None:
-            found.alarm = self.unpack(packed)
+            found = []
+            for i, moves in here.moving:
+                heard = bus & heeds(i)
+                done = moves.get(heard)
+                if done is None:
+                    done = self._does(state, i, heard)
+                for more, words in done:
+                    found.append(state + more | words)
+            for ahead, left, words in here.after:
+                found.append(ahead | (bus & stays[left] | words) << bus_at)
+            transitions += len(found) - found.count(state)
+            for after in found:
+                if after not in came_from:
+                    came_from[after] = state
+                    waiting.append(after)
+            taken += 1
+            if not taken & 0xFF and time.process_time() - began_s >= most_s:
+                break
+        is_complete = not waiting and self.stopped is None
+        return Explored(len(came_from), transitions, is_complete, time.process_time() - began_s)

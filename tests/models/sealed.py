@@ -133,15 +133,15 @@ class SealedExplorer(Explorer):
     def _places(self) -> range:
         return range(len(self.nodes))
 
-    def steps(self, state: State) -> Iterator[State]:
+    def alone(self, state: State) -> Iterator[tuple[State, int]]:
         """As without seals; and two nodes ask each other for their numbers."""
-        yield from super().steps(state)
+        yield from super().alone(state)
         for i in self._places:
             for j in self._places:
                 if i < j and state.memory[i] is not None and state.memory[j] is not None:
                     after = self._asked_each_other(state, i, j)
                     if after != state:
-                        yield after
+                        yield after, 0
 
     def _asked_each_other(self, state: State, i: int, j: int) -> State:
         gates = state.gates
@@ -218,8 +218,8 @@ class SealedExplorer(Explorer):
         memories, journals = _set(state.memory, i, begun), _set(state.journal, i, journal)
         return self._say(state._replace(memory=memories, journal=journals, gates=gates), i, said)
 
-    def _left_on_bus(self, state: State) -> int:
-        return state.bus
+    def _left_on_bus(self, before: State, after: State) -> int:
+        return 0
 
     def _asks(self, state: State, j: int, i: int) -> bool:
         """Question and answer each need that the other follows."""
