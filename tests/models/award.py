@@ -89,8 +89,9 @@ class AwardPart:
         return AtWork(SITE, node, factory, RobotBody(node, body, is_quick=False), journal, stand_still, is_said)
 
     def hears(self, node: int, word: Message) -> bool:
-        """A robot hears the compartment's words that are for all, or for it; of the other what it would take, doubts that
-        are about itself, and what it has given away.
+        """A robot hears the compartment's words that are for all, or for it.
+
+        Of the other it hears what that would take, what it has given away, and doubts about itself.
         """
         if node == BAY or isinstance(word, Bid | TokenGiven):
             return True

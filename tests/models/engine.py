@@ -8,14 +8,14 @@ it: for words that come as late as they like, nothing in between differs from th
 worked out once, in its shipped code, and remembered by what decides it (``snapshot.essence``).
 """
 
-import time
-from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
 
 from onboard.contract.messages import CallForProposals, Message
 from tests.models.at_work import AtWork, Deed, Entry, Moved
+from tests.models.packed import Search, Split, Verdict
 from tests.models.snapshot import WHILE_US, copied, essence
 from tests.models.table import Table
 
@@ -94,7 +94,7 @@ class Part(Protocol):
 
 @dataclass(frozen=True)
 class Limits:
-    """How much is explored: crashes, states, CPU s; whether to remember how each state was come to.
+    """How much is explored: crashes, states, CPU s.
 
     With ``sleeps`` a machine may do nothing for a while instead, and remember all: one of its crashes.
     """
@@ -102,7 +102,6 @@ class Limits:
     crashes: int = 1
     most_states: int = 1 << 62
     most_s: float = 1e9
-    remembers: bool = True
     sleeps: bool = False
 
 
@@ -127,12 +126,11 @@ Step = tuple[str, int, Any, int]
 
 @dataclass
 class Engine:
-    """Breadth first, every reachable state once: what is found has the shortest way to it."""
+    """What machines do is worked out once; ``packed.Search`` goes through all states, the nearest first."""
 
     part: Part
     limits: Limits
     found: Found = field(default_factory=Found)
-    came_from: dict[State, tuple[State, Step]] = field(default_factory=dict)
     _minds: Table[Any] = field(default_factory=Table)
     _machines: list[Explored] = field(default_factory=list)
     _views: list[Any] = field(default_factory=list)
@@ -151,6 +149,10 @@ class Engine:
 
     def __post_init__(self) -> None:
         self.nodes = self.part.nodes
+        self.search = Search[State](self)
+        #: All that is on the bus, or all but what is too late for who hears it after a while.
+        self.stays = [-1, -1]
+        self._judged: dict[Any, str] = {}
         self._heeded = [0] * len(self.nodes)
         assert self._deeds.number(()) == 0, "nothing to do is number 0"
 
@@ -219,27 +221,59 @@ class Engine:
             for i, node in enumerate(self.nodes):
                 self._heeded[i] |= (node != word.sender and self.part.hears(node, word)) << number
         if isinstance(word, CallForProposals):
-            # Too late for who hears it after a while.
             self._fresh |= 1 << number
+            self.stays[1] = ~self._fresh
         return number
 
     # --- all of them ---------------------------------------------------------------------------------------------
 
+    def heeds(self, i: int) -> int:
+        """The words that machine i hears at all."""
+        return self._heeded[i]
+
+    def split(self, state: State) -> Split:
+        """What decides what each does and what outlives it."""
+        return Split(tuple(zip(state.minds, state.lasting, strict=True)), state.crashes, state.bus)
+
+    def join(self, split: Split) -> State:
+        """The state of these parts."""
+        parts: Any = split.parts
+        minds, lasting = zip(*parts, strict=True)
+        return State(minds, lasting, split.bus, split.faults)
+
+    def moves(self, state: State, i: int) -> Iterator[State]:
+        """It hears any word."""
+        return (after for after, _ in self._hears(state, i))
+
+    def alone(self, state: State) -> Iterator[tuple[State, int]]:
+        """One starts or crashes, or a while passes."""
+        yield from ((after, 0) for after, _ in self._at_any_time(state))
+        yield from ((after, 1) for after, _ in self._later(state))
+
     def steps(self, state: State) -> Iterator[tuple[State, Step]]:
         """All states that may come next, and how."""
+        for i in range(len(self.nodes)):
+            yield from self._hears(state, i)
+        yield from self._at_any_time(state)
+        yield from self._later(state)
+
+    def _hears(self, state: State, i: int) -> Iterator[tuple[State, Step]]:
+        mind = state.minds[i]
+        for word, after, deeds in [] if mind is None else self._heard(i, mind, state.bus):
+            yield from self._outcomes(state, i, after, deeds, ("hears", i, word, -1))
+
+    def _at_any_time(self, state: State) -> Iterator[tuple[State, Step]]:
         minds, lasting, bus, crashes = state
-        may_crash = crashes < self.limits.crashes
         for i, mind in enumerate(minds):
             if mind is None:
                 after, deeds = self.starts(i, lasting[i])
                 yield from self._outcomes(state, i, after, deeds, ("starts", i, None, -1))
-                continue
-            if may_crash:
+            elif crashes < self.limits.crashes:
                 yield State(_set(minds, i, None), lasting, bus, crashes + 1), ("crashes", i, None, -1)
-            for word, after, deeds in self._heard(i, mind, bus):
-                yield from self._outcomes(state, i, after, deeds, ("hears", i, word, -1))
+
+    def _later(self, state: State) -> Iterator[tuple[State, Step]]:
         yield from self._while(state)
-        if self.limits.sleeps and may_crash:
+        if self.limits.sleeps and state.crashes < self.limits.crashes:
             yield from self._sleep(state)
 
     def _heard(self, i: int, mind: int, bus: int) -> list[tuple[int, int, int]]:
@@ -281,8 +315,7 @@ class Engine:
         whole = base
         for i, after, deeds in done:
             whole = self._all_done(whole, i, after, deeds)
-        if whole != state:
-            yield whole, ("waits", -1, down, -1)
+        yield whole, ("waits", -1, down, -1)
         if state.crashes < self.limits.crashes:
             for i, _, deeds in done:
                 rest = base
@@ -392,54 +425,42 @@ class Engine:
             state = self._all_done(state, i, *self._does(i, mind, frozenset()))
         return state
 
+    def is_wrong(self, state: State) -> bool:
+        """What must never be; it is told in ``found``."""
+        what = self._judged_by(state)
+        why = self._judged.get(what)
+        if why is None:
+            why = self._judged[what] = self.part.wrong(self._seen(state))
+        if why:
+            self.found.wrong, self.found.why = state, why
+        return bool(why)
+
+    def verdict(self, state: State) -> Verdict:
+        """Whether it is a trap, or at its goal."""
+        if not self.ends_well(state):
+            self.found.trap, self.found.why = state, "a trap"
+            return Verdict.STOP
+        return Verdict.OVER if self.part.is_over(self._seen(state)) else Verdict.GOES_ON
+
     def run(self, late: Iterable[Message] = ()) -> Found:
         """Explore until all is seen, something is wrong or a trap, or the limit is reached.
 
         Words that are ``late`` are on the bus from the first.
         """
-        found, state = self.found, self.begin()
-        for word in late:
-            state = self.said(state, word)
-        seen, waiting = {state}, deque([state])
-        wrong, remembers, limits = self.part.wrong, self.limits.remembers, self.limits
-        judged: dict[Any, str] = {}
-        began_s, taken = time.process_time(), 0
-        while waiting and not found.why and len(seen) < limits.most_states:
-            state = waiting.popleft()
-            if not self.ends_well(state):
-                found.trap, found.why = state, "a trap"
-                break
-            if self.part.is_over(self._seen(state)):
-                continue
-            for after, step in self.steps(state):
-                found.transitions += 1
-                if after in seen:
-                    continue
-                seen.add(after)
-                if remembers:
-                    self.came_from[after] = state, step
-                what = self._judged_by(after)
-                why = judged.get(what)
-                if why is None:
-                    why = judged[what] = wrong(self._seen(after))
-                if why:
-                    found.wrong, found.why = after, why
-                    break
-                waiting.append(after)
-            taken += 1
-            if not taken % 64 and time.process_time() - began_s > limits.most_s:
-                break
-        found.states, found.is_complete = len(seen), not waiting and not found.why
-        found.spent_s = time.process_time() - began_s
+        found, limits = self.found, self.limits
+        said = sum({1 << self._word(word) for word in late})
+        found.states, found.transitions, found.is_complete, found.spent_s = self.search.run(
+            said, limits.most_states, limits.most_s
+        )
         return found
 
     def way(self, state: State) -> list[tuple[State, Step]]:
         """The states on the shortest way to one, each with what was done in it."""
-        found = []
-        while state in self.came_from:
-            state, step = self.came_from[state]
-            found.append((state, step))
-        return found[::-1]
+        states = self.search.way(state)
+        return [
+            (before, next(step for one, step in self.steps(before) if one == after))
+            for before, after in pairwise(states)
+        ]
 
     def crashes(self, state: State) -> list[tuple[int, dict[str, str | int], bool]]:
         """The crashes on the way to a state: of which node, at which line of its journal, and whether that was written.

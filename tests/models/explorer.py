@@ -283,7 +283,7 @@ class Explorer:
         memory, to_do, journal, gates = zip(*parts, strict=True)
         has_gates = None not in gates
         return State(
-            memory, to_do, journal, split.bus, split.count & 0xF, split.count >> 4, gates if has_gates else ()
+            memory, to_do, journal, split.bus, split.faults & 0xF, split.faults >> 4, gates if has_gates else ()
         )
 
     def moves(self, state: State, i: int) -> Iterator[State]:
@@ -309,13 +309,17 @@ class Explorer:
                 if not state.to_do[i] and self._asks(state, j, i) and not state.to_do[j]:
                     yield self._answers(state, i, j), 0
 
+    def is_wrong(self, state: State) -> bool:
+        """Two hold the token."""
+        return len(self._holders(state)) > 1
+
     def verdict(self, state: State) -> Verdict:
-        """All is seen, or two hold the token; the first trap and the first false alarm are kept."""
+        """All is seen; the first trap and the first false alarm are kept."""
         if self.found.trap is None and not self.ends_well(state):
             self.found.trap = state
         if self.found.alarm is None and not state.old_copies and self._is_doubtful(state):
             self.found.alarm = state
-        return Verdict.STOP if len(self._holders(state)) > 1 else Verdict.GOES_ON
+        return Verdict.GOES_ON
 
     def _hearings(self, state: State, i: int, memory: int, words: list[Message | None]) -> Iterator[State]:
         node = self.nodes[i]

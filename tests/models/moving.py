@@ -38,9 +38,9 @@ class MovingEngine(Engine):
             found += [(i, moves, "moves")] if moves is not None else []
         return found
 
-    def steps(self, state: State) -> Iterator[tuple[State, Step]]:
-        """Words, crashes and whiles, and what comes about by itself."""
-        yield from super().steps(state)
+    def _at_any_time(self, state: State) -> Iterator[tuple[State, Step]]:
+        """Crashes and starts, and what comes about by itself."""
+        yield from super()._at_any_time(state)
         for i, event, what in self._own(state):
             mind = state.minds[i]
             assert mind is not None

@@ -1,9 +1,9 @@
 """One search for all explorations: breadth first, every reachable state once, each as one whole number.
 
-From the lowest bit a state is each machine's part by number, a count, and the bus with a bit for each word. What a
-machine may do about the bus depends on its part and on the words that it heeds: that is worked out once by the model
-and kept, as what is to be added to the state and said. What more than one part decides is kept by all parts. So most
-transitions cost an addition and a look into a table, about 1 us.
+From the lowest bit a state is each machine's part by number, a count of faults, and the bus with a bit for each word.
+What a machine may do about the bus depends on its part and on the words that it heeds: that is worked out once by the
+model and kept, as what is to be added to the state and said. What more than one part decides is kept by all parts. So
+most transitions cost an addition and a look into a table, about 1 us.
 """
 
 import time
@@ -16,14 +16,14 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 from tests.models.table import Table
 
 #: Bits of a machine's part, and of the count.
-_PART_BITS, _COUNT_BITS = 20, 8
+_PART_BITS, _COUNT_BITS = 24, 8
 _PART, _COUNT = (1 << _PART_BITS) - 1, (1 << _COUNT_BITS) - 1
 
 State = TypeVar("State")
 
 
 class Verdict(Enum):
-    """What becomes of a state: what follows it is explored; it is at its goal; or it must not be, and all ends."""
+    """What becomes of a state: what follows it is explored; it is at its goal; or nothing good follows: all ends."""
 
     GOES_ON = 1
     OVER = 2
@@ -31,19 +31,23 @@ class Verdict(Enum):
 
 
 class Split(NamedTuple):
-    """A state taken apart: what is each machine's, a count below 256, and the words on the bus as bits."""
+    """A state taken apart: what is each machine's, how many faults there were (below 256), and the bus by bits."""
 
     parts: tuple[Hashable, ...]
-    count: int
+    faults: int
     bus: int
 
 
 class Model(Protocol[State]):
     """What is explored."""
 
-    nodes: Sequence[int]
-    #: What a step may leave of the bus, as bits; steps name these by their places.
-    stays: Sequence[int]
+    @property
+    def nodes(self) -> Sequence[int]:
+        """Its machines."""
+
+    @property
+    def stays(self) -> Sequence[int]:
+        """What a step may leave of the bus, as bits; steps name these by their places."""
 
     def begin(self) -> State:
         """The first state."""
@@ -63,11 +67,14 @@ class Model(Protocol[State]):
     def alone(self, state: State) -> Iterable[tuple[State, int]]:
         """What else may come next whatever is on the bus, and by its place in ``stays`` what that leaves of it."""
 
+    def is_wrong(self, state: State) -> bool:
+        """Whether it must not be, whatever is on the bus; asked as soon as it is come to."""
+
     def verdict(self, state: State) -> Verdict:
-        """What is to be made of it, whatever is on the bus."""
+        """What is to be made of it, whatever is on the bus; asked before what follows it is looked for."""
 
 
-class Explored(NamedTuple):
+class Seen(NamedTuple):
     """How much was seen in how long, s of processor time; whether it was all."""
 
     states: int
@@ -97,11 +104,13 @@ class Search(Generic[State]):
     model: Model[State]
     #: From which state each was come to first.
     came_from: dict[int, int] = field(default_factory=dict)
-    #: The state that must not be.
+    #: The state that must not be, or from which nothing good follows.
     stopped: State | None = None
     _parts: Table[tuple[int, Any]] = field(default_factory=Table)
     _moves: list[_Moves] = field(default_factory=list)
     _here: dict[int, _Here] = field(default_factory=dict)
+    #: Parts and counts that are not wrong.
+    _sound: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self._count_at = _PART_BITS * len(self.model.nodes)
@@ -112,9 +121,9 @@ class Search(Generic[State]):
 
     def pack(self, state: State) -> int:
         """A state as a number."""
-        parts, count, bus = self.model.split(state)
-        assert count <= _COUNT, "a count has eight bits"
-        packed = bus << self._bus_at | count << self._count_at
+        parts, faults, bus = self.model.split(state)
+        assert faults <= _COUNT, "the count has eight bits"
+        packed = bus << self._bus_at | faults << self._count_at
         for i, part in enumerate(parts):
             packed |= self._part(i, part) << i * _PART_BITS
         return packed
@@ -123,7 +132,7 @@ class Search(Generic[State]):
         number = self._parts.number((i, part))
         if number == len(self._moves):
             self._moves.append({})
-            assert number <= _PART, "a part has 20 bits"
+            assert number <= _PART, "a part has 24 bits"
         return number
 
     def unpack(self, packed: int) -> State:
@@ -162,16 +171,24 @@ class Search(Generic[State]):
         self._moves[packed >> i * _PART_BITS & _PART][bus] = found
         return found
 
+    def _is_wrong(self, packed: int) -> bool:
+        state = self.unpack(packed)
+        if self.model.is_wrong(state):
+            self.stopped = state
+            return True
+        self._sound.add(packed & self._ground)
+        return False
+
     # --- the search ----------------------------------------------------------------------------------------------
 
-    def run(self, said: int = 0, most_states: int = 1 << 62, most_s: float = 1e9) -> Explored:
+    def run(self, said: int = 0, most_states: int = 1 << 62, most_s: float = 1e9) -> Seen:
         """Explore; words of ``said`` are on the bus from the first."""
         first = self.pack(self.model.begin()) | said << self._bus_at
-        came_from, known, waiting = self.came_from, self._here, deque([first])
+        came_from, known, sound, waiting = self.came_from, self._here, self._sound, deque([first])
         came_from[first] = first
         bus_at, ground_bits, heeds, stays = self._bus_at, self._ground, self.model.heeds, self.model.stays
         began_s, taken, transitions = time.process_time(), 0, 0
-        while waiting and len(came_from) < most_states:
+        while waiting and self.stopped is None and len(came_from) < most_states:
             state = waiting.popleft()
             ground, bus = state & ground_bits, state >> bus_at
             here = known.get(ground)
@@ -195,8 +212,10 @@ class Search(Generic[State]):
                 if after not in came_from:
                     came_from[after] = state
                     waiting.append(after)
+                    if after & ground_bits not in sound and self._is_wrong(after):
+                        break
             taken += 1
             if not taken & 0xFF and time.process_time() - began_s >= most_s:
                 break
         is_complete = not waiting and self.stopped is None
-        return Explored(len(came_from), transitions, is_complete, time.process_time() - began_s)
+        return Seen(len(came_from), transitions, is_complete, time.process_time() - began_s)

@@ -19,10 +19,11 @@ from tests.models.late import LatePart
 from tests.models.moving import engine_of
 from tests.thinned import is_long
 
-#: The compartment and one robot: all that two robots add is who of them wins.
+#: The compartment and one robot; two add who of them wins, and that one may have what the other waits for.
 PAIR = (BAY, CHEAP)
 PARTS: Mapping[str, Callable[[], Part]] = {
     "award": lambda: AwardPart(calls=1, nodes=PAIR),
+    "award-of-two": lambda: AwardPart(calls=1),
     "taking": lambda: CustodyPart(calls=1, nodes=PAIR, laden=False),
     "leaving": lambda: CustodyPart(calls=1, nodes=PAIR),
     "boarding": lambda: GatePart(nodes=(LIFT, FIRST)),
@@ -47,14 +48,19 @@ def _of(count: int) -> int:
     ("part", "limits", "at_least"),
     [
         ("award", Limits(crashes=0), 30_000),
+        ("award-of-two", Limits(crashes=0, most_states=_of(20_000)), _of(40_000)),
         ("award", Limits(crashes=1, most_states=_of(2_000)), _of(2_500)),
+        ("taking", Limits(crashes=0, most_states=_of(2_000)), _of(2_500)),
         ("taking", Limits(crashes=1, most_states=_of(2_000)), _of(2_500)),
         ("leaving", Limits(crashes=1, most_states=_of(2_000)), _of(2_500)),
         ("boarding", Limits(crashes=0, most_states=_of(1_500)), _of(2_500)),
         ("riding", Limits(crashes=1, most_states=1_000), 2_000),
         ("two-riding", Limits(crashes=1, most_states=400), 500),
     ],
-    ids=["award-without-crash", "award", "taking", "leaving", "boarding", "riding", "two-riding"],
+    ids=[
+        *("award-without-crash", "award-of-two", "award", "taking-without-crash", "taking", "leaving", "boarding"),
+        *("riding", "two-riding"),
+    ],
 )
 def test_one_holder_and_no_trap(part: str, limits: Limits, at_least: int) -> None:
     found = engine_of(PARTS[part](), limits).run()
