@@ -33,8 +33,25 @@ def as_scenario(engine: Engine, state: State) -> FaultScenario:
     """The crashes on the way to a state. Raises ``ValueError`` where one of them is not at a line of a journal."""
     scene = LIFT_SCENE if LIFT in engine.nodes else SCENE
     return scene.with_faults(
-        _crash(scene, node, line, durable=durable) for node, line, durable in engine.crashes(state)
+        _crash(scene, node, line, durable=durable) for node, line, durable in _crashes(engine, state)
     )
+
+
+def _crashes(engine: Engine, state: State) -> list[tuple[int, dict[str, Any], bool]]:
+    """The crashes on the way to a state: of which node, at which line of its journal, and whether that was written.
+
+    The line is the next of what it was doing, else the last that it had written.
+    """
+    found = []
+    for before, (what, i, about, most) in engine.way(state):
+        if what != "crashes" and most < 0:
+            continue
+        doing = engine.doing(before, i, about) if most >= 0 else ()
+        following = [deed for deed in doing[max(most, 0) :] if isinstance(deed, tuple)]
+        written = [*engine.journal(before, i), *doing[: max(most, 0)]]
+        lines = following[:1] or [deed for deed in written if isinstance(deed, tuple)][-1:]
+        found.append((engine.nodes[i], dict(lines[0]), not following))
+    return found
 
 
 def _crash(scene: FaultScenario, node: int, line: Mapping[str, Any], *, durable: bool) -> Injection:

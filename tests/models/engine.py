@@ -17,7 +17,7 @@ from onboard.contract.messages import CallForProposals, Message
 from tests.models.at_work import AtWork, Deed, Entry, Moved
 from tests.models.packed import Search, Split, Verdict
 from tests.models.snapshot import WHILE_US, copied, essence
-from tests.models.table import Table
+from tests.models.table import Table, ones, put
 
 #: Whiles in which all must have come to its end once nothing fails any more.
 PATIENCE = 16
@@ -269,7 +269,7 @@ class Engine:
                 after, deeds = self.starts(i, lasting[i])
                 yield from self._outcomes(state, i, after, deeds, ("starts", i, None, -1))
             elif crashes < self.limits.crashes:
-                yield State(_set(minds, i, None), lasting, bus, crashes + 1), ("crashes", i, None, -1)
+                yield State(put(minds, i, None), lasting, bus, crashes + 1), ("crashes", i, None, -1)
 
     def _later(self, state: State) -> Iterator[tuple[State, Step]]:
         yield from self._while(state)
@@ -282,7 +282,7 @@ class Engine:
         known = self._hearings.get((i, mind, bus))
         if known is None:
             known = []
-            for word in _ones(bus):
+            for word in ones(bus):
                 after, deeds = self._does(i, mind, word)
                 if (after != mind or deeds) and self._within[after]:
                     known.append((word, after, deeds))
@@ -294,11 +294,11 @@ class Engine:
         minds, lasting, bus, crashes = state
         count = len(self._deeds.things[deeds]) if deeds else 0
         kept, said = self._carried_out(lasting[i], deeds, count)
-        yield State(_set(minds, i, after), _set(lasting, i, kept), bus | said, crashes), step
+        yield State(put(minds, i, after), put(lasting, i, kept), bus | said, crashes), step
         if crashes < self.limits.crashes:
             for most in range(1, count + 1):
                 kept, said = self._carried_out(lasting[i], deeds, most)
-                down = State(_set(minds, i, None), _set(lasting, i, kept), bus | said, crashes + 1)
+                down = State(put(minds, i, None), put(lasting, i, kept), bus | said, crashes + 1)
                 yield down, (step[0], i, step[2], most)
 
     def _while(self, state: State) -> Iterator[tuple[State, Step]]:
@@ -324,7 +324,7 @@ class Engine:
                         rest = self._all_done(rest, j, other, more)
                 for most in range(1, len(self._deeds.things[deeds]) + 1):
                     kept, said = self._carried_out(rest.lasting[i], deeds, most)
-                    minds, lasting = _set(rest.minds, i, None), _set(rest.lasting, i, kept)
+                    minds, lasting = put(rest.minds, i, None), put(rest.lasting, i, kept)
                     yield State(minds, lasting, rest.bus | said, state.crashes + 1), ("waits", i, down, most)
 
     def _sleep(self, state: State) -> Iterator[tuple[State, Step]]:
@@ -342,7 +342,7 @@ class Engine:
 
     def _all_done(self, state: State, i: int, after: int, deeds: int) -> State:
         kept, said = self._carried_out(state.lasting[i], deeds, len(self._deeds.things[deeds]))
-        return State(_set(state.minds, i, after), _set(state.lasting, i, kept), state.bus | said, state.crashes)
+        return State(put(state.minds, i, after), put(state.lasting, i, kept), state.bus | said, state.crashes)
 
     def _seen(self, state: State) -> tuple[Any, ...]:
         return tuple([None if mind is None else self._views[mind] for mind in state.minds])
@@ -386,7 +386,7 @@ class Engine:
                 return state
             for i, bits in enumerate(new):
                 heard[i] |= bits
-                for word in _ones(bits):
+                for word in ones(bits):
                     mind = state.minds[i]
                     assert mind is not None
                     state = self._all_done(state, i, *self._does(i, mind, word))
@@ -462,26 +462,15 @@ class Engine:
             for before, after in pairwise(states)
         ]
 
-    def crashes(self, state: State) -> list[tuple[int, dict[str, str | int], bool]]:
-        """The crashes on the way to a state: of which node, at which line of its journal, and whether that was written.
+    def doing(self, state: State, i: int, event: Any) -> tuple[Deed, ...]:
+        """What machine i does about an event in a state; while it is down, at power-up."""
+        mind = state.minds[i]
+        _, deeds = self.starts(i, state.lasting[i]) if mind is None else self._does(i, mind, event)
+        return self._deeds.things[deeds]
 
-        The line is the next of what it was doing, else the last that it had written.
-        """
-        found = []
-        for before, (what, i, about, most) in self.way(state):
-            if what != "crashes" and most < 0:
-                continue
-            doing: tuple[Deed, ...] = ()
-            mind = before.minds[i]
-            if most >= 0:
-                event = about if what != "starts" else None
-                _, deeds = self.starts(i, before.lasting[i]) if mind is None else self._does(i, mind, event)
-                doing = self._deeds.things[deeds]
-            following = [deed for deed in doing[max(most, 0) :] if isinstance(deed, tuple)]
-            written = [*self._lasting.things[before.lasting[i]].journal, *doing[: max(most, 0)]]
-            lines = following[:1] or [deed for deed in written if isinstance(deed, tuple)][-1:]
-            found.append((self.nodes[i], dict(lines[0]), not following))
-        return found
+    def journal(self, state: State, i: int) -> tuple[tuple[tuple[str, str | int], ...], ...]:
+        """What is in machine i's journal."""
+        return self._lasting.things[state.lasting[i]].journal
 
     def told(self, state: State) -> str:
         """How a state was come to, and what it is, for a person."""
@@ -489,7 +478,7 @@ class Engine:
         for i, node in enumerate(self.nodes):
             mind = state.minds[i]
             lines.append(f"node {node}: {'down' if mind is None else self._views[mind]}")
-            lines += [f"    {dict(line)}" for line in self._lasting.things[state.lasting[i]].journal]
+            lines += [f"    {dict(line)}" for line in self.journal(state, i)]
         return "\n".join(lines)
 
     def _told_step(self, step: Step) -> str:
@@ -499,16 +488,3 @@ class Engine:
         if what == "hears":
             text += f" {self._words.things[about]}"
         return text if most < 0 else f"{text}, and crashes after {most} of its deeds"
-
-
-def _ones(bits: int) -> Iterator[int]:
-    """The places of the bits that are set, from 0."""
-    place = 0
-    while bits:
-        if bits & 1:
-            yield place
-        bits, place = bits >> 1, place + 1
-
-
-def _set(values: tuple[Any, ...], at: int, value: Any) -> tuple[Any, ...]:
-    return (*values[:at], value, *values[at + 1 :])

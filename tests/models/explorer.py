@@ -14,9 +14,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from bus_sim.sites import find_site
-from onboard.contract.codes import KindCode, MachineState, Reason, TokenKind
-from onboard.contract.constants import NOBODY
 from onboard.contract.messages import (
     Message,
     SyncDone,
@@ -28,45 +25,19 @@ from onboard.contract.messages import (
     TokenRequest,
     TokenSeen,
 )
-from onboard.core.authority import Grant, TokenBook, TokenKey, genesis_holder
-from onboard.core.belief import Belief
+from onboard.core.authority import TokenBook, genesis_holder
 from onboard.core.effects import Effect, Record, Send
-from onboard.core.mirror import Mirror, Peer
-from onboard.holon.witness import Doubt, Witness
-from onboard.systems.car_park.site import car_park
+from onboard.holon.witness import Witness
 from tests.core.token_words import hear
 from tests.models.packed import Search, Split, Verdict
-from tests.models.table import Table
+from tests.models.remembered import KEY, NOW_US, SITE, Memory, load, saved, witness_of
+from tests.models.table import Table, ones, put
 
-SITE = car_park(find_site("small"))
-KEY = TokenKey(TokenKind.STATION, next(iter(SITE.compartments.values())).number)
 #: No machine of the site.
 GHOST = 240
-#: Any moment: whatever is to be said again is due.
-_NOW_US = 1 << 40
 #: One line of a journal: record, version, holder.
 Line = tuple[str, int, int]
 Journal = tuple[Line, ...]
-
-
-class Memory(NamedTuple):
-    """What one node remembers of the token; hints, counts and times are left out, as nothing is decided by them."""
-
-    held: int | None = None
-    leaving: tuple[int, int] | None = None
-    seen: int | None = None
-    given: Belief | None = None
-    belief: Belief | None = None
-    disputed: TokenGrant | None = None
-    is_synced: bool = True
-    asked: frozenset[int] = frozenset()
-    answered: frozenset[int] = frozenset()
-    doubted: tuple[tuple[int, int], ...] = ()
-    doubt: bool = False
-    starting: frozenset[int] = frozenset()
-    is_gift: bool = False
-
-
 #: What a node has yet to do: lines for its journal and words for the bus.
 Deeds = tuple[Line | Message, ...]
 
@@ -141,78 +112,27 @@ class Explorer:
 
     # --- one node ----------------------------------------------------------------------------------------------
 
-    def _load(self, node: int, memory: Memory) -> tuple[TokenBook, Witness]:
-        book = TokenBook(SITE, node)
-        if memory.held is not None:
-            book.held[KEY] = memory.held
-        if memory.leaving is not None:
-            book.leaving[KEY] = Grant(*memory.leaving, 0)
-        if memory.seen is not None:
-            book.seen[KEY] = memory.seen
-        if memory.given is not None:
-            book.given[KEY] = memory.given
-        if memory.belief is not None:
-            book.beliefs.verified[KEY] = memory.belief
-        if memory.disputed is not None:
-            book._disputed[KEY] = memory.disputed
-        book.is_synced, book.asked = memory.is_synced, set(memory.asked)
-        return book, self._witness(book, memory)
-
-    def _witness(self, book: TokenBook, memory: Memory) -> Witness:
-        mirror = Mirror(SITE, book.node_id)
-        for node in self.nodes:
-            if node != book.node_id:
-                mirror.peers[node] = Peer(KindCode.ROBOT, MachineState.IDLE, 2, 0, _NOW_US, 0, 0)
-        witness = Witness(book, mirror, 2, True, lambda _: book.statements())
-        witness.answered = set(memory.answered)
-        witness.doubt = Doubt(Reason.JOURNAL_SHORT, NOBODY, "") if memory.doubt else None
-        witness.doubted = {node: {KEY: version} for node, version in memory.doubted}
-        witness.starting = set(memory.starting)
-        if memory.is_gift:
-            book.gifts.add(KEY)
-        # It has listened for long enough whenever all have answered.
-        witness._since_us = 0
-        return witness
-
-    def _save(self, book: TokenBook, witness: Witness) -> Memory:
-        leaving = book.leaving.get(KEY)
-        return Memory(
-            book.held.get(KEY),
-            leaving and (leaving.version, leaving.holder),
-            book.seen.get(KEY),
-            book.given.get(KEY),
-            book.beliefs.verified.get(KEY),
-            book._disputed.get(KEY),
-            book.is_synced,
-            frozenset(book.asked & set(self.nodes)),
-            frozenset(witness.answered),
-            tuple((node, lost[KEY]) for node, lost in sorted(witness.doubted.items()) if KEY in lost),
-            witness.doubt is not None,
-            frozenset(witness.starting & set(self.nodes)),
-            bool(witness.starting) and KEY in book.gifts,
-        )
-
     def hears(self, i: int, memory: int, word: Message | None) -> tuple[int, int]:
         """What node i makes of a word, None for the time that passes: its memory after it, and its deeds."""
         case = i, memory, word
         known = self._done.get(case)
         if known is None:
-            book, witness = self._load(self.nodes[i], self._memories.things[memory])
+            book, witness = load(self.nodes[i], self.nodes, self._memories.things[memory])
             deeds = _deeds(self._handle(book, witness, word))
-            known = self._memories.number(self._save(book, witness)), self._deeds.number(deeds)
+            known = self._memories.number(saved(book, witness, self.nodes)), self._deeds.number(deeds)
             self._done[case] = known
         return known
 
     def _handle(self, book: TokenBook, witness: Witness, word: Message | None) -> list[Effect]:
         if word is None:
-            return book.wake(_NOW_US)
+            return book.wake(NOW_US)
         if isinstance(word, SyncRequest):
-            return witness.on_request(word, _NOW_US)
+            return witness.on_request(word, NOW_US)
         if isinstance(word, SyncDone):
-            return witness.on_done(word, _NOW_US)
+            return witness.on_done(word, NOW_US)
         if isinstance(word, TokenHeld | TokenGrant | TokenGiven | TokenSeen | TokenRequest):
             witness.hear(word)
-        return hear(book, word, _NOW_US)
+        return hear(book, word, NOW_US)
 
     def starts(self, i: int, journal: int) -> tuple[Memory, Deeds]:
         """Node i begins again with what its journal says: its memory, and what it says."""
@@ -223,18 +143,18 @@ class Explorer:
                 {"record": record, "kind": int(KEY.kind), "number": KEY.number, "version": version, "holder": holder}
                 for record, version, holder in self._journals.things[journal]
             )
-            witness = self._witness(book, Memory())
-            known = self._started[i, journal] = self._save(book, witness), _deeds(witness.begin(0))
+            witness = witness_of(book, self.nodes, Memory())
+            known = self._started[i, journal] = saved(book, witness, self.nodes), _deeds(witness.begin(0))
         return known
 
     def _sees_start(self, j: int, memory: int, started: int) -> int:
         """A live node hears the first heartbeat of one that was started, and asks it."""
         known = self._seen_starting.get((j, memory, started))
         if known is None:
-            book, witness = self._load(self.nodes[j], self._memories.things[memory])
+            book, witness = load(self.nodes[j], self.nodes, self._memories.things[memory])
             witness._was_started(started)
             book.asked.add(started)
-            known = self._seen_starting[j, memory, started] = self._memories.number(self._save(book, witness))
+            known = self._seen_starting[j, memory, started] = self._memories.number(saved(book, witness, self.nodes))
         return known
 
     def _bits(self, deeds: Deeds) -> int:
@@ -255,11 +175,7 @@ class Explorer:
         return found
 
     def _on_bus(self, state: State) -> Iterator[Message]:
-        bits, number = state.bus, 0
-        while bits:
-            if bits & 1:
-                yield self._words.things[number]
-            bits, number = bits >> 1, number + 1
+        return (self._words.things[number] for number in ones(state.bus))
 
     # What may come next (``packed.Model``). The bus is left as it was, or with no more than a ghost says.
     @property
@@ -328,7 +244,7 @@ class Explorer:
                 continue
             after, deeds = self.hears(i, memory, word)
             if (after != memory or deeds) and (self._memories.things[after].seen or 0) <= self.limits.versions:
-                yield state._replace(memory=_set(state.memory, i, after), to_do=_set(state.to_do, i, deeds))
+                yield state._replace(memory=put(state.memory, i, after), to_do=put(state.to_do, i, deeds))
 
     def _asks(self, state: State, j: int, i: int) -> bool:
         """Whether node j waits for an answer of node i."""
@@ -337,7 +253,7 @@ class Explorer:
 
     def _crash(self, state: State, i: int) -> State:
         return state._replace(
-            memory=_set(state.memory, i, None), to_do=_set(state.to_do, i, 0), crashes=state.crashes + 1
+            memory=put(state.memory, i, None), to_do=put(state.to_do, i, 0), crashes=state.crashes + 1
         )
 
     def _restarts(self, state: State, i: int) -> Iterator[State]:
@@ -356,7 +272,7 @@ class Explorer:
         ]
         live = frozenset(self.nodes[j] for j, one in enumerate(others) if one is not None and j != i)
         others[i] = self._memories.number(memory._replace(asked=live, is_synced=not live))
-        return self._say(state._replace(memory=tuple(others), journal=_set(state.journal, i, journal)), i, said)
+        return self._say(state._replace(memory=tuple(others), journal=put(state.journal, i, journal)), i, said)
 
     def _left_on_bus(self, before: State, after: State) -> int:
         """What can still be heard, by its place in ``stays``: of before a change of the medium nothing."""
@@ -368,11 +284,11 @@ class Explorer:
 
     def _carry_out(self, state: State, i: int) -> State:
         deed, *rest = self._deeds.things[state.to_do[i]]
-        after = state._replace(to_do=_set(state.to_do, i, self._deeds.number(tuple(rest))))
+        after = state._replace(to_do=put(state.to_do, i, self._deeds.number(tuple(rest))))
         if isinstance(deed, Message):
             return self._say(after, i, (deed,))
         journal = self._journals.number((*self._journals.things[state.journal[i]], deed))
-        return after._replace(journal=_set(state.journal, i, journal))
+        return after._replace(journal=put(state.journal, i, journal))
 
     def _answers(self, state: State, i: int, j: int) -> State:
         """Node i answers node j: all that it vouches for, heard in one go; the others may hear it or not."""
@@ -385,8 +301,8 @@ class Explorer:
             asking, more = self.hears(j, asking, word)
             to_do += self._deeds.things[more]
         asking = self._trusts(state, asking, j)
-        memories = _set(_set(state.memory, i, memory), j, asking)
-        after = state._replace(memory=memories, to_do=_set(state.to_do, j, self._deeds.number(to_do)))
+        memories = put(put(state.memory, i, memory), j, asking)
+        after = state._replace(memory=memories, to_do=put(state.to_do, j, self._deeds.number(to_do)))
         return self._say(after, i, tuple(word for word in words if not isinstance(word, SyncDone)))
 
     def _trusts(self, state: State, asking: int, j: int) -> int:
@@ -451,7 +367,7 @@ class Explorer:
         memory = state.memory[i]
         assert memory is not None
         after, deeds = self.hears(i, memory, word)
-        return self._quiet(state._replace(memory=_set(state.memory, i, after), to_do=_set(state.to_do, i, deeds)))
+        return self._quiet(state._replace(memory=put(state.memory, i, after), to_do=put(state.to_do, i, deeds)))
 
     def told(self, state: State) -> str:
         """A state in full, for a person."""
@@ -506,7 +422,3 @@ def _deeds(effects: list[Effect]) -> Deeds:
         elif isinstance(effect, Send) and not isinstance(effect.message, SyncRequest):
             found.append(effect.message)
     return tuple(found)
-
-
-def _set(values: tuple[Any, ...], at: int, value: Any) -> tuple[Any, ...]:
-    return (*values[:at], value, *values[at + 1 :])

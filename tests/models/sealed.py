@@ -16,7 +16,9 @@ from onboard.contract.messages import Message, TokenGrant, TokenHeld
 from onboard.core.frame import Frame
 from onboard.seal.gate import Gate, GateSettings
 from onboard.seal.heard import WAITS_US
-from tests.models.explorer import KEY, Deeds, Explorer, Limits, State, _set
+from tests.models.explorer import Deeds, Explorer, Limits, State
+from tests.models.remembered import KEY
+from tests.models.table import put
 from tests.seal.nodes import BIT_RATE, CODEC, keys_of
 
 #: A moment at which nothing of an earlier one waits any more.
@@ -95,7 +97,7 @@ class SealedExplorer(Explorer):
                 frames = [one for frame in CODEC.encode(word) for one in gate.say(frame, 0)] + gate.seal(0)
                 memory = memory._replace(number=gate._sender.number)
                 bus |= 1 << self._sealed_number(SealedWord(word, tuple(frames)))
-        return state._replace(bus=bus, gates=_set(state.gates, i, memory))
+        return state._replace(bus=bus, gates=put(state.gates, i, memory))
 
     def _sealed_number(self, sealed: SealedWord) -> int:
         number = self._words.number(sealed)  # type: ignore[arg-type]  # the bus is of sealed words here
@@ -118,7 +120,7 @@ class SealedExplorer(Explorer):
             passed = last if at == i else gate._nodes[sender].last
             self._passes[known] = passed if handed else None
         after = self._passes[known]
-        return None if after is None else memory._replace(heard=_set(memory.heard, at, after))
+        return None if after is None else memory._replace(heard=put(memory.heard, at, after))
 
     # --- steps -------------------------------------------------------------------------------------------------
 
@@ -156,9 +158,9 @@ class SealedExplorer(Explorer):
             for answer in answering.wake(_LATER_US):
                 asking.hear(answer, _LATER_US)
             number = answering._sender.number
-            heard = _set(gates[one].heard, other, asking._nodes[self.nodes[other]].last)
-            gates = _set(gates, one, gates[one]._replace(heard=heard))
-            gates = _set(gates, other, gates[other]._replace(number=number))
+            heard = put(gates[one].heard, other, asking._nodes[self.nodes[other]].last)
+            gates = put(gates, one, gates[one]._replace(heard=heard))
+            gates = put(gates, other, gates[other]._replace(number=number))
             if heard != state.gates[one].heard:
                 # The first sign of life of a life is sealed: who follows it sees the start, and nobody else.
                 state = self._sees(state, one, other)
@@ -168,7 +170,7 @@ class SealedExplorer(Explorer):
         memory, before = state.memory[j], state.gates[j].heard[i]
         if memory is None or (before is not None and before >> 32 == state.gates[i].number >> 32):
             return state
-        return state._replace(memory=_set(state.memory, j, self._sees_start(j, memory, self.nodes[i])))
+        return state._replace(memory=put(state.memory, j, self._sees_start(j, memory, self.nodes[i])))
 
     def _hearings(self, state: State, i: int, memory: int, words: list[Message | None]) -> Iterator[State]:
         yield from super()._hearings(state, i, memory, [None, *self._requests])
@@ -180,7 +182,7 @@ class SealedExplorer(Explorer):
                     # It would hold, as for a twin.
                     self.own = word
                     continue
-                after = state._replace(gates=_set(state.gates, i, gate))
+                after = state._replace(gates=put(state.gates, i, gate))
                 heard = list(super()._hearings(after, i, memory, [word]))
                 # A word that changes nothing moves the number on all the same.
                 yield from heard or [after]
@@ -211,11 +213,11 @@ class SealedExplorer(Explorer):
         life = (state.gates[i].number >> 32) + 1
         # Planted: it believes the first number that anybody says.
         heard = tuple(None if self.asks or j == i else 0 for j in self._places)
-        gates = _set(state.gates, i, GateMemory(life << 32, heard))
+        gates = put(state.gates, i, GateMemory(life << 32, heard))
         memory, said = self.starts(i, journal)
         live = frozenset(self.nodes[j] for j, one in enumerate(state.memory) if one is not None and j != i)
         begun = self._memories.number(memory._replace(asked=live, is_synced=not live))
-        memories, journals = _set(state.memory, i, begun), _set(state.journal, i, journal)
+        memories, journals = put(state.memory, i, begun), put(state.journal, i, journal)
         return self._say(state._replace(memory=memories, journal=journals, gates=gates), i, said)
 
     def _left_on_bus(self, before: State, after: State) -> int:

@@ -1,7 +1,8 @@
 """Things by number: an exploration compares and keeps small numbers instead of what they stand for."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 Thing = TypeVar("Thing")
 
@@ -20,3 +21,17 @@ class Table(Generic[Thing]):
             found = self._numbers[thing] = len(self.things)
             self.things.append(thing)
         return found
+
+
+def ones(bits: int) -> Iterator[int]:
+    """The places of the bits that are set, from 0."""
+    place = 0
+    while bits:
+        if bits & 1:
+            yield place
+        bits, place = bits >> 1, place + 1
+
+
+def put(values: tuple[Any, ...], at: int, value: Any) -> tuple[Any, ...]:
+    """The same values, but this one at its place."""
+    return (*values[:at], value, *values[at + 1 :])

@@ -48,7 +48,7 @@ def _of(count: int) -> int:
     ("part", "limits", "at_least"),
     [
         ("award", Limits(crashes=0), 30_000),
-        ("award-of-two", Limits(crashes=0, most_states=_of(20_000)), _of(40_000)),
+        ("award-of-two", Limits(crashes=0, most_states=_of(4_000)), _of(5_000)),
         ("award", Limits(crashes=1, most_states=_of(2_000)), _of(2_500)),
         ("taking", Limits(crashes=0, most_states=_of(2_000)), _of(2_500)),
         ("taking", Limits(crashes=1, most_states=_of(2_000)), _of(2_500)),
