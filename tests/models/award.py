@@ -98,7 +98,7 @@ class AwardPart:
         if isinstance(word, TokenDispute):
             return word.believed == node
         addressee = getattr(word, "holder", getattr(word, "requester", node))
-        return word.sender == BAY and not isinstance(word, CarAt) and addressee == node
+        return word.sender == BAY and addressee == node
 
     def is_within(self, machine: AtWork) -> bool:
         """No more calls than are explored."""

@@ -8,7 +8,6 @@ from onboard.contract.codes import Reason, TaskPhase
 from onboard.contract.messages import CallForProposals, TaskReport
 from onboard.systems.car_park import bay_calls, stewardship
 from onboard.systems.car_park.bay_calls import BayCalls
-from onboard.systems.car_park.recovery import JournalRecovery
 from onboard.systems.car_park.robot import ParkingRobot
 from tests.models import late, planted, robots
 from tests.models.award import BAY, CAR, CHEAP, DEAR, PLACE, TASK, AwardPart
@@ -104,13 +103,6 @@ def test_whatever_comes_late_both_agree_in_the_end_whose_the_task_is(forgot: boo
 def test_who_waits_and_says_nothing_waits_for_ever(forgot: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(BayCalls, "_ask", lambda *_: [])
     assert _late(forgot=forgot, most_states=1_500).why == planted.TRAP
-
-
-def test_for_who_never_answers_for_a_task_that_it_does_not_know_is_waited_for_ever(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(JournalRecovery, "is_asked", lambda *_: False)
-    assert _late(forgot=True, most_states=1_500).why == planted.TRAP
 
 
 def test_no_robot_keeps_a_task_that_was_given_to_another_after_a_restart() -> None:
