@@ -11,6 +11,7 @@ from tests.models.custody import CustodyPart
 from tests.models.explorer import Explorer, Limits
 from tests.models.gate import GatePart
 from tests.models.moving import engine_of
+from tests.models.parking import ParkingPart
 from tests.models.runs import RunPart
 from tests.models.sealed import explore_sealed
 
@@ -19,6 +20,7 @@ PARTS: dict[str, Callable[[int, int], engine.Part]] = {
     "award": lambda machines, calls: AwardPart(calls, nodes=AwardPart.nodes[:machines]),
     "taking": lambda machines, calls: CustodyPart(calls, nodes=AwardPart.nodes[:machines], laden=False),
     "leaving": lambda machines, calls: CustodyPart(calls, nodes=AwardPart.nodes[:machines]),
+    "parking": lambda machines, calls: ParkingPart(calls, nodes=AwardPart.nodes[:machines]),
     "runs": lambda machines, calls: RunPart(2 * calls, nodes=RunPart.nodes[:machines]),
     "boarding": lambda machines, calls: GatePart(GatePart.nodes[:machines]),
     "riding": lambda machines, calls: GatePart(GatePart.nodes[:machines], aboard=True),

@@ -9,6 +9,7 @@ from onboard.core.effects import Record, Send
 from onboard.core.records import TokenGivenRecord
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.compartment import Compartment
+from onboard.systems.car_park.going_around import GoingAround
 from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.lift import Lift
 from onboard.systems.car_park.lift_steps import LiftFinding
@@ -106,6 +107,19 @@ AWARD = {
     "an award is told before it is written": Planted(ParkingRobot, "_take_on", _turned, TRAP),
     "a robot forgets what it has won": Planted(JournalRecovery, "_take", _without(AwardRecord), TRAP),
     "a restarted compartment does not call": Planted(Compartment, "_take_up_job", _never_again, TRAP),
+}
+
+
+def _of_the_place(method: Method) -> Method:
+    return lambda around, **_: method(around)
+
+
+#: Of two robots, without a crash.
+KEEPS_THE_PLACE = Planted(GoingAround, "untouched", _of_the_place, TRAP)
+
+#: Of a car in the bay.
+PARKING = {
+    "a car that was left is not passed on": Planted(ShuttleWork, "_finish", _nothing, TRAP),
 }
 
 LEAVING = {

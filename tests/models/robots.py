@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.contract.codes import DriveMode, LegAction, ShuttleAction, ShuttleMode, Side
+from onboard.contract.codes import DriveMode, LegAction, Operation, ShuttleAction, ShuttleMode, Side
 from onboard.contract.messages import CallForProposals, DriveState, Message, ShuttleOrder, ShuttleState
 from onboard.core.behaviour import Behaviour
 from onboard.core.effects import Actuate, Effect
@@ -128,15 +128,17 @@ class PricedGeneration(CarParkGeneration):
         self, call: CallForProposals, now_us: int, *, behind_bids: bool = True
     ) -> tuple[Solution | None, list[Alternative]]:
         """Behind what is in hand."""
-        ends = self.ends(call, Station.from_number(call.from_station))
+        is_fetched = call.operation is Operation.RETRIEVE
+        place = Station.from_number(call.from_station) if is_fetched else self.site.places[0]
+        ends = self.ends(call, place)
         handlings = (CarHandling.TAKE, CarHandling.LEAVE)
         works = [
             StationWork(handling, end, call.car, call.wheelbase_mm, call)
             for handling, end in zip(handlings, ends, strict=True)
         ]
-        kept, place = len(self.program.remaining), works[0].station
+        kept = len(self.program.remaining)
         steps = tuple(_step(work) for work in works)
-        return Solution(kept, place.segment, _BEGIN_US, steps, _END_US, place), []
+        return Solution(kept, works[0].station.segment, _BEGIN_US, steps, _END_US, place), []
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
         """At its price."""

@@ -16,6 +16,7 @@ from tests.models.engine import Engine, Found, Limits, Part
 from tests.models.gate import FIRST, LIFT, GatePart
 from tests.models.late import LatePart
 from tests.models.moving import engine_of
+from tests.models.parking import ParkingPart
 from tests.thinned import is_long
 
 #: The compartment and one robot; two add who of them wins, and that one may have what the other waits for.
@@ -25,6 +26,7 @@ PARTS: Mapping[str, Callable[[], Part]] = {
     "award-of-two": lambda: AwardPart(calls=1),
     "taking": lambda: CustodyPart(calls=1, nodes=PAIR, laden=False),
     "leaving": lambda: CustodyPart(calls=1, nodes=PAIR),
+    "parking": lambda: ParkingPart(calls=1, nodes=PAIR),
     "boarding": lambda: GatePart(nodes=(LIFT, FIRST)),
     "riding": lambda: GatePart(nodes=(LIFT, FIRST), aboard=True),
     "two-riding": lambda: GatePart(aboard=True),
@@ -32,6 +34,7 @@ PARTS: Mapping[str, Callable[[], Part]] = {
 PLANTED = {
     "award": planted.AWARD,
     "leaving": planted.LEAVING,
+    "parking": planted.PARKING,
     "boarding": planted.BOARDING,
     "riding": planted.RIDING,
 }
@@ -52,13 +55,14 @@ def _of(count: int) -> int:
         ("taking", Limits(crashes=0, most_states=_of(2_000)), _of(2_500)),
         ("taking", Limits(crashes=1, most_states=_of(2_000)), _of(2_500)),
         ("leaving", Limits(crashes=1, most_states=_of(2_000)), _of(2_500)),
+        ("parking", Limits(crashes=1, most_states=_of(2_000)), _of(2_500)),
         ("boarding", Limits(crashes=0, most_states=_of(1_500)), _of(2_500)),
         ("riding", Limits(crashes=1, most_states=1_000), 2_000),
         ("two-riding", Limits(crashes=1, most_states=400), 500),
     ],
     ids=[
-        *("award-without-crash", "award-of-two", "award", "taking-without-crash", "taking", "leaving", "boarding"),
-        *("riding", "two-riding"),
+        *("award-without-crash", "award-of-two", "award", "taking-without-crash", "taking", "leaving", "parking"),
+        *("boarding", "riding", "two-riding"),
     ],
 )
 def test_one_holder_and_no_trap(part: str, limits: Limits, at_least: int) -> None:
@@ -103,6 +107,13 @@ def test_whatever_comes_late_both_agree_in_the_end_whose_the_task_is(forgot: boo
 def test_who_waits_and_says_nothing_waits_for_ever(forgot: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(BayCalls, "_ask", lambda *_: [])
     assert _late(forgot=forgot, most_states=1_500).why == planted.TRAP
+
+
+def test_who_keeps_the_place_of_a_task_that_is_anothers_waits_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And so does who has the task, and the car: each has what the other needs."""
+    bug = planted.KEEPS_THE_PLACE
+    monkeypatch.setattr(bug.owner, bug.name, bug.made(getattr(bug.owner, bug.name)))
+    assert engine_of(PARTS["award-of-two"](), Limits(crashes=0, most_states=2_000)).run().why == bug.found
 
 
 def test_no_robot_keeps_a_task_that_was_given_to_another_after_a_restart() -> None:
