@@ -46,6 +46,12 @@ class FullBay(NamedTuple):
     load_kg: int = CAR_KG
 
 
+class Felt(NamedTuple):
+    """What the bay's sensors see of it."""
+
+    load_kg: int
+
+
 @dataclass
 class EmptiedBody(BayBody):
     """Doors, and a bay out of which its car goes."""
@@ -56,8 +62,9 @@ class EmptiedBody(BayBody):
         return FullBay(self.now, self.load_kg)
 
     def meets(self, event: Any) -> list[Message]:
-        """What is in the bay by now, kg."""
-        self.load_kg = event
+        """What is in the bay by now."""
+        assert isinstance(event, Felt)
+        self.load_kg = event.load_kg
         return self.start()[1:]
 
 
@@ -113,7 +120,7 @@ class ParkingPart(CustodyPart):
     def feels(self, i: int, view: Any, bodies: tuple[Any, ...]) -> Hashable | None:
         """The bay is empty once somebody has the car aboard."""
         is_gone = self.nodes[i] == BAY and any(one.load_kg for one in bodies[1:]) and bodies[0].load_kg
-        return 0 if is_gone else None
+        return Felt(0) if is_gone else None
 
     def view(self, machine: AtWork) -> Any:
         """See ``View``."""
