@@ -3,7 +3,7 @@
 From the lowest bit a state is each machine's part by number, a count of faults, and the bus with a bit for each word.
 What a machine may do about the bus depends on its part and on the words that it heeds: that is worked out once by the
 model and kept, as what is to be added to the state and said. What more than one part decides is kept by all parts. So
-most transitions cost an addition and a look into a table, about 1 us.
+most transitions cost an addition and a look into a table, 1 to 3 us (docs/figures.md).
 """
 
 import time
