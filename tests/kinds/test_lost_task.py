@@ -1,16 +1,18 @@
-"""A task that is another's by a newer word of its initiator: its robot lets go of it, and tells nothing as done."""
+"""A task is another's by a newer word of its initiator, or mine once more: its robot tells what is so, and no more."""
+
+from dataclasses import replace
 
 import pytest
 
-from onboard.contract.codes import CallResult, DriveMode, Reason, TaskPhase
-from onboard.contract.messages import Award, CarAt, DriveState, TaskReport, TokenGrant
+from onboard.contract.codes import CallResult, DriveMode, Reason, TaskPhase, TokenKind
+from onboard.contract.messages import Award, Bid, CarAt, DriveState, Itinerary, TaskReport, TokenGrant
 from onboard.core.authority import station_token
 from tests.kinds.test_whose_task import after_a_while
 from tests.models.at_work import AtWork, Deed
 from tests.models.award import BAY, CAR, CHEAP, DEAR, PLACE, TASK, WHEELBASE_MM
-from tests.models.custody import CustodyPart
+from tests.models.custody import CALL, HERE, CustodyPart
 from tests.models.robots import RobotBody
-from tests.models.snapshot import NOW_US
+from tests.models.snapshot import NOW_US, WHILE_US
 
 #: By the version after that under which the robot has it.
 ANOTHERS = Award(BAY, 0, DEAR, TASK, 2, CallResult.AWARDED, Reason.NONE)
@@ -51,3 +53,38 @@ def test_work_that_is_dropped_is_not_told_as_done(robot: AtWork, by_mm: int) -> 
     deeds = robot.hears(ANOTHERS) + robot.waits(())
     assert reports(deeds) == []
     assert not [deed for deed in deeds if isinstance(deed, tuple) and dict(deed)["record"] == "handled"]
+
+
+def awarded_anew(robot: AtWork) -> list[Deed]:
+    """It is called for again, as nothing was heard of it; the robot bids and wins."""
+    call = replace(CALL, call=CALL.call + 1, deadline_ms=(NOW_US + 2 * WHILE_US) // 1000)
+    assert [word for word in robot.hears(call) if isinstance(word, Bid)]
+    return robot.hears(Award(BAY, call.call, CHEAP, TASK, 2, CallResult.AWARDED, Reason.NONE))
+
+
+@pytest.fixture
+def laden() -> AtWork:
+    """It has the car aboard, and asks for the bay."""
+    part = CustodyPart()
+    made = part.made(CHEAP, part.journal(CHEAP), part.body(CHEAP))
+    made.starts()
+    for _ in range(2):
+        made, _ = after_a_while(made)
+    return made
+
+
+def test_who_has_the_car_aboard_and_wins_it_again_does_not_fetch_it_again(laden: AtWork) -> None:
+    """It planned to take the car once more out of where it had been, behind the work in hand."""
+    deeds = awarded_anew(laden)
+    assert reports(deeds) == [TaskPhase.LOADED]
+    assert not [word for word in deeds if isinstance(word, Itinerary)]
+
+
+def test_who_wins_what_it_has_done_says_so(laden: AtWork) -> None:
+    """It went back, and waited for a car that stood where it had left it, until it was late."""
+    assert TaskPhase.DONE in reports(laden.hears(TokenGrant(BAY, TokenKind.STATION, HERE.number, 1, CHEAP)))
+    deeds = awarded_anew(laden)
+    assert [(word.phase, word.station) for word in deeds if isinstance(word, TaskReport)] == [
+        (TaskPhase.DONE, HERE.number)
+    ]
+    assert not [word for word in deeds if isinstance(word, Itinerary)]

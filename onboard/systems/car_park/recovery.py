@@ -5,8 +5,10 @@ ride begun and ended. The mirror, bids and plans are not in the journal; the way
 say that the carrier stands (design, section 5).
 """
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from onboard.contract.codes import CallResult, Criterion, KindCode, LegAction, ShuttleMode, TokenKind
 from onboard.contract.constants import TASK_VERSION_BITS
@@ -90,6 +92,14 @@ _READ = (
 )
 
 
+class Done(NamedTuple):
+    """A task whose car was left at a station (number); the car is unknown where a compacted journal tells it."""
+
+    task: Reference
+    station: int
+    car: Reference | None
+
+
 @dataclass
 class JournalRecovery:
     """The journal read from its oldest entry on. ``works`` is what is left to do, in order."""
@@ -107,9 +117,9 @@ class JournalRecovery:
     _lost: tuple[int, int] = (0, 0)
     node_id: int = 0
     is_restart: bool = False
-    #: The last task whose car was left, and the number of its station: who asks for it is told so. Nobody may have
-    #: heard of it yet where the shuttle has done nothing since.
-    last_done: tuple[Reference, int] | None = None
+    #: The last tasks whose car was left: who asks for one, or awards it anew, is told so. Nobody may have heard of the
+    #: last one yet where the shuttle has done nothing since.
+    done: deque[Done] = field(default_factory=lambda: deque(maxlen=16))
     is_news: bool = False
     #: Where I have said that cars are.
     cars: dict[Reference, CarAt] = field(default_factory=dict)
@@ -145,11 +155,12 @@ class JournalRecovery:
                 self.works[:1] = [one._replace(wheelbase_mm=measured_mm or one.wheelbase_mm) for one in self.works[:1]]
             case HandledRecord():
                 ended = (record.task, record.handling)
+                cars = [one.car for one in self.works if (one.call.task, one.handling) == ended]
                 self.works = [one for one in self.works if (one.call.task, one.handling) != ended]
                 self.phase = None
                 if record.handling is CarHandling.LEAVE:
-                    self.versions.pop(record.task, None)
-                    self.last_done, self.is_news = (record.task, record.station), True
+                    self.is_news = True
+                    self._over(Done(record.task, record.station, cars[0] if cars else None))
             case _:
                 self._take_place(record)
 
@@ -224,6 +235,21 @@ class JournalRecovery:
     def is_newer(self, award: Award) -> bool:
         """Whether an award for a task of mine is of a later version than that under which I took it on."""
         return is_newer(award.task_version, self.versions.get(award.task, 1), TASK_VERSION_BITS)
+
+    def left(self, work: StationWork) -> None:
+        """A car was left, and its task is over."""
+        self._over(Done(work.call.task, work.station.number, work.car))
+
+    def _over(self, done: Done) -> None:
+        self.done.append(done)
+        self.versions.pop(done.task, None)
+
+    def has_done(self, call: CallForProposals) -> bool:
+        """Whether a task is done that was called for anew: its initiator had not heard so.
+
+        The car tells it from one under the same number whose initiator has lost its journal since.
+        """
+        return any((one.task, one.car) == (call.task, call.car) for one in self.done)
 
     def forget(self, task: Reference) -> None:
         """A task is another's, or was given back."""

@@ -1,6 +1,5 @@
 """The mobile robot (MR): carrier and shuttle carry out the order program of every task that it won."""
 
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -88,8 +87,6 @@ class ParkingRobot:
     holding: RobotHold = field(init=False)
     starting: Starting = field(init=False)
     resting: Resting = field(init=False)
-    #: The last tasks that were done: a late word about one of them is no news.
-    _done: deque[tuple[Reference, int]] = field(default_factory=lambda: deque(maxlen=16))
     _begun: bool = False
     _fault: Reason = Reason.NONE
 
@@ -253,10 +250,14 @@ class ParkingRobot:
                 (solution,) = proposal.program
                 version = 1 if award is None else award.task_version
                 self.recovery.versions[call.task] = version
+                again = call.task in self.going_around.untouched()
+                is_begun = not again and call.task in [work.call.task for work in self._works()]
+                if is_begun or self.recovery.has_done(call):
+                    # Its initiator has not heard how far it has come, and has called for it anew.
+                    return [self._tell_again(call.task)]
                 why = self._why_not()
                 if why is not Reason.NONE:
                     return self.going_around.forfeit(call.task, why, now_us)
-                again = call.task in self.going_around.untouched()
                 dropped = self.going_around.drop([call.task], now_us) if again else []
                 return dropped + self._take_on(call, solution, version, now_us)
             case AwardedAgain(call=call):
@@ -279,10 +280,10 @@ class ParkingRobot:
     def _tell_again(self, task: Reference) -> Effect:
         """What became of a task whose award is said again."""
         handlings = [work.handling for work in self._works() if work.call.task == task]
-        done = dict(self._done)
-        if handlings or task in done:
+        done = [one.station for one in self.recovery.done if one.task == task]
+        if handlings or done:
             phase = TaskPhase.AWARDED if CarHandling.TAKE in handlings else TaskPhase.LOADED
-            return self._report(task, *((phase, 0) if handlings else (TaskPhase.DONE, done[task])))
+            return self._report(task, *((phase, 0) if handlings else (TaskPhase.DONE, done[-1])))
         why = Reason.JOURNAL_LOST if self.recovery.is_restart else Reason.CANCELLED
         return Send(TaskReport(self.fleet.node_id, task, TaskPhase.FORFEITED, 0, why))
 
@@ -366,12 +367,10 @@ class ParkingRobot:
     def _say_what_is_mine(self) -> list[Effect]:
         """At a restart: tasks in hand, of which each initiator knows whether another has got it meanwhile."""
         mine = self._taken_on(self.recovery.works)
-        if self.recovery.last_done is not None:
-            task, station = self.recovery.last_done
-            self._done.append((task, station))
-            if self.recovery.is_news:
-                # The power may have failed before this was said, or heard; who is pushed as it starts has said it.
-                self.recovery.is_news, mine = False, [self._report(task, TaskPhase.DONE, station), *mine]
+        if self.recovery.is_news and self.recovery.done:
+            # The power may have failed before this was said, or heard; who is pushed as it starts has said it.
+            self.recovery.is_news = False
+            mine.insert(0, self._tell_again(self.recovery.done[-1].task))
         return mine
 
     def _started(self, planned: tuple[CarStep, ...] | None, now_us: int) -> list[Effect]:
@@ -461,8 +460,7 @@ class ParkingRobot:
             phase = TaskPhase.LOADED if taken else TaskPhase.DONE
             effects.append(handled_record(step.work))
             if not taken:
-                self._done.append((step.work.call.task, step.work.station.number))
-                self.recovery.versions.pop(step.work.call.task, None)
+                self.recovery.left(step.work)
             effects.append(self._report(step.work.call.task, phase, step.work.station.number))
         if step.action is LegAction.RIDE:
             floor = sill(self.fleet.site, step.track, step.to_index).track
