@@ -368,7 +368,9 @@ class BayCalls:
         if is_parked and not is_mine:
             self.unsaid.begins(job.task, job.car)
         if (is_placed or not is_loaded) if is_parked else (is_loaded or (is_mine and not is_placed)):
-            return BayPhase.CLOSING, []
+            # A car that is mine, by all that I heard, and in the bay no more: who took it says where it is.
+            is_elsewhere = is_parked and is_mine and not is_placed and job.winner
+            return BayPhase.CLOSING, [Send(job.award(self.fleet.node_id))] if is_elsewhere else []
         holder = self.fleet.tokens.holder_of(car_token(*job.car))
         if not is_mine and (is_parked or (holder == job.winner and holder != NOBODY)):
             return None, []
@@ -471,9 +473,13 @@ class BayCalls:
         return from_bus_ms(works[-1 if task is self.ahead else 0].end_ms, now_us)
 
     def brings(self, node: int) -> bool:
-        """Whether the work that a machine has next, by its plan, is at the bay."""
+        """Whether a machine with a car aboard has to leave it at the bay, by its plan.
+
+        It takes and leaves by turns: an even number of works begins with the one that it has done since it told them.
+        """
         plan = self.fleet.mirror.itineraries.get(node)
-        work = None if plan is None else next((leg for leg in plan.legs if leg.action is LegAction.WORK), None)
+        works = [] if plan is None else [leg for leg in plan.legs if leg.action is LegAction.WORK]
+        work = next(iter(works[1 - len(works) % 2 :]), None)
         return work is not None and (work.track, work.to_index, work.side) == tuple(self.station)
 
     def _work_here(self, node: int) -> Leg | None:

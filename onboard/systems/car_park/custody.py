@@ -30,6 +30,14 @@ def keeper(site: WaySite, station: Station) -> int:
     return site.stewards[station.track]
 
 
+def keeps(fleet: WayFleet, number: int) -> bool:
+    """Whether what stands in a station (number, as heard) is this machine's to keep."""
+    station = Station.from_number(number)
+    if station in fleet.site.compartments.values():
+        return fleet.site.compartments.get(fleet.node_id) == station
+    return fleet.site.stewards.get(station.track) == fleet.node_id
+
+
 def car_of(grant: TokenGrant) -> Reference:
     """The car that a grant of a car's token is about."""
     return Reference(grant.token >> 16, grant.token & 0xFFFF)
@@ -111,6 +119,7 @@ def before_taking(fleet: WayFleet, grant: TokenGrant) -> list[Effect] | None:
     if (
         record is None
         or record.station in (ANY_STATION, OUTSIDE)
+        or not keeps(fleet, record.station)
         or record.custodian != grant.sender
         or record.version + 1 != grant.version
     ):

@@ -57,6 +57,8 @@ class Stewardship:
     #: The robot that has a task for it, by the robot's own word.
     _claimant: int = NOBODY
     _say_at_us: dict[Reference, int] = field(default_factory=dict)
+    #: Who brought each car that was put down, and for which task: it says once more where that was.
+    _brought: dict[Reference, tuple[int, Reference]] = field(default_factory=dict)
     #: Since when the winner of each car has said nothing that shows that it knows of its award.
     _unheard_us: dict[Reference, int] = field(default_factory=dict)
     #: How often I was admitted, and since when I take part: what others did not do before is no sign of theirs.
@@ -86,6 +88,7 @@ class Stewardship:
         match message:
             case TaskReport() | Itinerary():
                 self._acts(message)
+                return self._put_right(message) if isinstance(message, TaskReport) else []
             case CallForProposals() if self._is_for_a_car(message):
                 self._cars_of_calls[message.sender, message.call] = message.car
                 while len(self._cars_of_calls) > MAX_CALLS:
@@ -113,6 +116,20 @@ class Stewardship:
             for car in [one for one in done if self.winners.get(one) == word.sender]:
                 if not self.fleet.tokens.holds(car_token(*car)):
                     del self.winners[car]
+
+    def _put_right(self, done: TaskReport) -> list[Effect]:
+        """Where a car stands by the word of who brought it, whose ``CarAt`` before its token was missed.
+
+        All that was heard then was where it stood before, under the same version.
+        """
+        brought = (car for car, by in self._brought.items() if by == (done.sender, done.task))
+        car = next(brought, None) if done.phase is TaskPhase.DONE else None
+        record = None if car is None else self.fleet.mirror.cars.get(car)
+        if car is None or record is None or not custody.keeps(self.fleet, done.station):
+            return []
+        del self._brought[car]
+        is_right = record.station in (done.station, OUTSIDE) or record.custodian != self.fleet.node_id
+        return [] if is_right else custody.state(self.fleet, car, done.station, record.wheelbase_mm)
 
     def _is_for_a_car(self, call: CallForProposals) -> bool:
         """Whether its winner may fetch a stored car: only a compartment, or a person's station, calls for that."""
@@ -303,6 +320,9 @@ class Stewardship:
         if not effects or grant.token_kind is not TokenKind.CAR:
             return effects
         car = custody.car_of(grant)
+        self._brought.pop(car, None)
+        if car in self.tasks:
+            self._brought[car] = grant.sender, self.tasks[car][0]
         winner = self.winners.get(car, grant.sender)
         if winner != grant.sender and car in self.tasks:
             # In the journal a new place stands for a new custody: who may fetch it then is noted behind it.
@@ -312,7 +332,7 @@ class Stewardship:
         return effects
 
     def _forget(self, car: Reference) -> None:
-        for table in (self.winners, self.tasks, self._say_at_us, self._unheard_us):
+        for table in (self.winners, self.tasks, self._say_at_us, self._unheard_us, self._brought):
             table.pop(car, None)
 
     def _state_anew(self, car: Reference, version: int) -> list[Effect]:
