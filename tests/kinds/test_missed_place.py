@@ -1,10 +1,12 @@
-"""A robot says where it leaves a car, and its keeper misses that: it learns the place from what the robot says later."""
+"""A robot says where it leaves a car, and its keeper misses that: it learns the place from later words."""
 
 import pytest
 
 from onboard.contract.codes import CallResult, Reason, TaskPhase, TokenKind
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import Award, CarAt, Message, TaskReport, TokenGrant, TokenHeld, TokenRequest
+from onboard.systems.car_park.bay_task import BayPhase
+from onboard.systems.car_park.compartment import Compartment
 from tests.kinds.test_whose_task import after_a_while
 from tests.models.at_work import AtWork
 from tests.models.award import BAY, CAR, CHEAP, KEY, PLACE, TASK, WHEELBASE_MM
@@ -21,6 +23,11 @@ def has(kind: TokenKind, number: int, version: int) -> list[Message]:
     return [TokenRequest(CHEAP, kind, number, version - 1, 2, 0), TokenHeld(CHEAP, kind, number, version)]
 
 
+def phase(machine: AtWork) -> BayPhase:
+    assert isinstance(machine.behaviour, Compartment)
+    return machine.behaviour.phase
+
+
 @pytest.fixture
 def keeper() -> AtWork:
     """Of bay and place; its robot has taken the car out of the one: all that it heard of it is where it was before."""
@@ -33,7 +40,6 @@ def keeper() -> AtWork:
     for word in (*bay, *bay, *has(KEY.kind, KEY.number, 2), CarAt(CHEAP, CAR, HERE.number, 2, WHEELBASE_MM), *place):
         made.hears(word)
     assert made.fleet.tokens.holder_of(KEY) == CHEAP
-    made.meets(Felt(0))
     return made
 
 
@@ -45,8 +51,21 @@ def test_who_brought_a_car_says_where_it_is_once_more(keeper: AtWork) -> None:
 
 def test_a_car_that_is_in_the_bay_no_more_is_asked_for(keeper: AtWork) -> None:
     """``DONE`` was missed as well: a robot answers an award that is said again with how its task stands."""
+    keeper.meets(Felt(0))
     keeper.hears(BROUGHT)
     assert Award(BAY, 0, CHEAP, TASK, 1, CallResult.AWARDED, Reason.NONE) in keeper.hears(BAY_BACK)
+
+
+def test_a_bay_whose_sensors_are_behind_is_free_once_its_car_stands_elsewhere(keeper: AtWork) -> None:
+    """It took the car for one that nobody had fetched yet, and waited for a robot for ever."""
+    for word in (BROUGHT, BAY_BACK, DONE):
+        keeper.hears(word)
+    assert phase(keeper) is BayPhase.AWAITING
+    keeper.meets(Felt(0))
+    keeper.waits(())
+    assert phase(keeper) is BayPhase.FREE
+    record = keeper.fleet.mirror.cars[CAR]
+    assert (record.custodian, record.station) == (BAY, PLACE.number), "it has not left"
 
 
 @pytest.mark.parametrize("word", [CarAt(CHEAP, CAR, ANY_STATION, 2, WHEELBASE_MM), CarAt(CHEAP, CAR, 9_999, 2, 0)])

@@ -22,6 +22,7 @@ from onboard.contract.messages import Award, BayState, CallForProposals, Referen
 from onboard.core.authority import TokenKey
 from onboard.core.effects import Effect, Send
 from onboard.core.negotiation import RequestedTerms
+from onboard.core.site import Station
 from onboard.systems.car_park.site import ANY_CLASS, CarLimits, CarPark
 from onboard.ways.mirror import WayMirror
 from onboard.ways.tokens import car_token
@@ -108,6 +109,11 @@ class BayTask:
     def has_left(self, bay: BayState, mirror: WayMirror) -> bool:
         """Whether its car is gone: out with the driver who brought it, or from another bay."""
         return is_gone(self.car, mirror) or (self.operation is Operation.PARK and not bay.load_kg)
+
+    def is_parked(self, bay: BayState, mirror: WayMirror, here: Station) -> bool:
+        """Whether its car stands at a place by its keeper's word, though no robot was seen to have the bay for it."""
+        stands = mirror.car_station(self.car)
+        return self.operation is Operation.PARK and not bay.load_kg and stands not in (None, here)
 
     def refused(self, reason: Reason, now_us: int) -> None:
         """Nobody could; it is called for again later, and ever less often."""

@@ -321,18 +321,16 @@ class Compartment:
             comes = not self.bay.load_kg and self.outputs.light is LightColour.GREEN
             called = self.pipeline.enters(now_us) if comes else []
             self._go(BayPhase.ENTERING if called else BayPhase.FREE)
-            return called or self._invite()
+            return called or self._invite(self.bay)
         is_out_next, called = self.pipeline.is_out_next(now_us)
         if not is_out_next:
-            return called + self._invite()
+            return called + self._invite(self.bay)
         self._go(BayPhase.RESERVING)
-        called.append(self.outputs.light_up(LightColour.RED))
-        return called + self.outputs.door(DoorName.INPUT, DoorAction.CLOSE)
+        return [*called, self.outputs.light_up(LightColour.RED), *self.outputs.door(DoorName.INPUT, DoorAction.CLOSE)]
 
-    def _invite(self) -> list[Effect]:
-        assert self.bay is not None
+    def _invite(self, bay: BayState) -> list[Effect]:
         colour = LightColour.RED if self._use is BayUse.EXIT else LightColour.GREEN
-        return [self.outputs.light_up(colour)] if self.outputs.light is not colour and not self.bay.load_kg else []
+        return [self.outputs.light_up(colour)] if self.outputs.light is not colour and not bay.load_kg else []
 
     def _admit(self, key: DeskInput, now_us: int) -> list[Effect]:
         """Steps 2 to 5: check the car, print the ticket, call, turn the light red and close the input door."""
@@ -394,18 +392,19 @@ class Compartment:
         if not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
         called = [] if self.calls.ahead is not None else self.pipeline.call(0, now_us)
-        return called + (self._promote() if self.calls.ahead is not None else self._to_free())
+        return called + (self._promote(self.calls.ahead) if self.calls.ahead is not None else self._to_free())
 
-    def _promote(self) -> list[Effect]:
+    def _promote(self, job: BayTask) -> list[Effect]:
         """The next one gets the bay, which is empty and locked."""
-        job = self.calls.ahead
-        assert job is not None
         self.job, self.calls.ahead, self._robot_waits, self._key = job, None, False, None
         self._go(BayPhase.AWAITING)
         return [job_record(job.task, Operation.RETRIEVE, job.car, job.wheelbase_mm)]
 
     def _when_awaiting(self, now_us: int) -> list[Effect]:
         assert self.bay is not None and self.job is not None
+        if self.job.is_parked(self.bay, self.fleet.mirror, self.station):
+            self._go(BayPhase.CLOSING)
+            return self._when_closing(now_us)
         if self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
             has_left = self.job.has_left(self.bay, self.fleet.mirror)
             return self._left(self.job) if has_left else self.calls.call_for(self.job, now_us)
@@ -439,7 +438,8 @@ class Compartment:
         if not self._is(DoorName.OUTPUT, DoorPosition.LOCKED):
             return []
         if job.operation is Operation.PARK and not job.is_given_back:
-            return self._to_free() if self.calls.ahead is None else [job_over_record(), *self._promote()]
+            ahead = self.calls.ahead
+            return self._to_free() if ahead is None else [job_over_record(), *self._promote(ahead)]
         self._go(BayPhase.HANDOVER)
         text = DeskText.CAR_READY
         if job.is_given_back:
