@@ -1,19 +1,21 @@
 """One shipped machine of a car park as an exploration drives it: words and time in, what it does in order out.
 
-What the holon does around rights, calls and the behaviour is done here in its order, without bus time, heartbeats and
-the pauses between them: a machine that is down is silent for all others after the next while, one that is up is heard.
+What the holon does around rights, calls and the behaviour is done here in its order, without bus time and the pauses
+between words: a machine that is down is silent for all others after the next while, one that is up is heard. Of
+heartbeats all that counts is of which life they are: who was started again says so with each.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from onboard.contract.codes import Reason
+from onboard.contract.codes import MachineState, Reason
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import (
     Award,
     Bid,
     CallForProposals,
+    Heartbeat,
     Itinerary,
     LeftOut,
     Message,
@@ -50,6 +52,8 @@ _WAYS = """
 LEFT_OUT = frozenset((_NAMES + _WAYS).split())
 #: Rounds in which a machine comes to rest after an event.
 _MOST_ROUNDS = 40
+#: The life in which all explored machines begin: another than that of their journals.
+FIRST_LIFE = 2
 
 
 class _Quiet(Witness):
@@ -115,6 +119,8 @@ class AtWork:
     behaviour: Any = field(init=False)
     rights: RightsTalk = field(init=False)
     boot: int = field(init=False)
+    #: Of whom a later life than the first was heard.
+    boots: dict[int, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         site, machine = self.site, self.site.machines[self.node]
@@ -137,6 +143,10 @@ class AtWork:
     def _statements(self, now_us: int) -> list[Effect]:
         return [*self.behaviour.statements(now_us), *self.fleet.mirror.statements()]
 
+    def _beat(self) -> list[Effect]:
+        beat = Heartbeat(self.node, 0, 0, 0, self.boot, self.behaviour.kind, MachineState.IDLE)
+        return [Send(beat)] if self.boot > FIRST_LIFE else []
+
     # --- events, each with what is done about it -----------------------------------------------------------------
 
     def starts(self) -> list[Deed]:
@@ -144,7 +154,7 @@ class AtWork:
         others = set(self.site.machines) - {self.node}
         self.fleet.tokens.is_synced, self.fleet.tokens.asked = False, others
         effects: list[Effect] = [Record(BootRecord(self.boot)), *self.behaviour.start(NOW_US)]
-        effects += [*self.fleet.tokens.statements(), Send(SyncRequest(self.node, NOBODY))]
+        effects += [*self.fleet.tokens.statements(), Send(SyncRequest(self.node, NOBODY)), *self._beat()]
         for state in self.body.start():
             effects += self.behaviour.sense(state, NOW_US)
         return self._deeds(effects)
@@ -168,7 +178,7 @@ class AtWork:
         # By digests all come to have one another's plans and cars.
         plan = mirror.itineraries.get(self.node)
         plans: list[Effect] = [] if plan is None else [Send(plan)]
-        return self._deeds([*effects, *plans, *custody.statements(self.fleet)])
+        return self._deeds([*self._beat(), *effects, *plans, *custody.statements(self.fleet)])
 
     def sleeps(self) -> list[Deed]:
         """It did nothing for a while, as whose process was stopped: it asks what it has missed, and plans anew."""
@@ -203,8 +213,16 @@ class AtWork:
 
     def _takes_up(self, word: Message) -> list[Effect]:
         mirror = self.fleet.mirror
+        if isinstance(word, Heartbeat):
+            if self.boots.get(word.sender, FIRST_LIFE) < word.boot:
+                self.boots[word.sender] = word.boot
+                mirror._forget_plan(word.sender)
+            return []
         mirror.hear(word, NOW_US)
         if isinstance(word, Itinerary):
+            if word.stamp.award_ms < self.boots.get(word.sender, FIRST_LIFE):
+                # A bus brings the words of one machine in their order: none of a plan of a life before.
+                return []
             mirror.on_itinerary(word, NOW_US)
         handler = self.rights.handlers().get(type(word)) or mirror.handlers().get(type(word))
         effects: list[Effect] = handler(word, NOW_US) if handler is not None else []
@@ -246,6 +264,12 @@ class AtWork:
         self.fleet.motion.event += 1
         return deeds
 
+    def _of_life(self, word: Message) -> Message:
+        """The time of a plan's stamp, which decides nothing here, tells of which life it is."""
+        if not isinstance(word, Itinerary):
+            return word
+        return replace(word, stamp=word.stamp._replace(award_ms=self.boot))
+
     def _carried_out(self, effects: list[Effect], deeds: list[Deed]) -> list[Effect]:
         """What follows at once from effects in their order: only what the body does is sensed."""
         follow: list[Effect] = []
@@ -254,7 +278,7 @@ class AtWork:
                 case Record():
                     deeds.append(tuple(effect.entry.items()))
                 case Send(message=message) if self.is_said(message):
-                    deeds.append(message)
+                    deeds.append(self._of_life(message))
                 case Actuate(message=order):
                     sensed = self.body.order(order)
                     deeds.append(Moved(self.body.state))

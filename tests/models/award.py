@@ -11,6 +11,7 @@ from onboard.contract.codes import Operation
 from onboard.contract.messages import (
     Bid,
     CarAt,
+    Heartbeat,
     Itinerary,
     Message,
     Progress,
@@ -36,11 +37,6 @@ CAR, TASK, WHEELBASE_MM = Reference(BAY, 1), Reference(BAY, 7), 2_600
 PLACE, KEY = SITE.places[0], car_token(*CAR)
 
 
-def is_said(word: Message) -> bool:
-    """Ways are no part of this: of a plan only which call it comes from."""
-    return not isinstance(word, Progress | Waiting) and (not isinstance(word, Itinerary) or word.stamp.initiator == BAY)
-
-
 class View(NamedTuple):
     """Of one machine: whether it holds the car, has the task in hand, and, whom the compartment takes for that."""
 
@@ -58,6 +54,9 @@ class AwardPart:
     left_out: frozenset[str] = LEFT_OUT
     #: In the first while they start; in the second the compartment calls.
     prelude: int = 2
+    #: Whether a robot's heartbeats are heard once it was started again. Where they are not, all has to come right by
+    #: what is said about tasks and rights alone.
+    tells_life: bool = False
 
     def journal(self, node: int) -> tuple[Entry, ...]:
         """The compartment has the car in its custody and has begun the task; the robots have lived before."""
@@ -84,9 +83,17 @@ class AwardPart:
     def made(self, node: int, journal: tuple[Entry, ...], body: Any) -> AtWork:
         """Compartment or robot."""
         if node == BAY:
-            return AtWork(SITE, node, CompartmentFactory(), BayBody(node, body, 0), journal, is_said=is_said)
+            return AtWork(SITE, node, CompartmentFactory(), BayBody(node, body, 0), journal, is_said=self.is_said)
         factory = PricedFactory(prices_ms={DEAR: 5_000})
-        return AtWork(SITE, node, factory, RobotBody(node, body, is_quick=False), journal, stand_still, is_said)
+        return AtWork(SITE, node, factory, RobotBody(node, body, is_quick=False), journal, stand_still, self.is_said)
+
+    def is_said(self, word: Message) -> bool:
+        """Ways are no part of this: of a plan only which call it comes from; nor is it the compartment's life."""
+        if isinstance(word, Heartbeat):
+            return self.tells_life and word.sender != BAY
+        return not isinstance(word, Progress | Waiting) and (
+            not isinstance(word, Itinerary) or word.stamp.initiator == BAY
+        )
 
     def hears(self, node: int, word: Message) -> bool:
         """A robot hears the compartment's words that are for all, or for it.
@@ -95,6 +102,8 @@ class AwardPart:
         """
         if node == BAY or isinstance(word, Bid | TokenGiven):
             return True
+        if isinstance(word, Heartbeat):
+            return False
         if isinstance(word, TokenDispute):
             return word.believed == node
         addressee = getattr(word, "holder", getattr(word, "requester", node))

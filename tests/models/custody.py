@@ -16,7 +16,7 @@ from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.program import CarHandling, StationWork
 from onboard.systems.car_park.recovery import award_record, handled_record
 from tests.models.at_work import AtWork, Entry
-from tests.models.award import BAY, CAR, CHEAP, KEY, PLACE, SITE, TASK, WHEELBASE_MM, AwardPart, is_said
+from tests.models.award import BAY, CAR, CHEAP, KEY, PLACE, SITE, TASK, WHEELBASE_MM, AwardPart
 from tests.models.robots import CAR_KG, PricedFactory, RobotBody, stand_still
 
 HERE = SITE.compartments[BAY]
@@ -86,7 +86,7 @@ class CustodyPart(AwardPart):
         """As in the award, with a shuttle whose strokes come to their ends."""
         if node == BAY:
             return super().made(node, journal, body)
-        return AtWork(SITE, node, PricedFactory(), RobotBody(node, body), journal, stand_still, is_said)
+        return AtWork(SITE, node, PricedFactory(), RobotBody(node, body), journal, stand_still, self.is_said)
 
     def hears(self, node: int, word: Message) -> bool:
         """Words about cars as well."""

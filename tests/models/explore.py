@@ -17,10 +17,10 @@ from tests.models.sealed import explore_sealed
 
 #: What is explored by the engine, by name: made from how many machines and calls.
 PARTS: dict[str, Callable[[int, int], engine.Part]] = {
-    "award": lambda machines, calls: AwardPart(calls, nodes=AwardPart.nodes[:machines]),
-    "taking": lambda machines, calls: CustodyPart(calls, nodes=AwardPart.nodes[:machines], laden=False),
-    "leaving": lambda machines, calls: CustodyPart(calls, nodes=AwardPart.nodes[:machines]),
-    "parking": lambda machines, calls: ParkingPart(calls, nodes=AwardPart.nodes[:machines]),
+    "award": lambda machines, calls: AwardPart(calls, AwardPart.nodes[:machines], tells_life=True),
+    "taking": lambda machines, calls: CustodyPart(calls, AwardPart.nodes[:machines], tells_life=True, laden=False),
+    "leaving": lambda machines, calls: CustodyPart(calls, AwardPart.nodes[:machines], tells_life=True),
+    "parking": lambda machines, calls: ParkingPart(calls, AwardPart.nodes[:machines], tells_life=True),
     "runs": lambda machines, calls: RunPart(2 * calls, nodes=RunPart.nodes[:machines]),
     "boarding": lambda machines, calls: GatePart(GatePart.nodes[:machines]),
     "riding": lambda machines, calls: GatePart(GatePart.nodes[:machines], aboard=True),

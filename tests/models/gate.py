@@ -4,15 +4,13 @@ Lift and robots with their journals and books of rights, the carriers' drives an
 ride from different floors. Each has the alleys of its ride to itself.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from onboard.config.site import parse_site
-from onboard.contract.codes import MachineState
-from onboard.contract.messages import Heartbeat, Itinerary, Message, Progress, TaskReport, Waiting
+from onboard.contract.messages import Itinerary, Message, Progress, TaskReport, Waiting
 from onboard.core.authority import segment_token
-from onboard.core.effects import Effect, Send
+from onboard.core.effects import Send
 from onboard.core.records import BootRecord, TokenGoneRecord, TokenHeldRecord
 from onboard.core.site import Segment
 from onboard.systems.car_park.lift import Lift
@@ -99,53 +97,28 @@ class View(NamedTuple):
 class _Rider(AtWork):
     """Lift or robot; what plans say of times is no time that passes, and mirrors that differ are made equal."""
 
-    boots: dict[int, int] = field(default_factory=dict)
-
     def starts(self) -> list[Deed]:
         """The body has come to a stand; plans of another life are others."""
         if not isinstance(self.behaviour, Lift):
             self.behaviour.generation.life = self.boot
-        return [*super().starts(), self._beat()]
-
-    def _beat(self) -> Heartbeat:
-        """Its sign of life: of it counts here of which life it is."""
-        return Heartbeat(self.node, 0, 0, 0, self.boot, self.behaviour.kind, MachineState.IDLE)
+        return super().starts()
 
     def waits(self, down: Any) -> list[Deed]:
         """Whose mirror differs by the heartbeats asks: plans are said again."""
         behaviour = self.behaviour
-        said: list[Deed] = [self._beat()]
+        said: list[Deed] = []
         if isinstance(behaviour, Lift):
             behaviour._made = {robot: begin_us + WHILE_US for robot, begin_us in behaviour._made.items()}
             if behaviour.ride is not None:
                 behaviour.ride = replace(behaviour.ride, begin_us=behaviour.ride.begin_us + WHILE_US)
         elif self.takes_part:
             told = [one.message for one in behaviour.statements(NOW_US)[:2] if isinstance(one, Send)]
-            said += self._of_life([word for word in told if isinstance(word, Itinerary | Progress)])
+            said += [self._of_life(word) for word in told if isinstance(word, Itinerary | Progress)]
         return [*said, *super().waits(down)]
 
-    def _deeds(self, effects: list[Effect]) -> list[Deed]:
-        return self._of_life(super()._deeds(effects))
-
-    def _of_life(self, deeds: Sequence[Deed]) -> list[Deed]:
-        """The call number of a stamp, which decides nothing here, tells of which life a plan is."""
-        return [
-            replace(one, stamp=one.stamp._replace(call=self.boot)) if isinstance(one, Itinerary) else one
-            for one in deeds
-        ]
-
     def _takes_up(self, word: Message) -> list[Any]:
-        if isinstance(word, Itinerary):
-            if word.stamp.call < self.boots.get(word.sender, 0):
-                # A bus brings the words of one machine in their order: none of a plan of a life before.
-                return []
-            self.fleet.mirror.on_itinerary(word, NOW_US)
-        elif isinstance(word, Progress):
+        if isinstance(word, Progress):
             self.fleet.mirror.on_progress(word)
-        elif isinstance(word, Heartbeat):
-            if self.boots.get(word.sender, word.boot) != word.boot:
-                self.fleet.mirror._forget_plan(word.sender)
-            self.boots[word.sender] = word.boot
         return super()._takes_up(word)
 
 

@@ -17,7 +17,7 @@ from onboard.systems.car_park.compartment_factory import CompartmentFactory
 from onboard.systems.car_park.records import NumberRecord
 from onboard.systems.car_park.recovery import award_record
 from tests.models.at_work import AtWork, Entry
-from tests.models.award import BAY, CAR, CHEAP, KEY, PLACE, SITE, TASK, WHEELBASE_MM, AwardPart, is_said
+from tests.models.award import BAY, CAR, CHEAP, KEY, PLACE, SITE, TASK, WHEELBASE_MM, AwardPart
 from tests.models.bays import BayBody, DoorsState
 from tests.models.custody import HERE, CustodyPart
 from tests.models.robots import CAR_KG
@@ -112,7 +112,7 @@ class ParkingPart(CustodyPart):
         if node != BAY:
             return super().made(node, journal, body)
         bay = EmptiedBody(node, body.doors, body.load_kg)
-        return AtWork(SITE, node, CompartmentFactory(), bay, journal, is_said=is_said)
+        return AtWork(SITE, node, CompartmentFactory(), bay, journal, is_said=self.is_said)
 
     def goes_on(self, body: Any) -> None:
         """Nothing by itself."""
