@@ -340,11 +340,12 @@ export class Calls extends Fleet {
     const one = this.tasks.get(which);
     this.forfeits.delete(which);
     if (word.winner !== this.node || word.result !== "AWARDED") return this.#isLost(word, which);
+    if (call) call.isMine = false;
     if (one) return this.report(which, one.phase === "LOADED" ? "LOADED" : "AWARDED", this.#sink(which));
     if (this.done.has(which)) return this.report(which, "DONE", this.done.get(which));
     const found = call?.hasBid && this.mayTake() && this.#arrange(this.#kept(), [call]);
     if (!found) return this.forfeit(which, call?.hasBid ? "IMPOSSIBLE" : "JOURNAL_LOST");
-    Object.assign(call, { isMine: false, phase: "AWARDED" });
+    call.phase = "AWARDED";
     this.stamp = this.stampOf(call);
     this.tasks.set(which, call);
     this.publish(found.steps);

@@ -118,9 +118,11 @@ class ParkingPart(CustodyPart):
         """Nothing by itself."""
 
     def feels(self, i: int, view: Any, bodies: tuple[Any, ...]) -> Hashable | None:
-        """The bay is empty once somebody has the car aboard."""
-        is_gone = self.nodes[i] == BAY and any(one.load_kg for one in bodies[1:]) and bodies[0].load_kg
-        return Felt(0) if is_gone else None
+        """The bay is empty once somebody has the car aboard, and stays so: who is at the place has left it there."""
+        if self.nodes[i] != BAY or not bodies[0].load_kg:
+            return None
+        at_mm = (PLACE.index - 1) * SITE.tracks[PLACE.track].pitch_mm
+        return Felt(0) if any(one.load_kg or one.position_mm == at_mm for one in bodies[1:]) else None
 
     def view(self, machine: AtWork) -> Any:
         """See ``View``."""

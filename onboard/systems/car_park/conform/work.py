@@ -4,7 +4,7 @@ from onboard.conform.cast import Cast, grants
 from onboard.conform.checks import Check
 from onboard.conform.player import Scene
 from onboard.conform.stage import SECOND, Heard, Play, Stage, Word, after_ms
-from onboard.contract.codes import MachineState, Operation, Reason, TaskPhase, TokenKind
+from onboard.contract.codes import LegAction, MachineState, Operation, Reason, TaskPhase, TokenKind
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import (
     CallForProposals,
@@ -29,6 +29,10 @@ _AGAIN = (
     "An award for me that is heard again is answered with how the task stands: "
     "AWARDED until the car is aboard, LOADED, DONE"
 )
+_ANEW = (
+    "So is one for a task that I have begun or done, in whichever call of its initiator, where the car is the same: "
+    "nothing is planned for it twice."
+)
 _VERSION = "`CarAt` says where a car is, under the version of its token: by its custodian only."
 
 _COMES = "a compartment calls when somebody drives in (PARK, wheelbase 1500, raw 0: not measured)"
@@ -52,6 +56,8 @@ PARKED = (
     Check("bay-goes-back-behind-the-car", "C3", _ABOARD),
     Check("loaded-is-told", "U2", "LOADED when the car is aboard and its shuttle home"),
     Check("loaded-again-by-an-award", "U3", _AGAIN),
+    Check("won-anew-with-its-car-aboard-is-told", "U3", _ANEW),
+    Check("won-anew-with-its-car-aboard-makes-no-work", "U3", _ANEW),
     Check("keeps-a-car-aboard", "U5", "Where a robot has the car aboard nobody else can do it."),
     Check("asks-for-the-place", "C1", "A robot before a station asks for the tokens of station and car."),
     Check("car-is-left", "C3", _LEFT),
@@ -67,6 +73,8 @@ PARKED = (
     Check("done-is-told", "U2", "DONE with the station where the car is left when the shuttle is home."),
     Check("done-names-the-place", "U2", ("DONE with the station where the car is left when the shuttle is home.")),
     Check("done-again-by-an-award", "U3", _AGAIN),
+    Check("won-anew-when-done-is-told", "U3", _ANEW),
+    Check("won-anew-when-done-makes-no-work", "U3", _ANEW),
     Check("is-idle-in-the-end", "U2", ("DONE with the station where the car is left when the shuttle is home.")),
 )
 
@@ -146,6 +154,28 @@ def _taken(stage: Stage, cast: Cast, desk: Desk, call: CallForProposals, aboard:
     yield from stage.pause(1.0)
     given = [one for one in stage.since(TaskReport, begin_us) if one.message.phase is TaskPhase.FORFEITED]
     stage.none_of("keeps-a-car-aboard", given, "gives a task back with the car aboard")
+    yield from _won_anew(stage, desk, call, "with-its-car-aboard", TaskPhase.LOADED)
+
+
+def _won_anew(stage: Stage, desk: Desk, of: CallForProposals, when: str, phase: TaskPhase) -> Play:
+    """Its initiator has heard nothing of the task, and calls for it once more; who does not bid is not judged."""
+    call = desk.call(task=of.task)
+    told = stage.since(Itinerary, 0)[-1:]
+    bid = yield from desk.asks(call, withdraws=False)
+    if bid is None:
+        return
+    begin_us = stage.now_us
+    desk.award(call, stage.node, task_version=3)
+    said = yield from stage.hears(TaskReport, lambda one: one.task == of.task, 2.0, begin_us)
+    stage.judge(f"won-anew-{when}-is-told", said and said.message.phase is phase, f"not {phase.name}", said)
+    yield from stage.pause(0.5)
+    most = max((_works(one) for one in told), default=0)
+    more = [one for one in stage.since(Itinerary, begin_us) if _works(one) > most]
+    stage.none_of(f"won-anew-{when}-makes-no-work", more, "plans more work than before")
+
+
+def _works(plan: Word) -> int:
+    return sum(leg.action is LegAction.WORK for leg in plan.message.legs)
 
 
 def _left(stage: Stage, cast: Cast, desk: Desk, call: CallForProposals, begin_us: int) -> Play:
@@ -192,6 +222,7 @@ def _done(stage: Stage, desk: Desk, call: CallForProposals, left: Word) -> Play:
     desk.award(call, stage.node)
     again = yield from stage.hears(TaskReport, lambda one: one.task == call.task, 2.0, begin_us)
     stage.judge("done-again-by-an-award", again and again.message.phase is TaskPhase.DONE, "not DONE", again)
+    yield from _won_anew(stage, desk, call, "when-done", TaskPhase.DONE)
     idle = yield from stage.hears(Heartbeat, lambda one: one.state is MachineState.IDLE, 60.0)
     stage.judge("is-idle-in-the-end", idle, "not idle within 60 s", idle)
 
