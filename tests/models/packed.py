@@ -1,13 +1,13 @@
 """One search for all explorations: breadth first, every reachable state once, each as one whole number.
 
 From the lowest bit a state is each machine's part by number, a count of faults, and the bus with a bit for each word.
-What a machine may do about the bus depends on its part and on the words that it heeds: that is worked out once by the
-model and kept, as what is to be added to the state and said. What more than one part decides is kept by all parts. So
-most transitions cost an addition and a look into a table, 1 to 3 us (docs/figures.md).
+What a machine may do about the bus depends on its part, the count and the words that it heeds: that is worked out once
+by the model and kept, as what is to be added to the state and said. What more than one part decides is kept by all
+parts. So most transitions cost an addition and a look into a table, 1 to 3 us (docs/figures.md).
 """
 
 import time
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -107,7 +107,8 @@ class Search(Generic[State]):
     #: The state that must not be, or from which nothing good follows.
     stopped: State | None = None
     _parts: Table[tuple[int, Any]] = field(default_factory=Table)
-    _moves: list[_Moves] = field(default_factory=list)
+    #: By part and count: a machine may crash only while faults are left.
+    _moves: dict[int, _Moves] = field(default_factory=lambda: defaultdict(dict))
     _here: dict[int, _Here] = field(default_factory=dict)
     #: Parts and counts that are not wrong.
     _sound: set[int] = field(default_factory=set)
@@ -130,9 +131,7 @@ class Search(Generic[State]):
 
     def _part(self, i: int, part: Any) -> int:
         number = self._parts.number((i, part))
-        if number == len(self._moves):
-            self._moves.append({})
-            assert number <= _PART, "a part has 24 bits"
+        assert number <= _PART, "a part has 24 bits"
         return number
 
     def unpack(self, packed: int) -> State:
@@ -160,15 +159,19 @@ class Search(Generic[State]):
         for one, stays in self.model.alone(ground):
             ahead = self.pack(one)
             after.append((ahead & self._ground, stays, ahead >> self._bus_at))
-        moving = [self._moves[packed >> i * _PART_BITS & _PART] for i in range(len(self.model.nodes))]
+        moving = [self._moves_of(packed, i) for i in range(len(self.model.nodes))]
         return _Here(verdict, tuple(enumerate(moving)), tuple(after))
+
+    def _moves_of(self, packed: int, i: int) -> _Moves:
+        count = packed >> self._count_at & _COUNT
+        return self._moves[count << _PART_BITS | packed >> i * _PART_BITS & _PART]
 
     def _does(self, packed: int, i: int, bus: int) -> tuple[tuple[int, int], ...]:
         """What machine i may do about the words that it heeds: what is added to the ground, and the bus then."""
         ground = packed & self._ground
         moves = [self.pack(one) for one in self.model.moves(self.unpack(bus << self._bus_at | ground), i)]
         found = tuple([((one & self._ground) - ground, one >> self._bus_at << self._bus_at) for one in moves])
-        self._moves[packed >> i * _PART_BITS & _PART][bus] = found
+        self._moves_of(packed, i)[bus] = found
         return found
 
     def _is_wrong(self, packed: int) -> bool:
