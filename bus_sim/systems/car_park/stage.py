@@ -114,11 +114,12 @@ class CarParkStage(SystemStage[Plant]):
         outcomes = Counter(customer.visit.outcome for customer in customers)
         still = (CustomerState.COMING, CustomerState.PARKED, CustomerState.GONE)
         told_off = sum(map(is_told_off, customers))
-        waiting = sum(one.state not in still and not looks_for_ticket(one) for one in customers)
+        # Who looks for the ticket may have been told why before: that one is told.
+        waiting = sum(one.state not in still and not (is_told_off(one) or looks_for_ticket(one)) for one in customers)
         return Tally(
             outcomes[VisitOutcome.SERVED] + outcomes[VisitOutcome.CANCELLED],
             sum(outcomes[one] for one in _TOLD_WHY) + told_off,
-            waiting - told_off,
+            waiting,
             max((*summary.in_wait_us, *summary.out_wait_us), default=0) / 1e6,
             outcomes[VisitOutcome.FULL],
         )
