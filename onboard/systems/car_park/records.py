@@ -74,6 +74,7 @@ class HandledRecord(JournalRecord):
     task: Reference
     handling: CarHandling
     station: int = 0
+    car: Reference | None = None
 
 
 @dataclass(frozen=True, slots=True)

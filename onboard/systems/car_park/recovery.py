@@ -54,7 +54,7 @@ def award_record(call: CallForProposals, source: Station, sink: Station, version
 
 def handled_record(work: StationWork) -> Record:
     """The journal's word that one handling of a task is over."""
-    return Record(HandledRecord(work.call.task, work.handling, work.station.number))
+    return Record(HandledRecord(work.call.task, work.handling, work.station.number, work.car))
 
 
 def forfeited_record(task: Reference) -> Record:
@@ -93,7 +93,7 @@ _READ = (
 
 
 class Done(NamedTuple):
-    """A task whose car was left at a station (number); the car is unknown where a compacted journal tells it."""
+    """A task whose car was left at a station (number); its car is unknown by a journal of before."""
 
     task: Reference
     station: int
@@ -155,12 +155,13 @@ class JournalRecovery:
                 self.works[:1] = [one._replace(wheelbase_mm=measured_mm or one.wheelbase_mm) for one in self.works[:1]]
             case HandledRecord():
                 ended = (record.task, record.handling)
-                cars = [one.car for one in self.works if (one.call.task, one.handling) == ended]
                 self.works = [one for one in self.works if (one.call.task, one.handling) != ended]
                 self.phase = None
                 if record.handling is CarHandling.LEAVE:
+                    # Of the last one alone: a compacted journal has no other.
+                    self.done.clear()
+                    self._over(Done(record.task, record.station, record.car))
                     self.is_news = True
-                    self._over(Done(record.task, record.station, cars[0] if cars else None))
             case _:
                 self._take_place(record)
 
