@@ -7,8 +7,8 @@ from itertools import chain
 from typing import Any, ClassVar
 
 from onboard.contract.codes import LegAction, Reason, Side, TokenKind
-from onboard.contract.constants import MOBILE_KINDS, NOBODY
-from onboard.contract.messages import Blocked, Clear, Itinerary, Leg, Message, Progress
+from onboard.contract.constants import ANY_STATION, MOBILE_KINDS, NOBODY, OUTSIDE
+from onboard.contract.messages import Blocked, CarAt, Clear, Itinerary, Leg, Message, Progress
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect
 from onboard.core.mirror import Mirror, digest_words
@@ -77,6 +77,17 @@ class WayMirror(CarMirror):
     def statements(self) -> list[Effect]:
         """What is blocked, or clear again, of the tracks that I am steward of."""
         return self.blocked_words.statements()
+
+    def _hear_car(self, statement: CarAt, now_us: int) -> list[Effect]:
+        """A car stands in the site, is aboard or has left; a word of any other place is none."""
+        if statement.station not in (ANY_STATION, OUTSIDE):
+            station = Station.from_number(statement.station)
+            track = self.site.tracks.get(station.track)
+            if track is None or not 1 <= station.index <= track.length:
+                if self.words is not None:
+                    self.words.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+                return []
+        return super()._hear_car(statement, now_us)
 
     def _on_word(self, word: Blocked | Clear, now_us: int) -> list[Effect]:
         self._digest = None

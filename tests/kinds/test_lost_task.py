@@ -9,7 +9,7 @@ from onboard.contract.messages import Award, Bid, CarAt, DriveState, Itinerary, 
 from onboard.core.authority import station_token
 from tests.kinds.test_whose_task import after_a_while
 from tests.models.at_work import AtWork, Deed
-from tests.models.award import BAY, CAR, CHEAP, DEAR, PLACE, TASK, WHEELBASE_MM
+from tests.models.award import BAY, CAR, CHEAP, DEAR, KEY, PLACE, TASK, WHEELBASE_MM
 from tests.models.custody import CALL, HERE, CustodyPart
 from tests.models.robots import RobotBody
 from tests.models.snapshot import NOW_US, WHILE_US
@@ -53,6 +53,17 @@ def test_work_that_is_dropped_is_not_told_as_done(robot: AtWork, by_mm: int) -> 
     deeds = robot.hears(ANOTHERS) + robot.waits(())
     assert reports(deeds) == []
     assert not [deed for deed in deeds if isinstance(deed, tuple) and dict(deed)["record"] == "handled"]
+
+
+def test_a_car_at_no_place_of_the_site_stands_where_it_stood(robot: AtWork) -> None:
+    """Who gave the car back for a word of track 39 looked for that track's keeper, and halted."""
+    robot.hears(ANOTHERS)
+    for number in (9_999, PLACE.number | 0x7F):
+        robot.hears(CarAt(BAY, CAR, number, 1, WHEELBASE_MM))
+    deeds = robot.hears(TokenGrant(BAY, KEY.kind, KEY.number, 2, CHEAP))
+    back = [(word.token, word.holder) for word in deeds if isinstance(word, TokenGrant)]
+    assert back == [(KEY.number, BAY)]
+    assert robot.fleet.mirror.cars[CAR].station == PLACE.number
 
 
 def awarded_anew(robot: AtWork) -> list[Deed]:

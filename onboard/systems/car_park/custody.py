@@ -33,9 +33,7 @@ def keeper(site: WaySite, station: Station) -> int:
 def keeps(fleet: WayFleet, number: int) -> bool:
     """Whether what stands in a station (number, as heard) is this machine's to keep."""
     station = Station.from_number(number)
-    if station in fleet.site.compartments.values():
-        return fleet.site.compartments.get(fleet.node_id) == station
-    return fleet.site.stewards.get(station.track) == fleet.node_id
+    return station.track in fleet.site.stewards and keeper(fleet.site, station) == fleet.node_id
 
 
 def car_of(grant: TokenGrant) -> Reference:

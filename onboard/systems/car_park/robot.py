@@ -248,13 +248,13 @@ class ParkingRobot:
             case Awarded(call_key=key, call=call, proposal=proposal, award=award):
                 self.generation.tentative.pop(key, None)
                 (solution,) = proposal.program
-                version = 1 if award is None else award.task_version
-                self.recovery.versions[call.task] = version
                 again = call.task in self.going_around.untouched()
                 is_begun = not again and call.task in [work.call.task for work in self._works()]
                 if is_begun or self.recovery.has_done(call):
                     # Its initiator has not heard how far it has come, and has called for it anew.
                     return [self._tell_again(call.task)]
+                version = 1 if award is None else award.task_version
+                self.recovery.versions[call.task] = version
                 why = self._why_not()
                 if why is not Reason.NONE:
                     return self.going_around.forfeit(call.task, why, now_us)
