@@ -43,6 +43,7 @@ from onboard.core.negotiation.winners import LOST_AFTER_US
 from onboard.core.site import Station
 from onboard.holon.holon import Holon
 from onboard.systems.car_park.bay_memory import winner_record
+from onboard.systems.car_park.site import CarPark
 from onboard.systems.registry import factory_for
 from onboard.ways.tokens import car_token
 from tests.sites import one_floor
@@ -66,11 +67,11 @@ def token_entry(record: str, version: int, holder: int) -> Entry:
 GIVEN = [token_entry("token_held", 1, BAY), token_entry("token_given", 2, ROBOT), token_entry("token_gone", 2, ROBOT)]
 
 
-def machine(node: int, entries: Iterable[Entry] = ()) -> Holon:
+def machine(node: int, entries: Iterable[Entry] = (), site: CarPark = SITE) -> Holon:
     """A machine with its journal, that knows the bus time; no other is there that could know better."""
     past: list[Entry] = [{"record": "boot", "boot": 1}, *entries] if entries else []
     made = Holon(
-        SITE, SITE.machines[node], factory_for(SITE, SITE.machines[node].kind), boot=len(past[:1]) + 1, entries=past
+        site, site.machines[node], factory_for(site, site.machines[node].kind), boot=len(past[:1]) + 1, entries=past
     )
     made.start(0)
     if node != BAY:
@@ -94,6 +95,17 @@ def grant(version: int, sender: int = ROBOT, holder: int = BAY) -> TokenGrant:
 def put_down(station: int = PLACE, version: int = 2) -> CarAt:
     """The robot's word, under the version before that of its grant."""
     return CarAt(ROBOT, CAR, station, version, WHEELBASE_MM)
+
+
+def test_who_keeps_one_station_takes_no_car_that_stands_in_anothers() -> None:
+    """All that it heard of the car is where it was before: it had it on paper there, and nobody had it where it is."""
+    other = '[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,9)"\n'
+    site = one_floor(extra=other)
+    keeper = machine(BAY, GIVEN, site)
+    keeper.receive(put_down(site.compartments[2].number), 1)
+    assert not [word for word in said(keeper.receive(grant(3), 2)) if isinstance(word, TokenHeld)]
+    keeper.receive(put_down(), 3)
+    assert [word for word in said(keeper.receive(grant(3), 4)) if isinstance(word, TokenHeld)]
 
 
 @pytest.mark.parametrize(
