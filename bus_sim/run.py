@@ -6,6 +6,7 @@ Same seed, same options: the same candump log, byte for byte.
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from hashlib import blake2s
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -118,13 +119,21 @@ class BusRun(Generic[PlantT]):
         self.secret = blake2s(f"secret:{self.options.seed}".encode()).digest()
         self.seals = SimulatedSeals(self.site, self.options.seed, self.codecs.fleet.decode_part)
 
-    def start(self) -> None:
-        """Switch on the plant, then every controller, in the order of their node-IDs. On the running loop."""
+    def start(self, after_us: Callable[[], int] | None = None) -> None:
+        """Switch on the plant, then every controller, in the order of their node-IDs. On the running loop.
+
+        With ``after_us`` each controller is there so many us of the loop later, as computers that boot.
+        """
         self._tap()
         self.plant.start()
         for machine in self.site.machines.values():
-            if machine.name not in self.options.without and machine.node_id in self.in_force:
+            if machine.name in self.options.without or machine.node_id not in self.in_force:
+                continue
+            if after_us is None:
                 self.start_controller(machine)
+            else:
+                due_us = self.loop.now_us() + after_us()
+                self.plant.timers.call_at(due_us, partial(self.start_controller, machine))
 
     def start_controller(self, machine: Machine) -> None:
         """Power up one machine's controller; a second time means a restart, with the same journal.

@@ -64,7 +64,7 @@ class OwnNumbers(Repeated):
     def words(self, now_us: int) -> Iterator[Message]:
         """That it has answered whoever asked."""
         for node in self.node.site.machines:
-            yield SyncDone(node, NOBODY, 1)
+            yield SyncDone(node, NOBODY, 1, 0)
 
 
 class StopsAsAll(Repeated):

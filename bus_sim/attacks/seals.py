@@ -61,7 +61,7 @@ class SplitSeals(Attack):
     def hear(self, message: Message, now_us: int) -> None:
         """Each word of a right is followed at once by one in the same name."""
         if isinstance(message, TokenGrant | TokenRequest):
-            self.node.say(SyncDone(message.sender, NOBODY, 1))
+            self.node.say(SyncDone(message.sender, NOBODY, 1, 0))
 
 
 class ManyChallenges(Repeated):

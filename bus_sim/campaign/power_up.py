@@ -3,8 +3,11 @@
 A machine takes part once its state says so and its rights are its own: all that live have answered it.
 """
 
+import random
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from bus_sim.campaign.recovery import ADMITTED
 from bus_sim.campaign.trial import stage_of
@@ -62,13 +65,20 @@ def large_with(machines: int, bitrate: int = 500_000, seals: str = "off") -> Sit
     return parse_site(text + "".join(more), "large.toml", crowded=True)
 
 
-def power_up(site: Site, loss: float = 0.0, seed: int = 1) -> PowerUp:
-    """Start all; each receiver misses each frame with the probability ``loss``, drawn from ``seed``."""
+def power_up(
+    site: Site, loss: float = 0.0, seed: int = 1, within_us: int = 0, before: Callable[[Any], object] = id
+) -> PowerUp:
+    """Start all; each receiver misses each frame with the probability ``loss``, drawn from ``seed``.
+
+    Computers boot within ``within_us``, drawn from ``seed`` too. ``before`` is given the run before it is switched on.
+    """
     loop = VirtualTimeLoop()
-    return run_on(loop, _power_up(site, loss, seed, loop))
+    return run_on(loop, _power_up(site, loss, seed, within_us, before, loop))
 
 
-async def _power_up(site: Site, loss: float, seed: int, loop: VirtualTimeLoop) -> PowerUp:
+async def _power_up(
+    site: Site, loss: float, seed: int, within_us: int, before: Callable[[Any], object], loop: VirtualTimeLoop
+) -> PowerUp:
     faults = (InjectedFault(FaultKind.OMISSION, probability=loss, seed=seed),) if loss else ()
     nobody = simulated_of(site).on(Occasion.BUSY, site)
     stage = stage_of(site, FaultScenario(site.name, seed, SPAN_US / 1e6, nobody, faults), loop)
@@ -85,8 +95,10 @@ async def _power_up(site: Site, loss: float, seed: int, loop: VirtualTimeLoop) -
 
     arm(run, faults)
     run.fleet.tap(on_fleet)
-    run.start()
-    await run_until(run, all_take_part, SPAN_US, LOOK_US)
+    before(run)
+    chance = random.Random(f"boots:{seed}")
+    run.start((lambda: chance.randrange(within_us)) if within_us else None)
+    await run_until(run, all_take_part, SPAN_US + within_us, LOOK_US)
     run.close()
     mirrors = len({one.holon.mirror.digest() for one in run.controllers.values()})
     return PowerUp(frames, run.fleet.statistics().worst_second_load, parts_s, mirrors)

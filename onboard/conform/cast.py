@@ -214,7 +214,7 @@ class Cast:
             if part.node in self.doubles:
                 self.doubles[part.node].tell()
             self.stage.say(*(TokenHeld(part.node, *key, self.tokens[key][1]) for key in self.held_by(part.node)))
-            self.stage.say(SyncDone(part.node, asked.sender, part.boot))
+            self.stage.say(SyncDone(part.node, asked.sender, part.boot, 0))
 
     def _answer_request(self, request: TokenRequest) -> None:
         key = TokenKey(request.token_kind, request.token)

@@ -132,6 +132,9 @@ class SyncDone(Message):
     whom: int
     #: Boot counter of the sender. 0 to 255.
     boot: int
+    #: Where whom is 0, a bit for each machine that this answers, by its place among the node-IDs of the site, from 0,
+    #: modulo 48; 0: not told. 0 to 281474976710655.
+    askers: int
 
 
 @message(frozen=True, slots=True)

@@ -378,6 +378,7 @@ class Holon:
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         if request.whom not in (NOBODY, self.node_id):
+            self.witness.on_other_request(request.whom, now_us)
             return []
         # Who asks may just have joined: it need not wait for the next period.
         told = [self.fixed.bus_time(now_us)] if self.clock.is_source else []

@@ -71,7 +71,7 @@ class RightsTalk:
     def _on_request(self, request: TokenRequest, now_us: int) -> list[Effect]:
         key = TokenKey(request.token_kind, request.token)
         self.petitions.hear(key, request, now_us)
-        self.witness.hear(request)
+        self.witness.hear(request, now_us)
         if not self.tokens.holds(key):
             return self.tokens.on_request(request, Reason.TOKEN_HELD_BY_OTHER, now_us)
         verdict = self.may_grant(key, request.sender, now_us)
@@ -138,7 +138,7 @@ class RightsTalk:
         key = TokenKey(grant.token_kind, grant.token)
         if not self._may_move(key, grant.holder) or (grant.holder == self.node_id and self.is_frozen()):
             return []
-        self.witness.hear(grant)
+        self.witness.hear(grant, now_us)
         if self.tokens.is_news(key, grant.version) and not self.tokens.holds(key):
             self.mirror.on_return(grant.sender, key)
             self.petitions.close(key, grant.holder)
@@ -149,7 +149,7 @@ class RightsTalk:
         key = TokenKey(statement.token_kind, statement.token)
         if not self._may_move(key, statement.sender):
             return []
-        self.witness.hear(statement)
+        self.witness.hear(statement, now_us)
         self.petitions.close(key, statement.sender)
         effects = self.tokens.on_held(statement, now_us, key)
         return self._after(key, effects, now_us) if effects else effects
@@ -158,12 +158,12 @@ class RightsTalk:
         key = TokenKey(word.token_kind, word.token)
         if not self._may_move(key, word.holder):
             return []
-        self.witness.hear(word)
+        self.witness.hear(word, now_us)
         return self._after(key, self.tokens.on_given(word, now_us), now_us)
 
     def _on_seen(self, word: TokenSeen, now_us: int) -> list[Effect]:
         if self._may_move(TokenKey(word.token_kind, word.token), word.holder):
-            self.witness.hear(word)
+            self.witness.hear(word, now_us)
             self.tokens.on_seen(word)
         return []
 

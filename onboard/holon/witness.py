@@ -8,6 +8,8 @@ until a person has decided (docs/protocol.md, Restart).
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import reduce
+from operator import or_
 from typing import NamedTuple
 
 from onboard.contract.codes import MachineState, Reason
@@ -39,17 +41,21 @@ WORDS_WAIT_US = 20_000
 OFTEN = 3
 SELDOM = 8
 #: Who asks within this time of an answer shares the next one, us: at power-up all ask all. And within so many bits of
-#: each of its frames: four who vouch for hundreds of things answer at once, and a frame with stuff bits has 160.
-ANSWER_PERIOD_US, ANSWER_FRAME_BITS = 250_000, 640
+#: each of its frames, of 160 with stuff bits: four who vouch for hundreds of things answer at once. And within so many
+#: for each right that was heard of: all tell two or three words about each, and as long the bus is free for others.
+ANSWER_PERIOD_US, ANSWER_FRAME_BITS, KNOWN_RIGHT_BITS = 250_000, 640, 900
 #: Who is to be asked by any one of all: the first slot begins so long after the cause, us, when who was started with
 #: all others has answered all; then each has its own, as long as a question and the first answer at 125 kbit/s.
 FIRST_SLOT_US = 400_000
 SLOT_US = 5_000
-#: So many words about rights since the start, or since something was put off, are no ordinary work: a tenth of what an
-#: answer's period at 500 kbit/s holds.
+#: So many words about rights within an answer's period are no ordinary work: a tenth of what it holds at 500 kbit/s.
 FLOOD = 100
-#: A slot or an answer is put off for an answer's period at most so often: five seconds, 15,000 words at 500 kbit/s.
-MOST_WAITS = 20
+#: Nobody waits for longer while such words come, us: 15,000 of them at 500 kbit/s.
+MOST_FLOOD_US = 5_000_000
+#: Bits of ``SyncDone.askers``.
+ASKER_BITS = 48
+#: So many things at most of those that it held before is a machine told: each shows that its journal is old.
+MOST_DOUBTS = 4
 #: From one question to who has not answered to the next, us: two shared answers.
 AGAIN_US = 500_000
 #: So many heartbeat periods after its start a machine has been compared with by all that live: the first word may be
@@ -107,15 +113,19 @@ class Witness:
     _quiet_until_us: int | None = None
     #: Whom to ask when, unless its answer to another is heard before.
     _slots: dict[int, int] = field(default_factory=dict)
-    #: Words about rights heard since anything was put off last, and how often that was since the start.
-    _words: int = 0
-    _waits: int = 0
+    #: When the last words about rights were heard, and since when there were so many of them.
+    _words_us: deque[int] = field(default_factory=lambda: deque(maxlen=FLOOD))
+    _flood_us: int = 0
+    #: Under which boot each machine has answered since this one started.
+    _answered_as: dict[int, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.site, self.node_id = self.tokens.site, self.tokens.node_id
         self._others = set(self.site.machines) - {self.node_id}
         #: After what all heard, this machine speaks so much later, us.
         self.slot_us = sum(node < self.node_id for node in self._others) * SLOT_US
+        #: What stands for each machine in ``SyncDone.askers``.
+        self._bits = {node: 1 << place % ASKER_BITS for place, node in enumerate(sorted(self.site.machines))}
 
     # --- asking ------------------------------------------------------------------------------------------------
 
@@ -131,7 +141,7 @@ class Witness:
 
     def on_heartbeat(self, beat: Heartbeat, now_us: int, *, is_fresh: bool) -> list[Effect]:
         """Ask who is new or was started again, and whose mirror has differed from mine for a while."""
-        if is_fresh:
+        if is_fresh and self._answered_as.get(beat.sender) != beat.boot:
             self._was_started(beat.sender)
             return self._ask_newcomer(beat.sender, self.mirror.boots_before[beat.sender], now_us)
         self._compare(beat, now_us)
@@ -144,9 +154,11 @@ class Witness:
             self._apart.pop(beat.sender, None)
             return
         self._told[-1] = now_us if self.is_telling() else self._told[-1]
-        if now_us - self._told[-1] < FRAMES_WAIT_US or now_us - self._told[0] < RESTLESS_US:
+        is_restless = now_us - self._told[-1] < FRAMES_WAIT_US or now_us - self._told[0] < RESTLESS_US
+        if is_restless or self._is_flooded(now_us):
             # Others hear one by one what I said in one step: what they believed in between I never did. Where I say
-            # one word after the other, the last ones wait for my share of the bus, and all are behind me.
+            # one word after the other, the last ones wait for my share of the bus, and all are behind me. And while
+            # answers come all are behind each other.
             return
         before = self._apart.get(beat.sender, (0, 0, 0))
         times = before[2] + 1 if before[:2] == (told, mine) else 1
@@ -194,10 +206,10 @@ class Witness:
         self.tokens.is_synced = False
         self._since_us = now_us
         self._ask_at_us = now_us + self.site.timing.heartbeat_us
-        self._waits = 0
         self.tokens.asked = set(self._others)
         # Who comes back after a hold asks anew: what was answered before that is old.
         self.answered.clear()
+        self._answered_as.clear()
         for node in self._others:
             self._was_started(node)
         # All answer me now and ask me: what they say in it need not be told to them.
@@ -205,8 +217,8 @@ class Witness:
 
     def _be_quiet(self, said: list[Effect], now_us: int) -> list[Effect]:
         """The next answer is shared by all who ask while this is said: more at once would never let its end through."""
-        said_us = len(said) * ANSWER_FRAME_BITS * 1_000_000 // self.site.bitrate
-        self._quiet_until_us = now_us + max(ANSWER_PERIOD_US, said_us)
+        bits = max(len(said) * ANSWER_FRAME_BITS, len(self.tokens.beliefs.verified) * KNOWN_RIGHT_BITS)
+        self._quiet_until_us = now_us + max(ANSWER_PERIOD_US, bits * 1_000_000 // self.site.bitrate)
         return said
 
     def shift(self, by_us: int) -> None:
@@ -220,6 +232,7 @@ class Witness:
             for peer in self.mirror.peers.values():
                 # Who has just come has no earlier life because the time was set.
                 peer.since_us += by_us
+            self._words_us.clear()
             self.digests_before.clear()
             self._told = deque((told_us + by_us for told_us in self._told), RESTLESS)
 
@@ -245,13 +258,19 @@ class Witness:
     def on_done(self, word: SyncDone, now_us: int) -> list[Effect]:
         """A machine has said all: of what it held before its restart and does not know of, it is told."""
         self._slots.pop(word.sender, None)
-        if word.whom not in (NOBODY, self.node_id) or word.sender not in self._others:
+        if not self._is_answer(word) or word.sender not in self._others:
             return []
         self.tokens.asked.discard(word.sender)
         self.answered.add(word.sender)
+        self._answered_as[word.sender] = word.boot
         effects = self._tell_doubted(word.sender)
         self._review(now_us)
         return effects
+
+    def _is_answer(self, word: SyncDone) -> bool:
+        """Whether all of what was said was said for me too: who asked later has heard a part of it."""
+        is_mine = not word.askers or bool(word.askers & self._bits[self.node_id])
+        return word.whom == self.node_id or (word.whom == NOBODY and is_mine)
 
     def _review(self, now_us: int) -> None:
         """The rights are mine once all that live have answered; without a past, all there are, or all as new as I."""
@@ -289,7 +308,7 @@ class Witness:
         if not self.is_over and self.doubt is None and self._ask_at_us is not None and self._ask_at_us <= now_us:
             self._ask_at_us = now_us + AGAIN_US
             missing, live = self._missing(now_us), self._live(now_us)
-            for node in sorted(missing & live):
+            for node in [] if self._is_flooded(now_us) else sorted(missing & live):
                 effects += self.ask(node)
             for node in sorted(missing - live):
                 effects.append(Send(Halted(self.node_id, self.node_id, Reason.JOURNAL_LOST, node, False, self.boot)))
@@ -303,26 +322,26 @@ class Witness:
     def _due(self, now_us: int) -> list[int]:
         """Whom to ask now."""
         due = sorted(node for node, due_us in self._slots.items() if due_us <= now_us)
-        if not due or not self._is_flooded():
+        if not due or not self._is_flooded(now_us):
             return due
-        self._slots = {node: max(due_us, now_us + ANSWER_PERIOD_US) for node, due_us in self._slots.items()}
+        self._slots = {node: due_us + ANSWER_PERIOD_US for node, due_us in self._slots.items()}
         return []
 
     def _is_answering(self, now_us: int) -> bool:
         """Whether those who asked meanwhile are answered now."""
         if self._answer_at_us is None or self._answer_at_us > now_us:
             return False
-        if not self._is_flooded():
+        if not self._is_flooded(now_us):
             return True
         self._answer_at_us = self._quiet_until_us = now_us + ANSWER_PERIOD_US
         return False
 
-    def _is_flooded(self) -> bool:
-        """Whether answers to my start still come: who is silent may be waiting behind them, and so may who asks."""
-        if self.is_over or self._words < FLOOD or self._waits >= MOST_WAITS:
-            return False
-        self._words, self._waits = 0, self._waits + 1
-        return True
+    def _is_flooded(self, now_us: int) -> bool:
+        """Whether answers still come: who is silent may be waiting behind them, and so may who asks."""
+        return self._is_flood(now_us) and now_us - self._flood_us < MOST_FLOOD_US
+
+    def _is_flood(self, now_us: int) -> bool:
+        return len(self._words_us) == FLOOD and now_us - self._words_us[0] < ANSWER_PERIOD_US
 
     def next_wake(self) -> int | None:
         """When there is something to ask or to answer, bus time in us."""
@@ -352,6 +371,11 @@ class Witness:
             self.tokens.drops[Reason.LATE] += 1
         return self._answer_to(request, now_us)
 
+    def on_other_request(self, node: int, now_us: int) -> None:
+        """Another has asked a machine, whose answer I hear with it."""
+        if node in self._slots and self.is_over:
+            self._slots[node] = max(self._slots[node], now_us + ANSWER_PERIOD_US + self.slot_us)
+
     def _may_know_better(self, node: int, now_us: int) -> bool:
         """Whether a machine may have known an earlier life of mine without having said so yet.
 
@@ -368,8 +392,13 @@ class Witness:
             # All are asked at power-up only: I knew it before, even where its counter is the same again.
             effects = self.ask(request.sender, known.boot)
         self._askers.add(request.sender)
+        if self._answer_at_us is not None:
+            return effects
         if self._quiet_until_us is not None and now_us < self._quiet_until_us:
             self._answer_at_us = self._quiet_until_us
+            return effects
+        if self._is_flooded(now_us):
+            self._answer_at_us = now_us + ANSWER_PERIOD_US
             return effects
         return self._answer(now_us) + effects
 
@@ -381,17 +410,25 @@ class Witness:
         return not self.has_past or is_newer(before, self.boot, 8)
 
     def _answer(self, now_us: int) -> list[Effect]:
-        askers, self._askers = sorted(self._askers), set()
+        # Who starts asks me as well, or has asked before I was there.
+        peers = self.mirror.peers
+        begin = {node for node in self.starting & peers.keys() if peers[node].state is MachineState.STARTING}
+        askers, self._askers = sorted(self._askers | begin), set()
         self._answer_at_us, effects = None, self.statements(now_us)
         for node in askers:
             effects += self._tell_doubted(node) + self._tell_gifts(node)
         effects += self._tell_own_gifts(set(askers)) + self._for_the_silent(now_us)
         whom = askers[0] if len(askers) == 1 else NOBODY
-        return self._be_quiet([*effects, Send(SyncDone(self.node_id, whom, self.boot))], now_us)
+        # A tool is no machine of the site: whom it is told with is not told.
+        is_told = whom == NOBODY and self._bits.keys() >= set(askers)
+        bits = reduce(or_, (self._bits[node] for node in askers), 0) if is_told else 0
+        return self._be_quiet([*effects, Send(SyncDone(self.node_id, whom, self.boot, bits))], now_us)
 
     def _tell_doubted(self, node: int) -> list[Effect]:
-        lost = self.doubted.get(node, {})
-        return [Send(TokenSeen(self.node_id, *key, version, node)) for key, version in lost.items()]
+        lost, beliefs = self.doubted.get(node, {}).items(), self.tokens.beliefs
+        # Whoever has one of them since has said so, whatever this one knows.
+        newest = [TokenSeen(self.node_id, *key, seen, node) for key, seen in lost if beliefs.of(key).version <= seen]
+        return list(map(Send, newest[-MOST_DOUBTS:]))
 
     def _tell_gifts(self, node: int) -> list[Effect]:
         """What a machine gave away by its own word and nobody has said that he has: only I can tell if it forgot it."""
@@ -420,11 +457,13 @@ class Witness:
 
     # --- what others know better -------------------------------------------------------------------------------
 
-    def hear(self, word: TokenHeld | TokenGrant | TokenGiven | TokenSeen | TokenRequest) -> None:
+    def hear(self, word: TokenHeld | TokenGrant | TokenGiven | TokenSeen | TokenRequest, now_us: int) -> None:
         """Compare what a machine says of a token with the journal, before the word counts for anything else."""
         if word.sender == self.node_id or word.sender not in self.site.machines:
             return
-        self._words += 1
+        self._words_us.append(now_us)
+        if not self._is_flood(now_us):
+            self._flood_us = now_us
         lost = self.doubted.get(word.sender)
         if lost and isinstance(word, (TokenHeld, TokenGrant, TokenGiven)):
             key = TokenKey(word.token_kind, word.token)

@@ -278,9 +278,10 @@ export class Fleet {
     if (isTurn) this.ask(peer, 0, this.now + 20 * MS + 5 * MS * this.rank);
   }
 
-  onSyncDone({ whom }, peer) {
+  onSyncDone({ whom, askers }, peer) {
+    const isForAll = whom === 0 && (askers === 0 || Math.floor(askers / 2 ** (this.rank % 48)) % 2 === 1);
     peer.question = undefined;
-    if (whom === 0 || whom === this.node) Object.assign(peer, { hasAnswered: true, isAsked: false });
+    if (isForAll || whom === this.node) Object.assign(peer, { hasAnswered: true, isAsked: false });
   }
 
   onSyncRequest({ sender, whom, boot_before }, peer) {

@@ -59,7 +59,7 @@ FIRST_LIFE = 2
 class _Quiet(Witness):
     """Restarts with a whole journal are explored: nobody knows better than that."""
 
-    def hear(self, message: Message) -> None:
+    def hear(self, message: Message, now_us: int) -> None:
         """Nothing."""
 
 

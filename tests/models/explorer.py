@@ -131,7 +131,7 @@ class Explorer:
         if isinstance(word, SyncDone):
             return witness.on_done(word, NOW_US)
         if isinstance(word, TokenHeld | TokenGrant | TokenGiven | TokenSeen | TokenRequest):
-            witness.hear(word)
+            witness.hear(word, NOW_US)
         return hear(book, word, NOW_US)
 
     def starts(self, i: int, journal: int) -> tuple[Memory, Deeds]:

@@ -131,6 +131,12 @@ TIMES: dict[str, tuple[Time, ...]] = {
     ),
     "restart": (
         Time("T_share", witness.ANSWER_PERIOD_US, _FIXED, "who asks so soon after an answer shares the next"),
+        Time(
+            "T_flood",
+            witness.MOST_FLOOD_US,
+            _FIXED,
+            "nobody waits longer while a hundred words about rights come in T_share",
+        ),
         Time("T_again", witness.AGAIN_US, _FIXED, "from one question to who has not answered to the next"),
         Time("T_new", witness.FIRST_SLOT_US, _FIXED, "a newcomer is asked after this and the own slot"),
         Time("T_turn", witness.SLOT_US, _FIXED, "slot of a question, times the number of lower node-IDs"),

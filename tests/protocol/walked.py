@@ -107,12 +107,12 @@ class Walker:
 
     def done(self, node: int) -> list[Effect]:
         """A machine has said all."""
-        return self.witness.on_done(SyncDone(node, 0, 1), BEAT_US)
+        return self.witness.on_done(SyncDone(node, 0, 1, 0), BEAT_US)
 
     def hear_of_token(self) -> list[Effect]:
         """Somebody has my right under a version that the journal lacks."""
         home = segment_token(SITE.machines[ALICE].home)
-        self.witness.hear(TokenHeld(STEWARD, home.kind, home.number, 5))
+        self.witness.hear(TokenHeld(STEWARD, home.kind, home.number, 5), BEAT_US)
         return []
 
 

@@ -303,6 +303,7 @@ LIFE = (
     Check("starts-in-each-life", "J1", "then I do as after a restart"),
     Check("asks-again-who-is-silent", "R2", "It asks who has not answered every `T_again`."),
     Check("asks-nobody-who-answered", "R2", "It asks who has not answered every `T_again`."),
+    Check("an-answer-to-others-is-none", "R2", "A `SyncDone` that names nobody answers me where its `askers`"),
 )
 
 
@@ -323,11 +324,16 @@ def another_life(stage: Stage, cast: Cast) -> Play:
         stage.judge("starts-in-each-life", beat.message.state is MachineState.STARTING, "another state", beat)
     asks = yield from stage.hears(SyncRequest, lambda one: one.whom == 0, 2.0, begin_us)
     stage.judge("asks-all-in-each-life", asks, "asks nobody", asks)
-    yield from stage.pause(6.0)
+    yield from stage.pause(2.5)
+    if slow is not None:
+        # Its answer was begun before the node was there.
+        stage.say(SyncDone(slow.node, 0, slow.boot, 1 << sorted(stage.site.machines).index(stage.caller)))
+    yield from stage.pause(3.5)
     if slow is not None:
         again = [one for one in stage.since(SyncRequest, stage.now_us - 3 * SECOND) if one.message.whom == slow.node]
         is_kept = _is_every(again, 500 * MS, stage.means.late_us)
         stage.judge("asks-again-who-is-silent", is_kept, "not every 0.5 s", *again)
+        stage.judge("an-answer-to-others-is-none", again, "asks no more", asks, *again)
         others = [one for one in stage.since(SyncRequest, begin_us + 4 * SECOND) if one.message.whom == stage.caller]
         stage.none_of("asks-nobody-who-answered", others, "asks who has answered")
         slow.answers = True

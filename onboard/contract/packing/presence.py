@@ -29,6 +29,7 @@ _OPERATOR_ACTION = tuple(OperatorAction)
 _REASON = tuple(Reason)
 _FROM_0_TO_255_AT_4 = {value: value << 4 for value in range(256)}
 _PACK_BBBBBXXX = struct.Struct("<BBBBBxxx").pack
+_PACK_BBHI = struct.Struct("<BBHI").pack
 _PACK_BBHXXXX = struct.Struct("<BBHxxxx").pack
 _PACK_BBXXXXXX = struct.Struct("<BBxxxxxx").pack
 _PACK_BHHBBB = struct.Struct("<BHHBBB").pack
@@ -186,15 +187,21 @@ def unpack_operator_order(sender: int, data: bytes) -> OperatorOrder | None:
 
 
 def pack_sync_done(message: SyncDone) -> bytes:
+    askers = message.askers
     try:
-        return _PACK_BBXXXXXX(message.whom, message.boot)
+        return _PACK_BBHI(message.whom, message.boot, askers & 0xFFFF, askers >> 16)
     except struct.error as error:
-        raise refusal(message, ("SyncDone.whom", 0, 255), ("SyncDone.boot", 0, 255)) from error
+        raise refusal(
+            message, ("SyncDone.whom", 0, 255), ("SyncDone.boot", 0, 255), ("SyncDone.askers", 0, 281474976710655)
+        ) from error
 
 
 def unpack_sync_done(sender: int, data: bytes) -> SyncDone | None:
-    whom, boot = _UNPACK_BBXXXXXX(data)
-    return SyncDone(sender, whom, boot)
+    (word_0,) = _UNPACK_Q(data)
+    whom = word_0 & 0xFF
+    boot = word_0 >> 8 & 0xFF
+    askers = word_0 >> 16
+    return SyncDone(sender, whom, boot, askers)
 
 
 def pack_heartbeat(message: Heartbeat) -> bytes:

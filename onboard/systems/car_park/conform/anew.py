@@ -64,7 +64,7 @@ def memory(stage: Stage, cast: Cast) -> Play:
     cast.beat(part)
     stage.say(TokenHeld(other, *kept, versions[kept]), SyncRequest(other, 0))
     yield from stage.pause(0.6)
-    stage.say(SyncDone(other, 0, part.boot))
+    stage.say(SyncDone(other, 0, part.boot, 0))
     done = yield from stage.hears(SyncDone, within_s=3.0, since_us=begin_us)
     yield from stage.pause(2.0)
     stage.judge("answers-who-lives-anew", done, "no SyncDone within 3 s", done)
@@ -104,7 +104,7 @@ def _newcomer(stage: Stage, cast: Cast) -> Play:
         if answers:
             yield from stage.pause(0.1)
             asked_us = stage.now_us
-            stage.say(SyncDone(part.node, 0, part.boot))
+            stage.say(SyncDone(part.node, 0, part.boot, 0))
             yield from stage.pause(3.0)
             asks = [one for one in stage.since(SyncRequest, asked_us + 200_000) if one.message.whom == part.node]
             stage.none_of(name, asks, "asks who has told all")
@@ -308,7 +308,7 @@ def short(stage: Stage, cast: Cast) -> Play:
         stage.switch(on=True)
         asked = yield from stage.hears(SyncRequest, lambda one: one.whom == 0, 5.0, begin_us)
         if asked is not None and number == 0:
-            stage.say(TokenHeld(stage.other, *here, version + 7), SyncDone(stage.other, stage.node, part.boot))
+            stage.say(TokenHeld(stage.other, *here, version + 7), SyncDone(stage.other, stage.node, part.boot, 0))
             part.answers = True
         word = yield from stage.hears(Halted, lambda one: one.machine == stage.node, 12.0, begin_us)
         is_short = word is not None and word.message.reason is Reason.JOURNAL_SHORT
