@@ -141,9 +141,10 @@ class Witness:
 
     def on_heartbeat(self, beat: Heartbeat, now_us: int, *, is_fresh: bool) -> list[Effect]:
         """Ask who is new or was started again, and whose mirror has differed from mine for a while."""
-        if is_fresh and self._answered_as.get(beat.sender) != beat.boot:
+        before = self.mirror.boots_before[beat.sender] if is_fresh else 0
+        if before or (is_fresh and self._answered_as.get(beat.sender) != beat.boot):
             self._was_started(beat.sender)
-            return self._ask_newcomer(beat.sender, self.mirror.boots_before[beat.sender], now_us)
+            return self._ask_newcomer(beat.sender, before, now_us)
         self._compare(beat, now_us)
         return []
 

@@ -101,7 +101,18 @@ def test_who_has_answered_before_its_first_heartbeat_was_not_started_since() -> 
     alice.hear(done(STEWARD, ALICE))
     hears_first(alice, beat(STEWARD))
     assert KEY not in alice.witness.doubted[STEWARD]
-    hears_first(alice, beat(STEWARD, boot=3), START_US + 1)
+
+
+@pytest.mark.parametrize("boot", [2, 3])
+def test_who_has_answered_and_starts_again_has_to_say_what_it_holds(boot: int) -> None:
+    """Under the boot that it had where its journal was lost meanwhile, and with it how often it was started."""
+    alice = Machine(ALICE)
+    alice.start()
+    alice.tokens.on_held(TokenHeld(STEWARD, KEY.kind, KEY.number, 3), START_US)
+    alice.hear(done(STEWARD, ALICE))
+    hears_first(alice, beat(STEWARD))
+    alice.mirror.on_heartbeat(beat(STEWARD, MachineState.STARTING, boot), START_US + 5 * BEAT_US)
+    alice.witness.on_heartbeat(beat(STEWARD, MachineState.STARTING, boot), START_US + 5 * BEAT_US, is_fresh=True)
     assert KEY in alice.witness.doubted[STEWARD]
 
 
