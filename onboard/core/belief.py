@@ -47,11 +47,11 @@ class Beliefs:
         return self.hints.get(key) or self.of(key)
 
     def take_up(self, key: Key, version: int, holder: int, *, confirmed: bool = False, giver: int = NOBODY) -> None:
-        """What counts from now on; hints that are no newer end."""
+        """What counts from now on, last of all; hints that are no newer end."""
         self.changes += 1
+        self.verified.pop(key, None)
         self.verified[key] = tuple.__new__(Belief, (version, holder, confirmed, giver))
-        hint = self.hints.get(key)
-        if hint is not None and hint.version <= version:
+        if (hint := self.hints.get(key)) is not None and hint.version <= version:
             del self.hints[key]
 
     def hint(self, key: Key, version: int, holder: int) -> None:

@@ -54,7 +54,7 @@ FLOOD = 100
 MOST_FLOOD_US = 5_000_000
 #: Bits of ``SyncDone.askers``.
 ASKER_BITS = 48
-#: So many things at most of those that it held before is a machine told: each shows that its journal is old.
+#: So many things at most of those that it held before is a machine told, the last ones: an old journal lacks these.
 MOST_DOUBTS = 4
 #: From one question to who has not answered to the next, us: two shared answers.
 AGAIN_US = 500_000

@@ -116,14 +116,21 @@ def test_who_has_answered_and_starts_again_has_to_say_what_it_holds(boot: int) -
     assert KEY in alice.witness.doubted[STEWARD]
 
 
-def _robs(others: int) -> tuple[Machine, list[TokenSeen]]:
-    """Alice heard Bob say that he holds some; he is started again, asks, and says nothing of them."""
+def _robs(others: int, *, comes_back: bool = False) -> tuple[Machine, list[TokenSeen]]:
+    """Alice heard Bob say that he holds some; he is started again, asks, and says nothing of them.
+
+    The first of them went back to the steward and came again.
+    """
     alice = Machine(ALICE)
     alice.knows(BOB, STEWARD)
-    for index in range(others):
-        key = segment_token(Segment(1, index + 1))
-        alice.tokens.on_grant(TokenGrant(STEWARD, key.kind, key.number, 1, BOB), START_US)
-        alice.tokens.on_held(TokenHeld(BOB, key.kind, key.number, 1), START_US)
+    given = [(index + 1, 1, STEWARD, BOB) for index in range(others)]
+    for index, version, giver, holder in [
+        *given,
+        *([(1, 2, BOB, STEWARD), (1, 3, STEWARD, BOB)] if comes_back else []),
+    ]:
+        key = segment_token(Segment(1, index))
+        alice.tokens.on_grant(TokenGrant(giver, key.kind, key.number, version, holder), START_US)
+        alice.tokens.on_held(TokenHeld(holder, key.kind, key.number, version), START_US)
     hears_first(alice, beat(BOB, MachineState.STARTING, 3))
     told = said(alice.hear(SyncRequest(BOB, 0), START_US + 1))
     return alice, [word for word in told if isinstance(word, TokenSeen)]
@@ -133,6 +140,12 @@ def test_of_many_things_that_it_held_before_a_machine_is_told_the_last_few() -> 
     _, told = _robs(MOST_DOUBTS + 3)
     assert [word.token & 0xFF for word in told] == list(range(4, MOST_DOUBTS + 4))
     assert {(word.version, word.holder) for word in told} == {(1, BOB)}
+
+
+def test_the_last_are_those_that_came_last() -> None:
+    """What an old copy of a journal lacks is what was written last."""
+    _, told = _robs(MOST_DOUBTS + 3, comes_back=True)
+    assert [word.token & 0xFF for word in told] == [*range(5, MOST_DOUBTS + 4), 1]
 
 
 def test_nobody_is_told_of_what_another_has_since() -> None:
