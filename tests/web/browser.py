@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from playwright.sync_api import Page
+from playwright.sync_api import Locator, Page
 
 from tests.tools import DEADLINE_S
 from tests.web.logs import environment
@@ -65,6 +65,11 @@ def drawn(page: Page, what: str) -> dict[str, dict[str, Any]]:
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(0))))")
     boxes: list[dict[str, Any]] = page.evaluate("document.querySelector('#picture').drawn")
     return {str(box["id"]): box for box in boxes if box["what"] == what}
+
+
+def row_of(page: Page, machine: str) -> Locator:
+    """A machine's row of its table: who carries it, or is where it is, names it in another cell."""
+    return page.locator("#machines tbody tr").filter(has=page.locator(f'td:first-child:text-is("{machine}")'))
 
 
 def rows(page: Page, table: str) -> list[list[str]]:

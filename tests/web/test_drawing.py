@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.thinned import some
-from tests.web.browser import drawn, rows, served
+from tests.web.browser import drawn, row_of, rows, served
 from tests.web.logs import log_of
 
 #: Moments of a log, in the slider's thousandths.
@@ -120,12 +120,12 @@ def test_who_has_failed_is_crossed_out(
         browser.goto(address)
         expect(browser.locator("#machines tbody tr")).not_to_have_count(0)
         for machine in machines:
-            expect(browser.locator("#machines tbody tr", has_text=machine)).not_to_contain_text("silent")
+            expect(row_of(browser, machine)).not_to_contain_text("silent")
         assert not any(box.get("isCrossed") for box in drawn(browser, "machine").values())
         for machine in machines:
             browser.select_option("#trouble select", machine)
             browser.get_by_role("button", name="break").click()
-            expect(browser.locator("#machines tbody tr", has_text=machine)).to_contain_text("silent")
+            expect(row_of(browser, machine)).to_contain_text("silent")
         crossed = {name for name, box in drawn(browser, "machine").items() if box.get("isCrossed")}
         silent = {row[0] for row in rows(browser, "machines") if row[1] in ("silent", "stopped")}
         assert len(crossed) == len(silent) >= len(machines)

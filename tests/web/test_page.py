@@ -10,7 +10,7 @@ from onboard.contract.messages import Blocked, CallForProposals, Clear, Message,
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
-from tests.web.browser import drawn, end, rows, served, start
+from tests.web.browser import drawn, end, row_of, rows, served, start
 from tests.web.logs import SITE_FILES, log_of
 
 
@@ -27,7 +27,7 @@ def test_a_simulated_site_is_shown_and_obeys(browser: Page, errors: list[str], t
         browser.get_by_role("button", name="pause").click()
         expect(browser.locator("#pace")).to_have_text("paused")
         before = browser.locator("#clock").inner_text()
-        browser.locator("#machines tbody tr", has_text="MR1").first.click()
+        row_of(browser, "MR1").click()
         expect(browser.locator("#details")).to_contain_text("MR1: robot, node 11")
         browser.set_viewport_size({"width": 360, "height": 740})
         assert browser.evaluate("document.documentElement.scrollWidth") <= 360
@@ -55,7 +55,7 @@ def _break_and_block(page: Page) -> None:
     page.select_option("#trouble select", "MR2")
     page.get_by_role("button", name="break").click()
     expect(answer).to_have_text("MR2's controller has lost its power")
-    expect(page.locator("#machines tbody tr", has_text="MR2")).to_contain_text("silent")
+    expect(row_of(page, "MR2")).to_contain_text("silent")
     page.get_by_role("button", name="repair").click()
     expect(answer).to_have_text("MR2 starts again with its journal")
     spot = drawn(page, "segment")["p(3,4)"]
