@@ -33,9 +33,10 @@ from onboard.core.site import Segment
 
 #: A freeze that its operator does not say again for so long is over, us: it says it each second.
 FORGOTTEN_US = 10_000_000
-#: Statements said in one go, and the pause behind them, us: a controller's queue has room for 1,000 frames.
-BURST, PAUSE_US = 100, 50_000
-#: Who repeats FREEZE for so long has missed something: all is said again, us.
+#: Statements said in one go, and the least pause behind them, us: a controller's queue has room for 1,000 frames. All
+#: machines say theirs at once, so the pause is as long as a burst of each takes, in frames of 160 bits with stuff bits.
+BURST, PAUSE_US, FRAME_BITS = 100, 50_000, 160
+#: Who repeats FREEZE for so long behind the last statement has missed something: all is said again, us.
 SAY_AGAIN_US = 4_000_000
 
 
@@ -66,6 +67,8 @@ class Regenerating:
 
     def __post_init__(self) -> None:
         self.site, self.node_id = self.tokens.site, self.tokens.node_id
+        bits = BURST * FRAME_BITS * len(self.site.machines)
+        self._pause_us = max(PAUSE_US, bits * 1_000_000 // self.site.bitrate)
 
     @property
     def is_frozen(self) -> bool:
@@ -142,7 +145,7 @@ class Regenerating:
         if self._say_us is None or now_us < self._say_us:
             return []
         burst = [self._to_say.popleft() for _ in range(min(BURST, len(self._to_say)))]
-        self._say_us = now_us + PAUSE_US if self._to_say else None
+        self._said_us, self._say_us = now_us, now_us + self._pause_us if self._to_say else None
         return [Send(message) for message in burst]
 
     def next_wake(self) -> int | None:
@@ -167,7 +170,7 @@ class Regenerating:
             self.phase, self._next, self._lost, self._list = RegenerationPhase.FREEZE, word.epoch, word.lost, {}
             self.mirror.recalls()
             self._begin_to_say(now_us)
-        elif now_us >= self._said_us + SAY_AGAIN_US:
+        elif not self._to_say and now_us >= self._said_us + SAY_AGAIN_US:
             self._begin_to_say(now_us)
         self._heard_us = now_us
         return [*effects, self._state(RegenerationPhase.FREEZE, self._count, 0), *self.wake(now_us)]

@@ -95,6 +95,8 @@ class Regenerate(OperatorCommand):
         self._assignment = RightsAssignment((), ())
         self._bursts: Iterator[list[Message]] = iter(())
         self._again_us = 0
+        #: How much has been said of rights, and when that was more last.
+        self._stated, self._stated_us = 0, 0
         self._aborts = 0
         #: The exit status where it is broken off.
         self._ending = NOT_CONFIRMED
@@ -217,7 +219,10 @@ class Regenerate(OperatorCommand):
 
     def _freeze(self, now_us: int) -> None:
         late = [node for node in self._participants() if not self._has_stated(node)]
-        if late and now_us >= self._since_us + self.confirm_us():
+        stated = sum(map(len, self._said.said_by.values()))
+        if stated > self._stated:
+            self._stated, self._stated_us = stated, now_us
+        if late and now_us >= max(self._since_us, self._stated_us) + self.confirm_us():
             self._abort(f"not all have said what they hold: {self._names(late)}", now_us)
             return
         if late:

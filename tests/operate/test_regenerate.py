@@ -342,6 +342,17 @@ def test_whatever_speaks_against_it_breaks_it_off_before_it_counts(
     assert COMMIT not in phases(hand) and phases(hand)[-1] is ABORT
 
 
+def test_all_are_waited_for_while_more_is_said() -> None:
+    """A full park on a slow bus needs longer for what all hold than anybody is waited for who says nothing."""
+    hand, machines = started(*WORDS, *(held(MR2, Segment(2, index), 1) for index in range(1, 9)))
+    track = Segment(2, 0).number
+    machines.bend = lambda one: None if isinstance(one, TokenHeld) and one.token > track + said else one
+    for said in range(1, 9):
+        machines.turn(2)
+        assert (hand.order.status, phases(hand)) == (None, [FREEZE]), hand.lines
+        assert hand.order.has_question is (said == 8)
+
+
 def test_who_missed_a_frame_is_told_the_list_again() -> None:
     hand, machines = started()
     machines.turn(2)

@@ -153,7 +153,12 @@ TIMES: dict[str, tuple[Time, ...]] = {
     ),
     "regeneration": (
         Time("T_frozen", regeneration.FORGOTTEN_US, _FIXED, "a freeze that is not said again is over"),
-        Time("T_missed", regeneration.SAY_AGAIN_US, _FIXED, "a freeze repeated for so long: all is said again"),
+        Time(
+            "T_missed",
+            regeneration.SAY_AGAIN_US,
+            _FIXED,
+            "a freeze repeated for so long behind the last word: all is said again",
+        ),
     ),
 }
 
