@@ -46,3 +46,10 @@ def a_count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise ArgumentTypeError(f"{text}: must be a whole number, 1 or more")
     return int(text)
+
+
+def a_number(text: str) -> int:
+    """A whole number, 0 or more."""
+    if not text.isdecimal():
+        raise ArgumentTypeError(f"{text}: must be a whole number, 0 or more")
+    return int(text)

@@ -1,4 +1,4 @@
-"""What all machines say that start together: ``python -m bench.power_up``.
+"""What all machines say that start together.
 
     python -m bench.power_up [MACHINES] [SEEDS] [BIT/S] [SEALS] [CARS] [WITHIN_S]
 
@@ -12,21 +12,13 @@ import statistics
 import sys
 from functools import partial
 
-from bench._arguments import a_count, given
+from bench._arguments import a_count, a_number, given
 from bus_sim.campaign.power_up import PowerUp, large_with, power_up
-from bus_sim.systems.car_park.demand import Stay
-from bus_sim.systems.car_park.plant.bodies import random_car
-from bus_sim.systems.car_park.simulation import Simulation
-from bus_sim.systems.car_park.standing_cars import stand
+from bus_sim.systems.car_park.standing_cars import stand_drawn
 from onboard.config.problems import ConfigError
 from onboard.core.site import Site
 
 LOSS = 0.1
-
-
-def _stand(cars: int, run: Simulation) -> None:
-    """So many cars stand inside; which, is the same each time."""
-    stand(run, [Stay(0, None, random_car(f"car {number}", 1)) for number in range(cars)])
 
 
 def _line(title: str, found: PowerUp) -> str:
@@ -37,7 +29,7 @@ def _line(title: str, found: PowerUp) -> str:
 def _one_by_one(site: Site, seeds: int, cars: int, within_us: int) -> int:
     found = []
     for seed in range(1, seeds + 1):
-        found.append(power_up(site, seed=seed, within_us=within_us, before=partial(_stand, cars)))
+        found.append(power_up(site, seed=seed, within_us=within_us, before=partial(stand_drawn, cars)))
         mirrors = "mirrors equal" if found[-1].mirrors == 1 else f"{found[-1].mirrors} mirrors that differ"
         print(
             _line(f"{len(site.machines)} machines, {cars} cars, seed {seed}", found[-1]), mirrors, sep="; ", flush=True
@@ -52,8 +44,8 @@ def main() -> int:
         seeds=(int, 20),
         bitrate=(a_count, 500_000),
         seals=(str, "off"),
-        cars=(int, 0),
-        within_s=(int, 0),
+        cars=(a_number, 0),
+        within_s=(a_number, 0),
     )
     machines, seeds, bitrate, seals = words.machines, words.seeds, words.bitrate, words.seals
     try:

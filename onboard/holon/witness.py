@@ -93,8 +93,8 @@ class Witness:
     doubt: Doubt | None = None
     #: Whether a plan of mine is on its way still: nobody else has it in his digest.
     is_telling: Callable[[], bool] = lambda: False
-    #: Machines that have answered since this one started: what they say later is no proof against its journal.
-    answered: set[int] = field(default_factory=set)
+    #: Who has answered since this one started, under which boot: what it says later is no proof against its journal.
+    answered: dict[int, int] = field(default_factory=dict)
     #: My mirror's digest, and until when it was another.
     digest: int | None = None
     digests_before: dict[int, int] = field(default_factory=dict)
@@ -116,8 +116,6 @@ class Witness:
     #: When the last words about rights were heard, and since when there were so many of them.
     _words_us: deque[int] = field(default_factory=lambda: deque(maxlen=FLOOD))
     _flood_us: int = 0
-    #: Under which boot each machine has answered since this one started.
-    _answered_as: dict[int, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.site, self.node_id = self.tokens.site, self.tokens.node_id
@@ -142,7 +140,7 @@ class Witness:
     def on_heartbeat(self, beat: Heartbeat, now_us: int, *, is_fresh: bool) -> list[Effect]:
         """Ask who is new or was started again, and whose mirror has differed from mine for a while."""
         before = self.mirror.boots_before[beat.sender] if is_fresh else 0
-        if before or (is_fresh and self._answered_as.get(beat.sender) != beat.boot):
+        if before or (is_fresh and self.answered.get(beat.sender) != beat.boot):
             self._was_started(beat.sender)
             return self._ask_newcomer(beat.sender, before, now_us)
         self._compare(beat, now_us)
@@ -210,7 +208,6 @@ class Witness:
         self.tokens.asked = set(self._others)
         # Who comes back after a hold asks anew: what was answered before that is old.
         self.answered.clear()
-        self._answered_as.clear()
         for node in self._others:
             self._was_started(node)
         # All answer me now and ask me: what they say in it need not be told to them.
@@ -262,8 +259,7 @@ class Witness:
         if not self._is_answer(word) or word.sender not in self._others:
             return []
         self.tokens.asked.discard(word.sender)
-        self.answered.add(word.sender)
-        self._answered_as[word.sender] = word.boot
+        self.answered[word.sender] = word.boot
         effects = self._tell_doubted(word.sender)
         self._review(now_us)
         return effects
@@ -287,14 +283,14 @@ class Witness:
     @property
     def _has_all_answered(self) -> bool:
         """Whether a machine with a past was answered by each other one: nobody is left who might still be heard."""
-        return self.has_past and self._others <= self.answered
+        return self.has_past and self._others <= self.answered.keys()
 
     def _missing(self, now_us: int) -> set[int]:
         live = self._live(now_us)
         if not self.has_past and any(self.mirror.peers[node].boot > 1 for node in live):
             # A first life in a fleet that has a past: whoever is away may know of an earlier one.
-            return self._others - self.answered
-        return live - self.answered
+            return self._others - self.answered.keys()
+        return live - self.answered.keys()
 
     def _live(self, now_us: int) -> set[int]:
         """Who can answer: not who has said that it is halted or held apart; who has stopped itself answers."""
@@ -411,19 +407,25 @@ class Witness:
         return not self.has_past or is_newer(before, self.boot, 8)
 
     def _answer(self, now_us: int) -> list[Effect]:
-        # Who starts asks me as well, or has asked before I was there.
-        peers = self.mirror.peers
-        begin = {node for node in self.starting & peers.keys() if peers[node].state is MachineState.STARTING}
-        askers, self._askers = sorted(self._askers | begin), set()
+        askers, self._askers = sorted(self._askers | self._starters()), set()
         self._answer_at_us, effects = None, self.statements(now_us)
         for node in askers:
             effects += self._tell_doubted(node) + self._tell_gifts(node)
         effects += self._tell_own_gifts(set(askers)) + self._for_the_silent(now_us)
-        whom = askers[0] if len(askers) == 1 else NOBODY
-        # A tool is no machine of the site: whom it is told with is not told.
-        is_told = whom == NOBODY and self._bits.keys() >= set(askers)
+        return self._be_quiet([*effects, Send(self._done(askers))], now_us)
+
+    def _starters(self) -> set[int]:
+        """Who starts, and so asks this machine as well, or has asked before it was there."""
+        peers = self.mirror.peers
+        return {node for node in self.starting & peers.keys() if peers[node].state is MachineState.STARTING}
+
+    def _done(self, askers: list[int]) -> SyncDone:
+        if len(askers) == 1:
+            return SyncDone(self.node_id, askers[0], self.boot, 0)
+        # A tool is no machine of the site: with whom it is answered is not told.
+        is_told = self._bits.keys() >= set(askers)
         bits = reduce(or_, (self._bits[node] for node in askers), 0) if is_told else 0
-        return self._be_quiet([*effects, Send(SyncDone(self.node_id, whom, self.boot, bits))], now_us)
+        return SyncDone(self.node_id, NOBODY, self.boot, bits)
 
     def _tell_doubted(self, node: int) -> list[Effect]:
         lost, beliefs = self.doubted.get(node, {}).items(), self.tokens.beliefs

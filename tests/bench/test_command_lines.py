@@ -45,6 +45,7 @@ def test_a_word_that_no_bench_knows_is_one_line(
         ("fuzz.py", ["0"], "frames: 0: must be a whole number, 1 or more"),
         ("power_up.py", ["many"], "machines: many: must be a whole number, 1 or more"),
         ("power_up.py", ["9"], "error: 9 machines: 18 to 108 can start together here"),
+        ("power_up.py", ["26", "2", "500000", "off", "-1"], "cars: -1: must be a whole number, 0 or more"),
         ("drawn.py", ["3-1"], "error: 3-1: must be a seed"),
     ],
 )

@@ -1,13 +1,11 @@
 """All machines of a site start together: nobody says again what all have heard (issue 16, item 2)."""
 
-from typing import Any
+from functools import partial
 
 import pytest
 
 from bus_sim.campaign.power_up import large_with, power_up
-from bus_sim.systems.car_park.demand import Stay
-from bus_sim.systems.car_park.plant.bodies import random_car
-from bus_sim.systems.car_park.standing_cars import stand
+from bus_sim.systems.car_park.standing_cars import stand_drawn
 
 
 def test_twenty_six_machines_start_on_a_bus_that_is_hardly_used() -> None:
@@ -29,13 +27,9 @@ def test_the_same_where_each_misses_every_tenth_frame(seed: int) -> None:
 CARS = 300
 
 
-def _cars(run: Any) -> None:
-    stand(run, [Stay(0, None, random_car(f"car {number}", 1)) for number in range(CARS)])
-
-
 def test_computers_that_boot_one_by_one_wake_a_full_park_on_a_slow_bus() -> None:
     """Each asks all, and is asked by all who came before it; what all vouch for is told to all who wait for it."""
-    found = power_up(large_with(18, 125_000), within_us=5_000_000, before=_cars)
+    found = power_up(large_with(18, 125_000), within_us=5_000_000, before=partial(stand_drawn, CARS))
     print(found)
     assert len(found.parts_s) == 18 and found.longest_s <= 10.0
     assert found.mirrors == 1

@@ -63,7 +63,7 @@ def witness_of(book: TokenBook, nodes: Iterable[int], memory: Memory) -> Witness
         if node != book.node_id:
             mirror.peers[node] = Peer(KindCode.ROBOT, MachineState.IDLE, 2, 0, NOW_US, 0, 0)
     witness = Witness(book, mirror, 2, True, lambda _: book.statements())
-    witness.answered = set(memory.answered)
+    witness.answered = dict.fromkeys(memory.answered, 2)
     witness.doubt = Doubt(Reason.JOURNAL_SHORT, NOBODY, "") if memory.doubt else None
     witness.doubted = {node: {KEY: version} for node, version in memory.doubted}
     witness.starting = set(memory.starting)

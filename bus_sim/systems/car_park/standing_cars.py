@@ -12,6 +12,7 @@ from itertools import cycle
 
 from bus_sim.journal import SimulatedJournal
 from bus_sim.systems.car_park.demand import Stay
+from bus_sim.systems.car_park.plant.bodies import random_car
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import KindCode, TokenKind
 from onboard.contract.messages import Reference
@@ -55,6 +56,11 @@ def stand(simulation: Simulation, stays: Sequence[Stay], origin_us: int = 0) -> 
     for node, machine in site.machines.items():
         owner = journal_owner(site, machine)
         simulation.journals[node] = SimulatedJournal(owner, entries=entries[node])
+
+
+def stand_drawn(count: int, simulation: Simulation) -> None:
+    """So many cars, the same ones each time, which nobody fetches; as ``stand`` does."""
+    stand(simulation, [Stay(0, None, random_car(f"car {number}", 1)) for number in range(count)])
 
 
 def _right(number: int, record: type[TokenRecord], version: int, holder: int) -> Entry:
