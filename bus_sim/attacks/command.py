@@ -51,14 +51,10 @@ attacks:
 """
 
 
-def add_attack(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add ``attack`` to the commands of ``bus-sim``, with its options."""
-    parser = commands.add_parser(
-        "attack",
-        help="attack a site by a node that sees only the bus",
-        description=HELP + "\n".join(f"  {name:<17} {entry.summary}" for name, entry in ATTACKS.items()),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``attack``, and its description, which lists them all."""
+    parser.description = HELP + "\n".join(f"  {name:<17} {entry.summary}" for name, entry in ATTACKS.items())
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("site", help="name of a shipped site, or a site file")
     parser.add_argument("--attacks", metavar="A,B", help="only these (default: all)")
     parser.add_argument("--seeds", default="1-3", metavar="A-B", help="from the first to the last (default: 1-3)")
@@ -89,7 +85,7 @@ def add_attack(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     )
 
 
-def run_attack_command(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
     """Play them. Raises ``DemandError`` for a mistake in the command line, ``SiteNotFoundError`` for no such site."""
     site = find_site(args.site)
     plan, attacks, seeds = _plan(args, site), _attacks(args, site), read_seeds(args.seeds)

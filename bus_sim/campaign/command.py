@@ -68,14 +68,9 @@ examples:
 """
 
 
-def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add ``campaign`` to the commands of ``bus-sim``, with its options."""
-    parser = commands.add_parser(
-        "campaign",
-        help="run a site under many seeds of faults",
-        description=HELP,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``campaign``, and its description."""
+    parser.description, parser.formatter_class = HELP, argparse.RawDescriptionHelpFormatter
     parser.add_argument("site", help="name of a shipped site, or a site file")
     parser.add_argument("--seeds", default="1-16", metavar="A-B", help="from the first to the last (default: 1-16)")
     parser.add_argument("--faults", default="all", metavar="PROFILE", help=f"{', '.join(PROFILES)} (default: all)")
@@ -153,7 +148,7 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
 
 
-def run_campaign_command(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
     """Play it. Raises ``DemandError`` for a mistake in the command line, ``SiteNotFoundError`` for an unknown site."""
     site = find_site(args.site)
     plan = _plan(args, site)

@@ -1,17 +1,18 @@
 """The simulator's half of each system: a folder beside this file, or a package that says so by an entry point.
 
-Its parts are modules of that folder, loaded when they are asked for: ``simulated`` describes it, ``commands`` are
-commands of ``bus-sim`` for its sites alone. docs/new-system.md lists what is asked of each.
+Its parts are modules of that folder, loaded when they are asked for: ``simulated`` describes it, ``commands`` has
+``COMMANDS`` of ``bus-sim`` for its sites alone. docs/new-system.md lists what is asked of each.
 """
 
-from collections.abc import Iterator
-from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bus_sim import systems
-from bus_sim.systems.system import SimulatedSystem
-from onboard.core.site import Site
+from bus_sim.commands import Command
 from onboard.systems.folders import Folders
+
+if TYPE_CHECKING:
+    from bus_sim.systems.system import SimulatedSystem
+    from onboard.core.site import Site
 
 #: Packages of other people have an entry point ``bus_sim.systems``: the system's name, then its package.
 _FOLDERS = Folders(systems)
@@ -26,7 +27,7 @@ def simulated_names() -> tuple[str, ...]:
     return _FOLDERS.names()
 
 
-def simulated(name: str) -> SimulatedSystem[Any, Any]:
+def simulated(name: str) -> "SimulatedSystem[Any, Any]":
     """The system of this name. Raises ``UnknownSystemError`` for one that cannot be simulated."""
     module = _FOLDERS.part(name, "simulated")
     if module is None:
@@ -38,14 +39,12 @@ def simulated(name: str) -> SimulatedSystem[Any, Any]:
     return found
 
 
-def simulated_of(site: Site) -> SimulatedSystem[Any, Any]:
+def simulated_of(site: "Site") -> "SimulatedSystem[Any, Any]":
     """The system of a site. Raises ``UnknownSystemError``, as ``simulated``."""
     return simulated(site.system)
 
 
-def own_commands() -> Iterator[ModuleType]:
-    """The modules that bring commands of ``bus-sim`` for the sites of one system; each has ``add`` and ``RUN``."""
-    for name in simulated_names():
-        module = _FOLDERS.part(name, "commands")
-        if module is not None:
-            yield module
+def own_commands() -> dict[str, Command]:
+    """The commands of ``bus-sim`` for the sites of one system, by name."""
+    modules = (_FOLDERS.part(name, "commands") for name in simulated_names())
+    return {name: command for module in modules if module is not None for name, command in module.COMMANDS.items()}

@@ -168,7 +168,7 @@ def options_of(*words: str, monkeypatch: pytest.MonkeyPatch) -> tuple[str, RunOp
         taken.append((getattr(site, "name", ""), options))
         raise Enough
 
-    monkeypatch.setattr("bus_sim.cli.run_site", take)
+    monkeypatch.setattr("bus_sim.run_command.run_site", take)
     with pytest.raises(Enough):
         bus_sim(["run", *words])
     return taken[0]

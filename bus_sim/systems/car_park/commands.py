@@ -1,14 +1,23 @@
 """What ``bus-sim`` can do with sites of this system alone."""
 
-import argparse
+from types import ModuleType
 
-from bus_sim.systems.car_park.compare.command import add_compare, run_compare
-from bus_sim.systems.car_park.design.command import add_design, run_design
-
-RUN = {"compare": run_compare, "design": run_design}
+from bus_sim.commands import Command
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the commands of this system to those of ``bus-sim``."""
-    add_compare(commands)
-    add_design(commands)
+def _compare() -> ModuleType:
+    from bus_sim.systems.car_park.compare import command
+
+    return command
+
+
+def _design() -> ModuleType:
+    from bus_sim.systems.car_park.design import command
+
+    return command
+
+
+COMMANDS = {
+    "compare": Command("our protocol beside central dispatchers, a bound and an optimum", _compare),
+    "design": Command("how many robots, lifts and compartments a demand needs", _design),
+}

@@ -1,8 +1,16 @@
 """What ``bus-sim`` can do with sites of this system alone."""
 
-from bus_sim.systems.graph.certify.command import add_certify as add
-from bus_sim.systems.graph.certify.command import run_certify
+from types import ModuleType
 
-RUN = {"certify": run_certify}
+from bus_sim.commands import Command
 
-__all__ = ["RUN", "add"]
+
+def _certify() -> ModuleType:
+    from bus_sim.systems.graph.certify import command
+
+    return command
+
+
+COMMANDS = {
+    "certify": Command("can robots ever stick on a graph? and how many robots are best?", _certify),
+}

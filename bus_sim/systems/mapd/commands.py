@@ -1,8 +1,16 @@
 """What ``bus-sim`` can do with sites of this system alone."""
 
-from bus_sim.systems.mapd.importers.command import add_import as add
-from bus_sim.systems.mapd.importers.command import run_import
+from types import ModuleType
 
-RUN = {"import": run_import}
+from bus_sim.commands import Command
 
-__all__ = ["RUN", "add"]
+
+def _import() -> ModuleType:
+    from bus_sim.systems.mapd.importers import command
+
+    return command
+
+
+COMMANDS = {
+    "import": Command("make a site file of a MAPF map, an openTCS model or an Open-RMF building", _import),
+}

@@ -49,18 +49,13 @@ exit status: 0 all went well; 1 a run broke an invariant or left somebody waitin
 """
 
 
-def add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add ``compare`` to the commands of ``bus-sim``, with its options."""
-    compare = commands.add_parser(
-        "compare",
-        help="our protocol beside central dispatchers, a bound and an optimum",
-        description=HELP,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    compare.add_argument("site", nargs="?", default="standard", help="name of a shipped site, or a site file")
-    compare.add_argument("--seeds", default="1-10", metavar="A-B", help="seeds of the random parts (default: 1-10)")
-    compare.add_argument("--cars", type=int, default=12, metavar="N", help="cars of each random run (default: 12)")
-    compare.add_argument(
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``compare``, and its description."""
+    parser.description, parser.formatter_class = HELP, argparse.RawDescriptionHelpFormatter
+    parser.add_argument("site", nargs="?", default="standard", help="name of a shipped site, or a site file")
+    parser.add_argument("--seeds", default="1-10", metavar="A-B", help="seeds of the random parts (default: 1-10)")
+    parser.add_argument("--cars", type=int, default=12, metavar="N", help="cars of each random run (default: 12)")
+    parser.add_argument(
         "--random",
         nargs=2,
         type=float,
@@ -68,30 +63,30 @@ def add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         metavar=("MEAN", "SIGMA"),
         help="intervals of arrivals, and of departures, in s (default: 30 15)",
     )
-    compare.add_argument("--day", metavar="D", help="the day whose busiest hour is played (default: the shipped one)")
-    compare.add_argument("--sessions", type=Path, metavar="FILE", help="sessions file of that day")
-    add_table_options(compare)
-    compare.add_argument(
+    parser.add_argument("--day", metavar="D", help="the day whose busiest hour is played (default: the shipped one)")
+    parser.add_argument("--sessions", type=Path, metavar="FILE", help="sessions file of that day")
+    add_table_options(parser)
+    parser.add_argument(
         "--window", default="busiest", metavar="FROM-TO", help="another part of it, such as 06:30-09:00"
     )
-    compare.add_argument(
+    parser.add_argument(
         "--parts",
         default=",".join(PARTS),
         metavar="PART,...",
         help=f"which of {', '.join(PARTS)} (default: all)",
     )
-    compare.add_argument(
+    parser.add_argument(
         "--place",
         default="",
         metavar="POLICY,...",
         help=f"by which places are chosen, each of these with each who decides: {', '.join(PLACES)} "
         "(default: as the site file says)",
     )
-    add_where_options(compare)
-    compare.add_argument("--json", type=Path, metavar="FILE", help="write all tables as JSON too")
+    add_where_options(parser)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all tables as JSON too")
 
 
-def run_compare(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
     """Make the tables; the exit status. Raises ``DemandError`` for a person's mistake."""
     seeds, parts, engine = _seeds(args.seeds), _parts(args.parts), engine_of(args, chunk=1)
     places = _places(args.place)

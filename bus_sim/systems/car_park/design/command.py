@@ -44,14 +44,9 @@ example:
 """
 
 
-def add_design(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add ``design`` to the commands of ``bus-sim``, with its options."""
-    parser = commands.add_parser(
-        "design",
-        help="how many robots, lifts and compartments a demand needs",
-        description=HELP,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``design``, and its description."""
+    parser.description, parser.formatter_class = HELP, argparse.RawDescriptionHelpFormatter
     parser.add_argument("site", help="name of a shipped car park, or a site file: the building that is equipped")
     sizes = parser.add_argument_group("sizes to choose from (default: as in the site file)")
     for kind in ("robots", "lifts", "compartments"):
@@ -91,7 +86,7 @@ def add_design(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures as JSON too")
 
 
-def run_design(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
     """The command. Raises ``DemandError`` for a mistake in the command line or a table."""
     search = _search(args)
     design = search.run(has_plant=not args.no_plant)

@@ -51,14 +51,9 @@ exit status: 0 certified; 1 not certified, or undecided; 2 a mistake in the comm
 """
 
 
-def add_certify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Adds ``bus-sim certify``: whether robots can stick on a graph, and how many are best."""
-    parser = commands.add_parser(
-        "certify",
-        help="can robots ever stick on a graph? and how many robots are best?",
-        description=HELP,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``certify``, and its description."""
+    parser.description, parser.formatter_class = HELP, argparse.RawDescriptionHelpFormatter
     parser.add_argument(
         "site",
         nargs="?",
@@ -87,7 +82,7 @@ def add_certify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     parser.add_argument("--table", action="store_true", help="count the task sets that can stick on known graphs")
 
 
-def run_certify(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
     """The command. Raises ``SiteNotFoundError`` or ``ConfigError`` for a mistake in the command line or a file."""
     engine = engine_of(args, chunk=1)
     if args.table:

@@ -22,15 +22,16 @@ START_FRAMES = 9
 _KINDS = "a map (.map, with a .task file or without), an openTCS model (.xml) or an Open-RMF building (.yaml)"
 
 
-def add_import(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add ``import`` to the commands of ``bus-sim``, with its options."""
-    one = commands.add_parser("import", help="make a site file of a MAPF map, an openTCS model or an Open-RMF building")
-    one.add_argument("files", nargs="+", type=Path, metavar="FILE", help=_KINDS)
-    one.add_argument("-o", "--output", type=Path, required=True, metavar="SITE", help="the site file to write")
-    one.add_argument("--robots", type=_positive, metavar="N", help="so many robots (default: all that the file names)")
-    one.add_argument("--tasks", type=_positive, default=20, metavar="N", help="tasks to draw where it has none")
-    one.add_argument("--every", type=_positive, default=5, metavar="STEPS", help="steps between two tasks drawn")
-    one.add_argument("--seed", type=int, default=1, help="seed of everything that is drawn (default: 1)")
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which files, where the site goes, and what is drawn where they say nothing."""
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help=_KINDS)
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="SITE", help="the site file to write")
+    parser.add_argument(
+        "--robots", type=_positive, metavar="N", help="so many robots (default: all that the file names)"
+    )
+    parser.add_argument("--tasks", type=_positive, default=20, metavar="N", help="tasks to draw where it has none")
+    parser.add_argument("--every", type=_positive, default=5, metavar="STEPS", help="steps between two tasks drawn")
+    parser.add_argument("--seed", type=int, default=1, help="seed of everything that is drawn (default: 1)")
 
 
 def most_machines(bitrate: int) -> int:
@@ -48,7 +49,7 @@ def _positive(text: str) -> int:
     return number
 
 
-def run_import(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
     """Import, check by reading the result as any site file is read, then write. Raises ``ConfigError``."""
     draft = import_files(args.files, DrawnDemand(args.robots, args.tasks, args.every, args.seed))
     text = site_text(draft)
