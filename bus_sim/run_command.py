@@ -254,10 +254,9 @@ def _speed(text: str | None) -> float | None:
 
 def _run_scenario(args: argparse.Namespace) -> int:
     """A scenario says everything itself: what the command line says besides would be passed over in silence."""
-    usual = _usual()
     free = ("scenario", "trace", "json")
-    for name, value in vars(args).items():
-        if name not in free and value != getattr(usual, name):
+    for name, usual in vars(_usual()).items():
+        if name not in free and getattr(args, name) != usual:
             option = "SITE" if name == "site" else f"--{name.removesuffix('_s').replace('_', '-')}"
             raise OptionError(f"{option}: does not go with --scenario; write it into the file, or leave it out")
     from bus_sim.campaign.command import run_scenario  # noqa: PLC0415  # other runs are no campaign

@@ -88,6 +88,9 @@ def _run(words: list[str], said: int) -> None:
 def main() -> None:
     """Play them all."""
     assert trace is not None
+    # Each play would load its command anew.
+    bus_sim.build_parser()
+    bus_sim.mistakes()
     # A person waits longer for what comes slowly; here nothing ever comes.
     bounded_file.PATIENCE_S = 0.1
     json.dump([play(one) for one in json.load(sys.stdin)], sys.stdout)
