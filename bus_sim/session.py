@@ -27,7 +27,6 @@ from bus_sim.systems.stage import EndedRun, PersonAtKeys, RunFigures, Show, Syst
 from bus_sim.systems.system import SimulatedSystem
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.site import Site
-from onboard.io.collector import MANY, rare_looks
 from onboard.io.signals import ended_by
 
 #: A run that only a person ends, us: a century.
@@ -59,15 +58,13 @@ def play(
 def _on_loop(site: Site, options: RunOptions, system: SimulatedSystem[Any, Any]) -> tuple[SystemStage[Any], RunFigures]:
     _check(site, options)
     loop = VirtualTimeLoop(pace=options.speed)
-    # Words and beliefs make no cycles: to look for some as often as usual takes a tenth of the time.
-    with rare_looks(MANY):
-        try:
-            asyncio.set_event_loop(loop)
-            session = _Session(site, options, system, loop)
-            return session.stage, loop.run_until_complete(_to_its_end(session))
-        finally:
-            asyncio.set_event_loop(None)
-            loop.close()
+    try:
+        asyncio.set_event_loop(loop)
+        session = _Session(site, options, system, loop)
+        return session.stage, loop.run_until_complete(_to_its_end(session))
+    finally:
+        asyncio.set_event_loop(None)
+        loop.close()
 
 
 async def _to_its_end(session: "_Session") -> RunFigures:

@@ -38,3 +38,9 @@ def test_what_has_settled_is_not_looked_at_until_all_is_over() -> None:
             pass
         assert gc.get_freeze_count() == there
     assert gc.get_freeze_count() == 0
+
+
+def test_an_interpreter_without_thresholds_runs_as_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(gc, "get_threshold")
+    with rare_looks(50_000, settled=True):
+        assert not gc.get_freeze_count()
