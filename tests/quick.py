@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from bus_sim.cli import build_parser
+
 #: Of one test, s of processor time: nobody waits for a single one.
 LIMIT_S = 1.0
 #: Folders and files of tests that need no whole run of a site.
@@ -38,6 +40,7 @@ SLOW = (
     "tests/config/test_garbage.py",
     "tests/config/test_names.py::test_every_command_takes_the_name_of_a_shipped_site",
     "tests/config/test_shipped_sites.py",
+    "tests/controller/test_outgoing.py::test_a_fleet_that_may_hardly_say_anything_says_it_later_and_serves_its_cars",
     "tests/core/negotiation/test_agreement.py",
     "tests/core/negotiation/test_contract_net.py",
     "tests/core/negotiation/test_sub_calls.py::test_whatever_is_lost_nothing_is_acted_on_early_nor_held_for_ever",
@@ -60,7 +63,8 @@ def processor_s() -> float:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave the slow ones out."""
+    """Leave the slow ones out, and load what commands of ``bus-sim`` need: that is no one test's own."""
+    build_parser()
     slow = [item for item in items if item.nodeid.startswith(SLOW)]
     config.hook.pytest_deselected(items=slow)
     items[:] = [item for item in items if item not in slow]
