@@ -170,6 +170,7 @@ export class Tokens {
     one.open.set(sender, { us: robot.now, plan, predecessor });
     if (!this.holds(one.key) || !robot.mayGive()) return;
     const reason = robot.objection(one.key, sender, one.open.get(sender));
+    if (!reason && isSegment(one.key)) robot.sayPlace();
     if (!reason) this.give([one.key], sender);
     else this.#say("TokenRefusal", one, { version: one.version & LOW, requester: sender, reason });
   }

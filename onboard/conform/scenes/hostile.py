@@ -64,8 +64,11 @@ def _counted(
             stage.put(frame)
             told = yield from stage.hears(Diagnostic, _more(reason, before), 4.5)
             frames = (stage.shown(frame, begin_us), *((stage.shown(told.frame),) if told is not None else ()))
-            what = f"no Diagnostic of {reason.name} within 4.5 s"
-            stage.findings.by_name[f"{name}-is-counted"].judge(what, frames, is_kept=told is not None)
+            more = 0 if told is None else told.message.count - before
+            what = (
+                f"Diagnostic of {reason.name} says {more} more" if more else f"no Diagnostic of {reason.name} in 4.5 s"
+            )
+            stage.findings.by_name[f"{name}-is-counted"].judge(what, frames, is_kept=more == 1)
 
     return play
 
@@ -77,6 +80,8 @@ out_of_range = _counted(
 of_kind = _counted(_KIND, Reason.NOT_OF_KIND, lambda stage, one: Frame(one.identifier | stage.caller, bytes(8)))
 of_site = _counted(_SITE, Reason.NOT_OF_SITE, lambda stage, one: Frame(one.identifier | stage.stranger, bytes(8)))
 
+#: Wrong frames one behind the other, a tenth of a second apart.
+_FLOOD = 40
 UNKNOWN = (
     Check("unknown-message-is-counted", "F3", _WRONG),
     Check("standard-frame-is-counted", "F3", _WRONG),
@@ -84,6 +89,7 @@ UNKNOWN = (
     Check("node-0-is-counted", "F3", _WRONG),
     Check("empty-frame-is-counted", "F3", _WRONG),
     Check("a-flood-is-told-slowly", "F3", "at most once in `T_beat` for each reason."),
+    Check("each-frame-of-a-flood-is-counted-once", "F3", _WRONG),
     Check("a-flood-stops-nothing", "F3", "What is heard never stops me"),
 )
 
@@ -106,12 +112,17 @@ def unknown(stage: Stage, cast: Cast) -> Play:
         stage.put(frame)
         told = yield from stage.hears(Diagnostic, _more(reason, before), 4.5)
         stage.judge(name, told, "no Diagnostic of it within 4.5 s", told)
-    begin_us = stage.now_us
-    for number in range(40):
+    begin_us, before = stage.now_us, stage.count_of(Reason.SHORT_FRAME)
+    for number in range(_FLOOD):
         stage.put(Frame(beat | stage.caller, bytes(number % 8)))
         yield from stage.pause(0.1)
     told_all = [one for one in stage.since(Diagnostic, begin_us) if one.message.reason is Reason.SHORT_FRAME]
     stage.judge("a-flood-is-told-slowly", 1 <= len(told_all) <= 3, f"{len(told_all)} times in 4 s", *told_all)
+    # The last count is told a heartbeat period behind the one before.
+    yield from stage.pause(2.5)
+    told_all = [one for one in stage.since(Diagnostic, begin_us) if one.message.reason is Reason.SHORT_FRAME]
+    found = stage.count_of(Reason.SHORT_FRAME) - before
+    stage.judge("each-frame-of-a-flood-is-counted-once", found == _FLOOD, f"{found} of {_FLOOD}", *told_all[-1:])
     alive = yield from stage.hears(Heartbeat, within_s=3.0)
     stage.judge("a-flood-stops-nothing", alive, "no heartbeat within 3 s", alive)
     _ = cast

@@ -5,8 +5,8 @@ from itertools import pairwise
 from onboard.conform.cast import Cast
 from onboard.conform.checks import Check
 from onboard.conform.stage import Stage, Word, after_ms
-from onboard.contract.codes import Grade, LegAction
-from onboard.contract.messages import Itinerary, Leg, Progress, TaskReport
+from onboard.contract.codes import Grade, LegAction, TokenKind
+from onboard.contract.messages import Itinerary, Leg, Progress, TaskReport, TokenGrant
 from onboard.core.site import Segment
 from onboard.systems.car_park.conform.desk import Desk
 from onboard.systems.car_park.site import car_park
@@ -15,6 +15,10 @@ from onboard.systems.car_park.site import car_park
 _MOST_LEGS = 31
 #: Duty P9, and what a word may take, ms.
 _LATE_MS, _SOON_MS = 2_300, 800
+#: So much of a body beyond a border is none, mm: what its drive may read too little.
+_EDGE_MM = 20
+#: Two frames at 125 kbit/s, and as many of others, us.
+_OVERTAKES_US = 5_000
 _FOLLOW = "The legs follow each other in time and place: leg n begins when and where leg n - 1 ends"
 
 PLANS = (
@@ -32,6 +36,11 @@ PLANS = (
     Check("plan-ends-in-a-refuge", "P5", "A plan ends in a refuge: a segment that is before no compartment"),
     Check("place-names-its-plan", "P10", "`itinerary_version` and `leg` are of the plan in hand."),
     Check("place-names-a-leg", "P10", "`itinerary_version` and `leg` are of the plan in hand."),
+    Check(
+        "each-return-comes-behind-its-place",
+        "P10",
+        "A robot says it before it gives back segments that it has left since.",
+    ),
     Check(
         "is-where-its-plan-has-it",
         "P9",
@@ -52,15 +61,21 @@ class PlanJudge:
 
     def __init__(self, stage: Stage, cast: Cast) -> None:
         self.stage, self.cast, self.site = stage, cast, car_park(stage.site)
+        #: Segments given back before a word that the body has left them.
+        self._given: list[tuple[Word, Segment]] = []
         self.desk = Desk(stage, cast)
         stage.hearers.append(self.hear)
 
     def hear(self, word: Word) -> None:
         """One word of the node."""
+        if self._given:
+            self._review_given(word)
         if isinstance(word.message, Itinerary):
             self._on_plan(word, word.message)
         elif isinstance(word.message, Progress):
             self._on_place(word, word.message)
+        elif isinstance(word.message, TokenGrant) and word.message.token_kind is TokenKind.SEGMENT:
+            self._on_given(word, Segment(*divmod(word.message.token, 256)))
         elif isinstance(word.message, TaskReport):
             is_known = word.message.task in self.stage.awarded or word.message.reason != 0
             self.stage.judge("reports-only-what-was-awarded", is_known, "nobody awarded it", word)
@@ -131,6 +146,32 @@ class PlanJudge:
         holder = self.cast.holder(self.desk.segment_key(at.track, at.index))[0]
         if stage.means.power:
             stage.judge("is-only-where-it-may-be", holder == stage.node, f"node {holder} has the segment", word)
+
+    def _on_given(self, word: Word, given: Segment) -> None:
+        """By its last word of where it is no part of its body is in what it gives back, or to another."""
+        told = self.stage.last(Progress)
+        if told is not None and not self._is_out_of(given, told.message):
+            self._given.append((word, given))
+        elif told is not None:
+            self.stage.judge("each-return-comes-behind-its-place", True, "", told, word)
+
+    def _review_given(self, word: Word) -> None:
+        """A grant may overtake the place that was said before it where both wait for the bus."""
+        place = word.message if isinstance(word.message, Progress) else None
+        if place is None and word.time_us <= self._given[0][0].time_us + _OVERTAKES_US:
+            return
+        for early, given in self._given:
+            is_said = place is not None and word.time_us <= early.time_us + _OVERTAKES_US
+            is_kept = is_said and place is not None and self._is_out_of(given, place)
+            self.stage.judge("each-return-comes-behind-its-place", is_kept, "was in it by its last word", early, word)
+        self._given.clear()
+
+    def _is_out_of(self, slot: Segment, at: Progress) -> bool:
+        if at.track != slot.track:
+            return True
+        pitch_mm = self.site.tracks[slot.track].pitch_mm
+        away_mm = abs((slot.index - at.index) * pitch_mm - at.offset_mm)
+        return away_mm >= (pitch_mm + self.site.carrier_length_mm) // 2 - _EDGE_MM
 
     def _in_time(self, plan: Word, word: Word, at: Progress) -> None:
         """A place that it tells while it moves is one of the leg in hand, between its begin and its end."""
