@@ -21,8 +21,10 @@ from onboard.conform.suite import scenes_of, watchers_of
 from onboard.contract.messages import Heartbeat
 from onboard.core.negotiation.participant import Participant
 from onboard.holon.holding import HoldResponse, MachineHolds
+from onboard.holon.holon import Holon
 from onboard.io.open_bus import BusSettings, open_bus
 from onboard.systems.car_park.site import CarPark
+from onboard.systems.car_park.travel import Carriage
 from onboard.wire.codec import fleet_codec
 from tests.conform.bench import ALL, SITE, SITES, play
 from tests.foreign.life import Foreign
@@ -150,6 +152,20 @@ def test_a_robot_that_hears_no_stop_is_caught(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(MachineHolds, "stop", lambda *_: next(iter(HoldResponse)))
     findings = play(("emergency stop",)).findings
     assert "stop-is-obeyed" in names(findings, Verdict.FAILED) and status(findings) == 1
+
+
+def test_a_robot_that_gives_back_before_it_says_where_it_is_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Carriage, "_after_place", lambda _, given, __, went=False: given)  # its name
+    assert names(play(("parking",)).findings, Verdict.FAILED) == ["each-return-comes-behind-its-place"]
+
+
+def test_a_robot_that_counts_a_drop_twice_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    counted = Holon._all_drops
+    monkeypatch.setattr(Holon, "_all_drops", lambda holon: counted(holon) + counted(holon))
+    broken = names(play(("short frames", "no message at all")).findings, Verdict.FAILED)
+    assert {"short-heartbeat-is-counted", "unknown-message-is-counted", "each-frame-of-a-flood-is-counted-once"} <= {
+        *broken
+    }
 
 
 # --- what is told ------------------------------------------------------------------------------------------------

@@ -52,6 +52,17 @@ def _more(reason: Reason, before: int) -> Callable[[Diagnostic], bool]:
     return lambda one: one.reason is reason and one.count != before
 
 
+def _one(stage: Stage, check: str, reason: Reason, frame: Frame) -> Play:
+    """A frame that is to be counted once under ``reason``."""
+    before, begin_us = stage.count_of(reason), stage.now_us
+    stage.put(frame)
+    told = yield from stage.hears(Diagnostic, _more(reason, before), 4.5)
+    frames = (stage.shown(frame, begin_us), *((stage.shown(told.frame),) if told is not None else ()))
+    more = 0 if told is None else told.message.count - before
+    what = f"Diagnostic of {reason.name} says {more} more" if more else f"no Diagnostic of {reason.name} within 4.5 s"
+    stage.findings.by_name[check].judge(what, frames, is_kept=more == 1)
+
+
 def _counted(
     names: dict[str, FrameCode], reason: Reason, frame_of: Callable[[Stage, FrameCode], Frame]
 ) -> Callable[[Stage, Cast], Play]:
@@ -59,16 +70,7 @@ def _counted(
 
     def play(stage: Stage, _: Cast) -> Play:
         for name, code in names.items():
-            before, begin_us = stage.count_of(reason), stage.now_us
-            frame = frame_of(stage, code)
-            stage.put(frame)
-            told = yield from stage.hears(Diagnostic, _more(reason, before), 4.5)
-            frames = (stage.shown(frame, begin_us), *((stage.shown(told.frame),) if told is not None else ()))
-            more = 0 if told is None else told.message.count - before
-            what = (
-                f"Diagnostic of {reason.name} says {more} more" if more else f"no Diagnostic of {reason.name} in 4.5 s"
-            )
-            stage.findings.by_name[f"{name}-is-counted"].judge(what, frames, is_kept=more == 1)
+            yield from _one(stage, f"{name}-is-counted", reason, frame_of(stage, code))
 
     return play
 
@@ -108,10 +110,7 @@ def unknown(stage: Stage, cast: Cast) -> Play:
         ("node-0-is-counted", Reason.UNKNOWN_IDENTIFIER, Frame(beat, bytes(8))),
         ("empty-frame-is-counted", Reason.SHORT_FRAME, Frame(beat | stage.caller, b"")),
     ):
-        before = stage.count_of(reason)
-        stage.put(frame)
-        told = yield from stage.hears(Diagnostic, _more(reason, before), 4.5)
-        stage.judge(name, told, "no Diagnostic of it within 4.5 s", told)
+        yield from _one(stage, name, reason, frame)
     begin_us, before = stage.now_us, stage.count_of(Reason.SHORT_FRAME)
     for number in range(_FLOOD):
         stage.put(Frame(beat | stage.caller, bytes(number % 8)))

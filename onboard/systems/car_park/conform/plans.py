@@ -161,8 +161,8 @@ class PlanJudge:
         if place is None and word.time_us <= self._given[0][0].time_us + _OVERTAKES_US:
             return
         for early, given in self._given:
-            is_said = place is not None and word.time_us <= early.time_us + _OVERTAKES_US
-            is_kept = is_said and place is not None and self._is_out_of(given, place)
+            is_soon = word.time_us <= early.time_us + _OVERTAKES_US
+            is_kept = is_soon and place is not None and self._is_out_of(given, place)
             self.stage.judge("each-return-comes-behind-its-place", is_kept, "was in it by its last word", early, word)
         self._given.clear()
 
