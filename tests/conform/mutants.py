@@ -1,6 +1,6 @@
 """``python -m tests.conform.mutants``: break our robot in 60 places, one at a time, and play the kit before each.
 
-Mutations are drawn by a seed from the lines that the robot runs in the play: a comparison turned round, ``and`` for
+Mutations are drawn by a seed from the lines that the robot runs in the plays: a comparison turned round, ``and`` for
 ``or``, a ``not`` left out, a sum for a difference, a number one more, a truth for its contrary, a call left out. Left
 out are those that no frame could ever tell: what goes to the telemetry only (``UNHEARD``), and files about machines
 that the benches do not have (``_OF_OTHERS``). A mutant is caught where a check fails. Each is played in a process of
