@@ -73,6 +73,8 @@ def _crash(chance: random.Random, site: Site) -> dict[str, Value]:
     return drawn
 
 
+_WAYS = ("both", "out", "in")
+
 _BUS: Final[dict[str, Draw]] = {
     "burst": lambda c, _: {"for_s": _lasting(0.05, 2.0, c)},
     "bit_errors": lambda c, _: {"probability": c.choice([0.001, 0.01, 0.1]), "seed": _seed(c)},
@@ -82,7 +84,7 @@ _BUS: Final[dict[str, Draw]] = {
     "partition": lambda c, s: {
         "members": _some(c, s),
         "for_s": _lasting(0.5, 15, c),
-        "way": c.choice(["both", "out", "in"]),
+        "way": c.choice(_WAYS),
     },
     "overflow": lambda c, s: {"target": _machine(c, s), "queue": c.choice([1, 2, 8])},
     "babble": lambda c, _: {"for_s": _lasting(0.5, 8, c), "rate_hz": c.choice([500, 1500, 3000])},
@@ -146,6 +148,17 @@ _POWER: Final[dict[str, Draw]] = {
     "chargers_off": lambda c, _: {"for_s": _lasting(60, 400, c)},
 }
 
+#: What a cable, a supply or a fuse does until somebody comes: longer than any wait of the protocol's.
+_OUTAGES: Final[dict[str, Draw]] = {
+    "partition": lambda c, s: {"members": _some(c, s), "for_s": _lasting(30, 600, c), "way": c.choice(_WAYS)},
+    "burst": lambda c, _: {"for_s": _lasting(5, 120, c)},
+    "bus_off": lambda c, s: {"target": _machine(c, s), "for_s": _lasting(10, 120, c)},
+    "babble": lambda c, _: {"for_s": _lasting(10, 90, c), "rate_hz": c.choice([500, 1500, 3000])},
+    "crash": lambda c, s: {**_crash(c, s), "restart_s": _lasting(30, 900, c)},
+    "pause": lambda c, s: {"target": _machine(c, s), "for_s": _lasting(10, 300, c)},
+    "power_cut": lambda c, _: {"for_s": _lasting(20, 300, c), "seed": _seed(c)},
+}
+
 PROFILES: Final[dict[str, dict[str, Draw]]] = {
     "none": {},
     "bus": _BUS,
@@ -155,6 +168,7 @@ PROFILES: Final[dict[str, dict[str, Draw]]] = {
     "pushes": _PUSHES,
     "all": {**_BUS, **_CRASH, **_PEOPLE, **_MORE, **_POWER},
     "clocks": _CLOCKS,
+    "outages": _OUTAGES,
     "power": {**_POWER, "crash": _crash, "pause": _CRASH["pause"], "power_cut": _CRASH["power_cut"]},
 }
 #: Kinds that have no moment of their own.

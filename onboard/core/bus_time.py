@@ -4,8 +4,7 @@ A clock that is far off is no clock: it counts as lost, so that its machine neit
 once a second time message confirms the error.
 
 **Bus time never goes back** on one machine, but by a slew. One that has to be set back is set forward by the rest of
-the way round: the wire shows bus time modulo ``BUS_TIME_MODULUS``, so that is the same time. What was due in the wrong
-future is due now, and the machine has slept, for 8.8 years as it were: the one thing to do about both is the same.
+the way round: the wire shows bus time modulo ``BUS_TIME_MODULUS``, so that is the same time, after 8.8 years of sleep.
 """
 
 from dataclasses import dataclass

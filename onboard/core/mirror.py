@@ -1,8 +1,7 @@
 """The mirror: what this machine believes of the others, built from bus traffic alone (row P35).
 
-The core keeps versions: who lives, what each last planned, where it last was, and who is in the way. What a plan
-occupies, and what else is believed of the site's things, a system's own mirror adds (``onboard.ways``). A wrong mirror
-costs time, never safety: what moves is guarded by tokens.
+The core keeps versions: who lives, what each last planned, where it last was, who is in the way. What plans occupy a
+system's own mirror adds (``onboard.ways``). A wrong mirror costs time, never safety: tokens guard what moves.
 """
 
 from binascii import crc_hqx
@@ -71,6 +70,8 @@ class Mirror:
     progress: dict[int, Progress] = field(default_factory=dict)
     #: Machines that do not follow their plans.
     aside: dict[int, Obstacle] = field(default_factory=dict)
+    #: Who was silent: its next plan counts whatever its version, as more may have been missed than that tells apart.
+    was_silent: set[int] = field(default_factory=set)
     #: Boot counter of each node's life before the present one, 0 where I knew of none.
     boots_before: dict[int, int] = field(default_factory=dict)
     #: Whether all stand, as rights are made anew.
@@ -81,7 +82,8 @@ class Mirror:
         """Note a sign of life; True where the sender is new or was restarted, so that its statements are wanted."""
         known = self.peers.get(beat.sender)
         starts = beat.state is MachineState.STARTING and known is not None and known.state is not MachineState.STARTING
-        if starts and known is not None and known.boot == beat.boot and self._has_just_come(known, now_us):
+        is_soon = known is not None and now_us - known.since_us < self.site.timing.heartbeat_us // 2
+        if starts and known is not None and known.boot == beat.boot and is_soon:
             # No board starts so soon again: its first word has come twice.
             return False
         fresh = known is None or known.boot != beat.boot or starts
@@ -94,9 +96,6 @@ class Mirror:
         self.peers[beat.sender] = Peer(*word, now_us, beat.contract, beat.site_digest, since_us, beat)
         return fresh
 
-    def _has_just_come(self, peer: Peer, now_us: int) -> bool:
-        return now_us - peer.since_us < self.site.timing.heartbeat_us // 2
-
     def _forget_plan(self, node: int) -> None:
         if self.itineraries.pop(node, None) is not None:
             self._digest = None
@@ -105,9 +104,11 @@ class Mirror:
         """Take up a firm itinerary by version; True where it was news. Tentative ones are hints and not kept here."""
         if itinerary.grade is Grade.TENTATIVE:
             return False
-        known = self.itineraries.get(itinerary.sender)
-        if known is not None and not is_newer(itinerary.version, known.version, 8):
+        told, known = itinerary.version, self.itineraries.get(itinerary.sender)
+        is_another = known is not None and told != known.version and itinerary.sender in self.was_silent
+        if not (known is None or is_another or is_newer(told, known.version, 8)):
             return False
+        self.was_silent.discard(itinerary.sender)
         self.itineraries[itinerary.sender] = itinerary
         self._digest = None
         return True
@@ -119,6 +120,7 @@ class Mirror:
     def set_aside(self, node: int, slots: frozenset[Segment], reason: Reason, now_us: int) -> bool:
         """A machine does not follow its plan: it is an obstacle at ``slots``; True where that was not known so."""
         known = self.aside.get(node)
+        self.was_silent |= {node} if reason is Reason.NODE_SILENT else set()
         if known is not None and (known.slots, known.reason) == (slots, reason):
             return False
         self.aside[node] = Obstacle(slots, now_us if known is None else known.since_us, reason)

@@ -197,6 +197,7 @@ class Presence:
     def _begin_anew(self, now_us: int) -> None:
         """I have not listened for a while myself: everybody gets the time to be heard again."""
         self._listening_since_us = now_us
+        self.mirror.was_silent.update(self.mirror.peers)
         for peer in self.mirror.peers.values():
             peer.heard_at_us = now_us
 

@@ -139,6 +139,12 @@ class CarMirror(Mirror):
             for listener in self.on_forgotten:
                 listener(car)
 
+    def drop_car(self, car: Reference) -> None:
+        """What I believed of a car is wrong; whoever knows better says so."""
+        del self.cars[car]
+        self._standing.put(car, OUTSIDE)
+        self._digest = None
+
     def car_station(self, car: Reference) -> Station | None:
         """Where a car stands, or None where it is unknown or aboard a machine."""
         record = self.cars.get(car)
@@ -201,9 +207,7 @@ class CarMirror(Mirror):
     def disown(self) -> None:
         """What I have said of cars came from a journal that is old: whoever knows better says so, or nobody does."""
         for car in [car for car, record in self.cars.items() if record.custodian == self.node_id]:
-            del self.cars[car]
-            self._standing.put(car, OUTSIDE)
-        self._digest = None
+            self.drop_car(car)
 
     def remembers(self, word: CarAt) -> None:
         """My journal knew where a car stands that is mine once the list counts which I have read back."""

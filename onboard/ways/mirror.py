@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import Any, ClassVar
 
-from onboard.contract.codes import LegAction, Reason, Side, TokenKind
-from onboard.contract.constants import ANY_STATION, MOBILE_KINDS, NOBODY, OUTSIDE
-from onboard.contract.messages import Blocked, CarAt, Clear, Itinerary, Leg, Message, Progress
+from onboard.contract.codes import LegAction, MachineState, Reason, Side, TokenKind
+from onboard.contract.constants import ANY_STATION, MOBILE_KINDS, NOBODY, OUTSIDE, STILL
+from onboard.contract.messages import Blocked, CarAt, Clear, Itinerary, Leg, Message, Progress, SyncDone
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect
 from onboard.core.mirror import Mirror, digest_words
@@ -20,6 +20,7 @@ from onboard.ways.bodies import Bodies
 from onboard.ways.cars import CarFleet, CarMirror
 from onboard.ways.lift_uses import standing_after
 from onboard.ways.lifts import lift_tracks
+from onboard.ways.missed_cars import MissedCars
 from onboard.ways.obstacles import Obstacles
 from onboard.ways.occupancy import LegWindows, final_position, leg_windows, lift_uses, standing_segments, turned_in
 from onboard.ways.passing_order import PassingOrder
@@ -47,6 +48,7 @@ class WayMirror(CarMirror):
     standing: Standing = field(init=False)
     bodies: Bodies = field(init=False)
     blocked_words: BlockedWords = field(init=False)
+    missed: MissedCars = field(init=False)
     #: Who told a plan without a leg.
     _without_leg: set[int] = field(default_factory=set)
     #: Whose plan is thought of for a while (``as_told``): what it really told hinders no run of mine.
@@ -58,6 +60,7 @@ class WayMirror(CarMirror):
         self.standing = Standing(self.site, self.itineraries, self.is_laden)
         self.bodies = Bodies(self.site)
         self.blocked_words = BlockedWords(self.site, self.node_id, self.obstacles)
+        self.missed = MissedCars(self.cars)
 
     # --- what is heard -----------------------------------------------------------------------------------------
 
@@ -71,8 +74,17 @@ class WayMirror(CarMirror):
         self._digest = None
 
     def hear(self, message: Message, now_us: int) -> None:
-        """Who moves, and who says what it waits for."""
+        """Who moves, who says what it waits for, and what cars who has told all has not named."""
         self.standing.hear(message, now_us)
+        if isinstance(message, SyncDone) and self._takes_part(message.sender):
+            for car in self.missed.answered(message.sender):
+                self.drop_car(car)
+
+    def _takes_part(self, node: int) -> bool:
+        """Whether a machine has its rights: who starts, or lost its journal, answers without them."""
+        peer = self.peers.get(node)
+        is_ready = peer is not None and peer.state not in (*STILL, MachineState.STARTING)
+        return is_ready and node not in self.aside and not self.is_frozen()
 
     def statements(self) -> list[Effect]:
         """What is blocked, or clear again, of the tracks that I am steward of."""
@@ -80,6 +92,7 @@ class WayMirror(CarMirror):
 
     def _hear_car(self, statement: CarAt, now_us: int) -> list[Effect]:
         """A car stands in the site, is aboard or has left; a word of any other place is none."""
+        self.missed.named(statement)
         if statement.station not in (ANY_STATION, OUTSIDE):
             station = Station.from_number(statement.station)
             track = self.site.tracks.get(station.track)
@@ -218,7 +231,10 @@ class WayMirror(CarMirror):
         return self.obstacles.slots_of(machine, seen, lambda slot: holder_of(segment_token(slot)))
 
     def stands(self, node: int, now_us: int) -> bool:
-        """Whether a machine has stood for too long where its plan does not leave it."""
+        """Whether a machine that is heard has stood for too long where its plan does not leave it."""
+        known = self.aside.get(node)
+        if known is not None and known.reason is Reason.NODE_SILENT:
+            self.standing.returned(node, known.since_us, now_us)
         return self.standing.stands(node, now_us)
 
     def is_planless(self, machine: Machine) -> bool:

@@ -1,8 +1,7 @@
 """Who is left out of an initiator's calls, because it won tasks and did not do them (docs/protocol.md, A8).
 
 Who forfeits a task is out of its next calls; who forfeits several in a row, with nothing done in between, is out of all
-calls of this initiator, each time for four times as long. A task that is done ends that. So does a restart of the
-initiator: whoever fails again is found again.
+calls of this initiator, each time for four times as long. A task that is done ends that, or a restart of the initiator.
 """
 
 from collections.abc import Callable, Iterator

@@ -276,6 +276,8 @@ class BayCalls:
         if self.fleet.slots_told is not None and self.forgot is None:
             self.forgot = True
         for task in self.in_hand():
+            if task.is_brought(self.fleet.mirror, self.fleet.node_id, self.station):
+                continue
             # Nobody has a right by an award that was not heard: its car is mine, and goes to the winner only.
             is_lost = (
                 taken_back and self.stewardship.is_given_back(task.car)
@@ -421,7 +423,8 @@ class BayCalls:
         on, prove for as long as I wait that somebody comes.
         """
         record = self.fleet.mirror.cars.get(task.car)
-        if record is not None and record.station == ANY_STATION and record.custodian != task.winner:
+        is_aboard = record is not None and record.station == ANY_STATION and task.operation is Operation.RETRIEVE
+        if record is not None and is_aboard and record.custodian != task.winner:
             # Whoever brings it here has it, whomever a word was believed that came late.
             return [] if self._work_here(record.custodian) is None else self.won_by(task, record.custodian, 0)
         if self.is_shown(task):
@@ -452,9 +455,11 @@ class BayCalls:
     def _is_open(self, task: BayTask) -> bool:
         return any(one.terms.task == task.task for one in self.fleet.negotiation.initiators)
 
-    def next_wake(self, *, is_job_asked: bool) -> int | None:
+    def next_wake(self, phase: BayPhase) -> int | None:
         """When a call is made again, or a winner counts as lost; the job's call only where its phase waits for it."""
-        tasks = [None if self._is_full else self.ahead, self.job if is_job_asked else None]
+        is_given_back = self.job is not None and self.job.is_given_back
+        is_asked = phase is BayPhase.AWAITING or (phase is BayPhase.HANDOVER and is_given_back)
+        tasks = [None if self._is_full else self.ahead, self.job if is_asked else None]
         times = [task.retry_at_us for task in tasks if task is not None]
         times += [task.ask_at_us for task in self.in_hand()]
         times += [self.stewardship.next_wake(), self.unsaid.next_wake()]

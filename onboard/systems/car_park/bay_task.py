@@ -115,6 +115,12 @@ class BayTask:
         stands = mirror.car_station(self.car)
         return self.operation is Operation.PARK and not bay.load_kg and stands not in (None, here)
 
+    def is_brought(self, mirror: WayMirror, keeper: int, here: Station) -> bool:
+        """Whether its car, to be fetched, is here by its keeper's word: nobody need be asked for it any more."""
+        record = mirror.cars.get(self.car)
+        is_kept = record is not None and (record.custodian, record.station) == (keeper, here.number)
+        return self.operation is Operation.RETRIEVE and is_kept
+
     def refused(self, reason: Reason, now_us: int) -> None:
         """Nobody could; it is called for again later, and ever less often."""
         self.refusals, self.reason = self.refusals + 1, reason

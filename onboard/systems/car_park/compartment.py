@@ -231,8 +231,7 @@ class Compartment:
 
     def next_wake(self) -> int | None:
         """When a refused call is made again, or a winner counts as lost."""
-        waits = self.phase in (BayPhase.AWAITING, BayPhase.HANDOVER)
-        times = [self.calls.next_wake(is_job_asked=waits), self.pipeline.next_wake(self.phase), self.desks.next_wake()]
+        times = [self.calls.next_wake(self.phase), self.pipeline.next_wake(self.phase), self.desks.next_wake()]
         times += [self.promises.next_wake()] if self._park.promises else []
         return min((one for one in times if one is not None), default=None)
 

@@ -59,6 +59,8 @@ class Stewardship:
     _say_at_us: dict[Reference, int] = field(default_factory=dict)
     #: Who brought each car that was put down, and for which task: it says once more where that was.
     _brought: dict[Reference, tuple[int, Reference]] = field(default_factory=dict)
+    #: For which task each car was brought that was done then: who missed that may say its award again.
+    _done: dict[Reference, Reference] = field(default_factory=dict)
     #: Since when the winner of each car has said nothing that shows that it knows of its award.
     _unheard_us: dict[Reference, int] = field(default_factory=dict)
     #: How often I was admitted, and since when I take part: what others did not do before is no sign of theirs.
@@ -127,7 +129,7 @@ class Stewardship:
         record = None if car is None else self.fleet.mirror.cars.get(car)
         if car is None or record is None or not custody.keeps(self.fleet, done.station):
             return []
-        del self._brought[car]
+        self._done[car] = self._brought.pop(car)[1]
         is_right = record.station in (done.station, OUTSIDE) or record.custodian != self.fleet.node_id
         return [] if is_right else custody.state(self.fleet, car, done.station, record.wheelbase_mm)
 
@@ -174,7 +176,9 @@ class Stewardship:
         return (self.winners.get(car, NOBODY), version) if known == task else (NOBODY, 1)
 
     def _is_news(self, car: Reference, award: Award) -> bool:
-        """Whether an award says more than is known; an older version of the same task counts no more."""
+        """Whether an award is news: not under an older version of the same task, nor of a task that is done."""
+        if self._done.get(car) == award.task:
+            return False
         task, version = self.tasks.get(car, (award.task, 0))
         if task != award.task or is_newer(award.task_version, version, TASK_VERSION_BITS):
             return True
@@ -332,7 +336,7 @@ class Stewardship:
         return effects
 
     def _forget(self, car: Reference) -> None:
-        for table in (self.winners, self.tasks, self._say_at_us, self._unheard_us, self._brought):
+        for table in (self.winners, self.tasks, self._say_at_us, self._unheard_us, self._brought, self._done):
             table.pop(car, None)
 
     def _state_anew(self, car: Reference, version: int) -> list[Effect]:

@@ -60,7 +60,9 @@ class TerminalMirror:
         if sender not in self.where:
             return
         known = self.traffic.plans.get(sender)
-        if known is not None and is_newer(known.plan.version, message.version, 8):
+        head = self.fleet.itineraries.get(sender)
+        is_of_head = head is not None and head.version == message.version
+        if known is not None and is_newer(known.plan.version, message.version, 8) and not is_of_head:
             return
         reader = self._readers.setdefault(sender, PlanReader(self.site))
         plan = reader.feed(message, now_us)
