@@ -80,11 +80,11 @@ class RecoveryMeasure:
         #: When the last fault known so far is over, us of loop time: later with every restart.
         self.healed_us = healed_us(faults)
         self._simulation = simulation
-        self._for_good = {
-            one.target
-            for one in faults
-            if isinstance(one, Injection) and one.kind == "crash" and one.text("restart") == "no"
-        }
+        crashes = [one for one in faults if isinstance(one, Injection) and one.kind == "crash"]
+        self._for_good = {one.target for one in crashes if one.text("restart") == "no"}
+        ends = (one for one in crashes if one.target not in self._for_good)
+        #: How long power is off, us: nothing is over before it is back.
+        self._off_us = {one.target: round(one.number("restart_s") * 1e6) for one in ends}
         self._starts: dict[int, int] = {}
         self._off: dict[str, int] = {}
         self._ends = {
@@ -163,6 +163,7 @@ class RecoveryMeasure:
 
     def _on_crash(self, machine: Machine) -> None:
         self._starts.pop(machine.node_id, None)
+        self.healed_us = max(self.healed_us, self._now_us() + self._off_us.get(machine.name, 0))
         now_us = self._now_us()
         self._at(now_us + LOOK_US, partial(self._look_at_loss, machine.node_id, now_us))
 

@@ -125,7 +125,10 @@ class OrderDesk(ABC, Generic[AnOrder]):
             self.fleet.drops[Reason.NOT_OF_KIND] += 1
             return []
         if order.is_over:
-            return []
+            # Who missed that it was taken back would carry out all the same what its customer was refused.
+            is_lost = order.state is OrderState.REFUSED or order.winner != message.sender
+            is_claim = is_lost and message.phase is TaskPhase.AWARDED
+            return self.fleet.winners.remind(order.task, message.sender) if is_claim else []
         if self._may_say(order, message.sender, now_us):
             return self._on_report(order, message, now_us)
         # Who has lost it, or never won it, says nothing that counts.

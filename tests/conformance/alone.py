@@ -33,13 +33,13 @@ class Alone:
             if isinstance(one, Record):
                 self.journal.append(one.entry)
 
-    def passes(self, seconds: float, step_us: int = SECOND) -> None:
-        """Time goes by, and all the others tell that they live."""
+    def passes(self, seconds: float, step_us: int = SECOND, *, silent: int = 0) -> None:
+        """Time goes by, and all the others tell that they live, but who is ``silent``."""
         until_us = self.now_us + round(seconds * SECOND)
         while self.now_us < until_us:
             self.now_us += step_us
             for node, machine in self.site.machines.items():
-                if node != self.node:
+                if node not in (self.node, silent):
                     beat = Heartbeat(node, CONTRACT_VERSION, self.site.digest, 0, 1, machine.kind, MachineState.IDLE)
                     self.hears(beat)
             while (due_us := self.holon.next_wake()) is not None and due_us <= self.now_us:

@@ -67,6 +67,13 @@ def test_a_machine_that_stays_dead_is_not_waited_for() -> None:
     assert (report.verdict, report.is_apart) == (RunVerdict.SERVED, False)
 
 
+def test_a_machine_that_is_off_for_long_is_waited_for() -> None:
+    """All were served before it came back, and that it knew nothing by then was called not converged."""
+    report = trial("crash:target=ER2,at_s=40,restart_s=700")
+    assert (report.verdict, report.is_apart) == (RunVerdict.SERVED, False)
+    assert report.simulated_s >= 740
+
+
 def test_all_faults_are_over_with_the_last_of_them() -> None:
     texts = ["burst:at_s=5,for_s=2", "power_cut:at_s=6,for_s=10,spread_s=4", "cancel:car=1,at_s=9", "lost_ticket:car=1"]
     assert healed_us(parse_injection(text) for text in texts) == 20_000_000

@@ -7,23 +7,37 @@ from typing import TypeVar
 
 import pytest
 
-from onboard.contract.codes import KindCode, ManualMode, Reason, TaskPhase, TokenKind
+from onboard.contract.codes import Grade, KindCode, ManualMode, Reason, TaskPhase, TokenKind
 from onboard.contract.messages import (
     Award,
     Bid,
     CallForProposals,
+    CarAt,
+    Itinerary,
     ManualOrder,
     ManualState,
     Message,
     Reference,
+    Stamp,
     TaskReport,
+    TokenGrant,
     TokenRefusal,
     TokenRequest,
 )
-from onboard.contract.terminal import BoxOrder, LaneState, TaskTerms, Verb
+from onboard.contract.terminal import (
+    Action,
+    BoxOrder,
+    LaneState,
+    PlanHead,
+    PlanStep,
+    PlanTask,
+    TaskTerms,
+    Verb,
+)
 from onboard.contract.terminal_device import LaneSensor, ManualKey, MissionAnswer, MissionKey
 from onboard.core.journal_records import Entry
 from onboard.systems.terminal.site import Terminal
+from onboard.ways.tokens import car_token
 from tests.conformance.alone import Alone
 from tests.terminal.seeds import short
 
@@ -184,6 +198,28 @@ def test_a_box_for_which_another_desk_calls_is_not_called_for() -> None:
     desk.hears(replace(theirs, sender=QUAY, task=Reference(QUAY, 1)))
     desk.senses(*tranship(9, "B4"))
     assert desk.answers() == [(9, True)] and desk.sent(CallForProposals) == []
+
+
+def test_a_box_whose_right_is_with_a_silent_vehicle_is_called_for_by_nobody() -> None:
+    """It was aboard, and its vehicle cut off while the desk's power failed: another was sent, and waited for a box.
+
+    It stood docked at the stack, and all others stood before that.
+    """
+    first = Counter()
+    first.senses(*tranship(9, "B4"))
+    call, number = won(first), car_token(*site().box(box("B4"))).number
+    key = TokenKind.CAR, number
+    takes = PlanStep(R1, 1, 0, Action.PICK_UP, place("S2"), 60_000, 0, 0)
+    leaves = PlanStep(R1, 1, 1, Action.PUT_DOWN, place("S4"), 90_000, 0, 0)
+    plan = PlanHead(R1, 1, 2, 1, 0), takes, leaves, PlanTask(R1, 1, 0, 0, 1, box("B4"), call.task)
+    first.hears(Itinerary(R1, 1, Grade.FIRM, Stamp(0, DESK, 0), ()), *plan, TokenRequest(R1, *key, 0, 1, 0))
+    assert TokenGrant(DESK, *key, 1, R1) in first.sent(TokenGrant), "it fetches the box"
+    again = Counter(first.journal, boot=2)
+    again.passes(600, silent=R1)
+    assert again.sent(CallForProposals) == [] and again.sent(Award) == []
+    again.hears(CarAt(R1, site().box(box("B4")), place("S4"), 1, 0), TokenGrant(R1, *key, 2, DESK))
+    again.passes(20)
+    assert again.sent(CallForProposals) == [], "it has come"
 
 
 # --- lanes -----------------------------------------------------------------------------------------------------

@@ -7,8 +7,8 @@ from itertools import product
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.contract.codes import ManualMode, TokenKind
-from onboard.contract.messages import CarAt, ManualOrder, Reference, TaskReport, TokenRequest
+from onboard.contract.codes import ManualMode, Reason, TokenKind
+from onboard.contract.messages import CarAt, ManualOrder, Reference, TaskReport, TokenRefusal, TokenRequest
 from onboard.contract.terminal import Action, HandlerMode, LaneState, MoveMode, StepReport
 from onboard.contract.terminal_device import HandlerOrder, HandlerState, MoveOrder, MoveState
 from onboard.core.authority import segment_token
@@ -20,6 +20,7 @@ from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 from onboard.systems.terminal.memory import plan_record
 from onboard.systems.terminal.plan import ActionPlan, ActionStep, Load
+from onboard.systems.terminal.planner import TURN_US
 from onboard.systems.terminal.records import BoxRecord, StepOverRecord
 from onboard.systems.terminal.site import Terminal
 from onboard.systems.terminal.steps import TABLE, ActionDeed, ActionFinding
@@ -235,3 +236,16 @@ def test_every_action_meets_every_word_of_drive_and_handler(step: int) -> None:
 
 def test_a_line_of_the_table_is_for_what_can_be() -> None:
     assert {(PLAN[step][0], meant(step, words)) for step in STEPS for words in words_for(step)} == set(TABLE)
+
+
+def test_who_is_refused_its_box_waits_for_it_and_goes_on() -> None:
+    """The right to a box was read as one to a way: the vehicle halted, with a person needed."""
+    one = vehicle(STEPS[-3], Words(gear=HandlerMode.DOCKED, has_right=False))
+    assert list(told(one.advance(LATER_US))) == [("asks", BOX)]
+    key = car_token(*SITE.box(BOX))
+    one.fleet.tokens.on_refusal(
+        TokenRefusal(SITE.desk, key.kind, key.number, 1, VEHICLE, Reason.TOKEN_NOT_GRANTABLE_YET), LATER_US
+    )
+    assert key in one.fleet.tokens.refused
+    for turn in range(60):
+        one.advance(LATER_US + turn * TURN_US)

@@ -131,6 +131,12 @@ def test_a_bid_after_the_deadline_does_not_win() -> None:
     assert tape.broken() == {"bids-in-time": 1}
 
 
+def test_an_initiators_own_bid_counts_however_late_its_frame_comes() -> None:
+    """The bus was dead for a minute: it had bid, and closed its call, before anybody could hear of either."""
+    tape = tell(STORY[:1]).say(2.1, bid(1, 50_000)).say(2.2, award(1))
+    assert "bids-in-time" not in tape.broken()
+
+
 def test_a_call_that_is_never_closed_is_found() -> None:
     assert tell(STORY[:3]).broken(13) == {}
     assert tell(STORY[:3]).broken(15) == {"calls-closed": 1}

@@ -6,9 +6,9 @@ from itertools import product
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.contract.codes import KindCode
-from onboard.contract.messages import Reference
-from onboard.core.effects import Record
+from onboard.contract.codes import CallResult, KindCode, Reason, TaskPhase
+from onboard.contract.messages import Award, Reference, TaskReport
+from onboard.core.effects import Record, Send
 from onboard.holon.holon import Holon
 from onboard.systems.cell.contracts import Goal
 from onboard.systems.cell.desk import GoalOrder
@@ -57,6 +57,22 @@ def test_every_state_meets_every_event(system: str, state: OrderState, event: Or
     again = desk_of(system, [*written, *(one for one in effects if isinstance(one, Record))]).orders[TASK]
     kept = OrderState.HEARD if following is OrderState.CALLED else following
     assert (again.state, again.may_be_won) == (kept, kept is OrderState.HEARD)
+
+
+@pytest.mark.parametrize("system", ORDERS)
+@pytest.mark.parametrize("state", OVER)
+def test_who_missed_that_an_order_was_taken_back_hears_so_when_it_claims_it(system: str, state: OrderState) -> None:
+    """A desk was cut off for minutes, and its customers were refused: the lathe made the parts all the same."""
+    desk, order = desk_of(system), type(ORDERS[system])(**vars(ORDERS[system]))
+    desk.come_in(order, NOW_US)
+    mine, other = sorted(one.node_id for one in desk.fleet.site.machines.values() if one.kind is desk.takers)[:2]
+    order.state, order.winner = state, mine
+    for node in (mine, other):
+        said = desk.hear(TaskReport(node, TASK, TaskPhase.AWARDED, 0, Reason.NONE), NOW_US)
+        is_its = state is OrderState.DONE and node == mine
+        awards = [one.message for one in said if isinstance(one, Send) and isinstance(one.message, Award)]
+        assert [one.result for one in awards] == ([] if is_its else [CallResult.REJECTED])
+        assert desk.hear(TaskReport(node, TASK, TaskPhase.STARTED, 0, Reason.NONE), NOW_US) == [], "it is begun"
 
 
 def test_nothing_follows_what_is_over_and_all_else_comes_to_an_end() -> None:

@@ -321,6 +321,7 @@ class Desk:
         free = len(self.candidates(now_us))
         taken = {box for box, until_us in self.taken.items() if until_us > now_us}
         taken |= {transport.box for transport in self.orders.open.values()}
+        taken |= {box for box in range(1, len(self.site.boxes) + 1) if not self._station_of(box)}
         while len(self.calls) < free:
             transport = self.orders.next(self.mirror, taken)
             if transport is None:
@@ -330,6 +331,16 @@ class Desk:
         if self.orders.missions or self.orders.open:
             self._look_at_us = self._look_at_us or now_us + LOOK_US
         return effects
+
+    def _station_of(self, box: int) -> int:
+        """Where a box stands for anybody to fetch; 0 while the right to it is with who has not told where it is.
+
+        After a restart that is all that is known of a box whose vehicle is silent.
+        """
+        car = self.site.box(box)
+        holder, record = self.fleet.tokens.holder_of(car_token(*car)), self.fleet.mirror.cars.get(car)
+        is_told = record is not None and record.custodian == holder
+        return 0 if holder in self.site.vehicles and not is_told else self.mirror.station_of(box)
 
     def call(self, transport: Transport, now_us: int) -> list[Effect]:
         """Call all robots for one transport."""
@@ -392,7 +403,7 @@ class Desk:
         reason = self.fleet.winners.lost(task, now_us)
         if reason is Reason.NONE:
             return []
-        if not self.mirror.station_of(transport.box) or self.mirror.in_plans(transport.box) is not None:
+        if not self._station_of(transport.box) or self.mirror.in_plans(transport.box) is not None:
             self.fleet.winners.keeps(task)
             return []
         self._won_at_us.pop(task, None)
@@ -413,7 +424,7 @@ class Desk:
                 effects.append(Record(self.orders.record()))
             elif self.mirror.in_plans(transport.box) is not None:
                 self._won_at_us[task] = now_us
-            elif now_us - self._won_at_us.get(task, now_us) >= LOST_US and self.mirror.station_of(transport.box):
+            elif now_us - self._won_at_us.get(task, now_us) >= LOST_US and self._station_of(transport.box):
                 self._won_at_us.pop(task, None)
                 self.orders.give_back(task, OrderEvent.TAKEN_BACK)
                 effects += self.fleet.winners.take_back(task, Reason.FALSE_STATEMENT, now_us)

@@ -3,7 +3,7 @@
 from collections import deque
 from dataclasses import dataclass, field, replace
 
-from onboard.contract.codes import Grade, Reason, TaskPhase
+from onboard.contract.codes import Grade, Reason, TaskPhase, TokenKind
 from onboard.contract.messages import CallForProposals, Itinerary, Stamp, TaskReport
 from onboard.contract.terminal import Assignment, StepReport, StepResult
 from onboard.core.behaviour import Fleet
@@ -188,8 +188,10 @@ class Planner:
         So it is after long where I do see somebody: lists may differ without any plan being missed, and then two may
         each wait for the other with nobody else's picture showing why (campaign terminal, all, seed 15).
         """
-        owned, tokens = self.owned, self.fleet.tokens
-        refused = [key.number >> 8 for key, why in tokens.refused.items() if why is Reason.TOKEN_NOT_GRANTABLE_YET]
+        owned, not_yet = self.owned, Reason.TOKEN_NOT_GRANTABLE_YET
+        keys = [key for key, why in self.fleet.tokens.refused.items() if why is not_yet]
+        # A box's right has no list: who has won it is all that its keeper goes by.
+        refused = [key.number >> 8 for key in keys if key.kind is TokenKind.SEGMENT]
         if owned is None or not refused:
             self._refused = None
             return []

@@ -196,8 +196,10 @@ class BidsInTime(_CallRule):
         due_us = seen.due_us
         if times_us and (due_us is None or min(times_us) <= due_us + CLOCK_TOLERANCE_US):
             return
-        if times_us and seen.event.time_us < self.picture.clock_settles_us:
-            # The caller's deadline was over when its own clock said so.
+        is_own = award.winner == award.sender
+        if times_us and (is_own or seen.event.time_us < self.picture.clock_settles_us):
+            # The caller's deadline was over when its own clock said so; or it bid itself, which only others hear by a
+            # frame, that waits as long as the bus is dead.
             return
         seen.is_reported = True
         late_us = min(times_us) - (due_us or 0) if times_us else 0
