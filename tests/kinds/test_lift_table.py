@@ -203,3 +203,18 @@ def test_after_a_ride_the_gate_goes_to_who_has_the_platform_still() -> None:
 def test_a_line_of_the_table_is_for_what_can_be() -> None:
     met = {(phase, meant(phase, words)) for phase in LiftPhase for words in words_for(phase)}
     assert met | {(LiftPhase.FREE, LiftFinding.GRANTED)} == set(LIFT_TABLE)
+
+
+@pytest.mark.parametrize(("told_of", "orders"), [(0, 1), (1, 1), (9, 1), (11, 0)])
+def test_who_is_aboard_and_tells_a_plan_that_rides_on_is_carried_on(told_of: int, orders: int) -> None:
+    """A robot that a power cut caught on the sill came back aboard and planned anew: it was let out time and again.
+
+    It has said of that plan only that it is told, as it stands where it did; by a word of a later plan, which was
+    missed, it may be anywhere in that.
+    """
+    one = lift(LiftPhase.LEAVING, Words(LEAVE, False, True, False, False, True, None))
+    leg = Leg(LegAction.RIDE, SHAFT, LEAVE, BOARD, Side.NEAR, 60_000)
+    one.fleet.mirror.on_progress(Progress(ROBOT, told_of, 3, SHAFT, LEAVE, 0, 0))
+    one.fleet.mirror.on_itinerary(Itinerary(ROBOT, 10, Grade.FIRM, Stamp(1, BAY, 1), (leg,)), NOW_US)
+    said = one.advance(NOW_US)
+    assert len([effect for effect in said if isinstance(effect, Actuate)]) == orders

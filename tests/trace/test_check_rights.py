@@ -119,8 +119,10 @@ def test_who_uses_an_old_journal_is_found(then: list[Message]) -> None:
         ([BusTime(1, 5_000_000)], 1),
         ([BusTime(1, 0)], 2),
         ([power_up(), BusTime(1, 3_000_000)], 2),
+        # A bus was dead for a while: two told the time meanwhile, and then all that they had said comes at once.
+        ([BusTime(1, 5_000_000), BusTime(2, 1_500_000), BusTime(1, 6_000_000), BusTime(2, 2_000_000)], 1),
     ],
-    ids=["held up", "stands still", "begins anew"],
+    ids=["held up", "stands still", "begins anew", "held up, of two"],
 )
 def test_a_word_of_the_time_that_was_held_up_begins_no_other_run(said: list[Message], runs: int) -> None:
     tape = Tape(one_alley()).say(1, grant(SLOT, 1, 1, MR1), BusTime(1, 1_000_000))

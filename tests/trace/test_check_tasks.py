@@ -1,5 +1,7 @@
 """Rules of the negotiation, of tasks and cars."""
 
+from dataclasses import replace
+
 import pytest
 
 from onboard.contract.codes import (
@@ -149,6 +151,19 @@ def test_a_call_whose_initiator_is_held_is_closed_when_it_goes_on() -> None:
         tape.say(second, held)
     assert tape.broken(36) == {}
     assert tape.broken(60) == {"calls-closed": 1}
+
+
+def test_a_call_whose_initiator_has_slept_is_closed_when_it_has_listened() -> None:
+    """A process that was stopped for minutes: it says that it is an obstacle first, and asks what it has missed."""
+    slept = Heartbeat(1, 1, 1, 0, 1, KindCode.COMPARTMENT, MachineState.OBSTACLE)
+    tape = tell(STORY[:3]).say(300, slept)
+    awake = replace(slept, state=MachineState.WORKING)
+    for second in range(302, 312, 2):
+        tape.say(second, awake)
+    assert "calls-closed" not in tape.broken(311)
+    for second in range(312, 316, 2):
+        tape.say(second, awake)
+    assert "calls-closed" in tape.broken(316)
 
 
 def test_a_call_whose_initiator_started_anew_is_over() -> None:

@@ -25,7 +25,7 @@ from onboard.core.effects import Effect, Record, Send
 from onboard.core.journal_records import records_in
 from onboard.core.motion_authority import authorised
 from onboard.core.negotiation import Awarded, AwardedAgain, NegotiationEvent, PreAssigned, Released
-from onboard.core.serial import from_bus_ms
+from onboard.core.serial import from_bus_ms, is_newer
 from onboard.systems.car_park.bay_memory import BayMemory
 from onboard.systems.car_park.lift_generation import LiftGeneration
 from onboard.systems.car_park.lift_steps import LIFT_TABLE, LiftDeed, LiftFinding, LiftPhase
@@ -401,7 +401,8 @@ class Lift:
         assert self.ride is not None
         robot = self.ride.robot
         itinerary, seen = self.fleet.mirror.itineraries.get(robot), self.fleet.mirror.progress.get(robot)
-        if itinerary is None or seen is None or seen.itinerary_version != itinerary.version:
+        if itinerary is None or seen is None or is_newer(seen.itinerary_version, itinerary.version, 8):
+            # Where it says that it is further on, its plan was missed; a plan told since begins where it is.
             return None
         leg = leg_in_hand(itinerary, seen)
         if leg is None or (leg.action, leg.track, leg.from_index) != (LegAction.RIDE, self.track, self.ride.leave):

@@ -4,9 +4,19 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import CallResult, Criterion, TaskPhase
+from onboard.contract.codes import CallResult, Criterion, MachineState, TaskPhase
 from onboard.contract.constants import NOBODY
-from onboard.contract.messages import Award, Bid, CallForProposals, Halted, LeftOut, Progress, Reference, TaskReport
+from onboard.contract.messages import (
+    Award,
+    Bid,
+    CallForProposals,
+    Halted,
+    Heartbeat,
+    LeftOut,
+    Progress,
+    Reference,
+    TaskReport,
+)
 from onboard.trace.check.event import Finding, LogEvent
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
@@ -118,14 +128,18 @@ class CallsClosed(_CallRule):
 
     def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
-        #: When a machine last said that it is held: it closes its calls once it goes on.
+        #: When a machine last said that it is held, or has slept: it closes its calls once it goes on.
         self._held_us: dict[int, int] = {}
         #: Calls that somebody is still to close, in their order.
         self._open: dict[tuple[int, int], CallSeen] = {}
 
     def handlers(self) -> Handlers:
         """Beside calls, machines that do nothing any more for a while."""
-        return {**super().handlers(), Halted: self._on_halted}
+        return {**super().handlers(), Halted: self._on_halted, Heartbeat: self._on_heartbeat}
+
+    def _on_heartbeat(self, event: LogEvent[Heartbeat]) -> None:
+        if event.message.state is MachineState.OBSTACLE:
+            self._held_us[event.message.sender] = event.time_us
 
     def _on_halted(self, event: LogEvent[Halted]) -> None:
         if event.message.sender == event.message.machine:

@@ -158,8 +158,8 @@ class Checks:
         self._last_us: int | None = None
         self._excused_us = 0
         self._clocks_until_us = 0
-        #: The newest bus time, us, and who was started since it told bus time last.
-        self._bus_time_us = 0
+        #: The newest bus time that each machine told, us, and who was started since it did last.
+        self._bus_time_us: dict[int, int] = {}
         self._started: set[int] = set()
         self._begin()
 
@@ -371,14 +371,14 @@ class Checks:
         """Whether bus time began anew, going back or standing still while the log goes on.
 
         A word of the same life that is late only was held up: with one other machine on the bus, and that one off,
-        nobody acknowledges frames, and the word waits until it is back.
+        nobody acknowledges frames, and the word waits until it is back. So do those of all, of a bus that was dead.
         """
         if isinstance(message, Heartbeat):
             if message.state is MachineState.STARTING:
                 self._started.add(message.sender)
             return False
-        before_us, offset_us = self._bus_time_us, self._picture.offset_us
-        self._bus_time_us = message.bus_time_us
+        before_us, offset_us = self._bus_time_us.get(message.sender, -1), self._picture.offset_us
+        self._bus_time_us[message.sender] = message.bus_time_us
         is_held_up = message.bus_time_us > before_us and message.sender not in self._started
         self._started.discard(message.sender)
         is_late = offset_us is not None and time_us - message.bus_time_us - offset_us > BACK_US
