@@ -59,7 +59,8 @@ export class Calls extends Fleet {
     if (word.name === "ItineraryLeg" && !this.sets.has(key)) return;
     const isWhole = (words) => Object.keys(words).length > words.head.legs;
     const { head, ...legs } = this.#collect(key, word.leg ?? "head", word, isWhole) ?? {};
-    if (!head || head.grade === "TENTATIVE" || (peer.plan && !newer(head.version, peer.plan.version, 8))) return;
+    if (!head || head.grade === "TENTATIVE" || !this.#isNews(head.version, peer)) return;
+    peer.wasSilent = false;
     const award = this.near(head.stamp_award_ms);
     const steps = [];
     for (const { action, track, side, from_index: from, to_index: to, end_ms } of Object.values(legs)) {
@@ -73,6 +74,10 @@ export class Calls extends Fleet {
     peer.plan = windows ? { version: head.version, stamp, steps, windows, leg: 0 } : undefined;
     this.compare();
   }
+
+  /** P1: of who was silent the next plan counts whatever its version. */
+  #isNews = (version, { plan, wasSilent }) =>
+    !plan || newer(version, plan.version, 8) || (wasSilent && version !== plan.version);
 
   /** The other side of a linked end that a leg goes over. */
   #beyond(track, index, before) {
@@ -383,9 +388,10 @@ export class Calls extends Fleet {
     const car = reference(car_origin, car_number);
     const known = this.cars.get(car);
     const { holder } = this.tokens.get(carKey(car));
+    if (known?.by === sender) known.lacks = 0;
     const isOld = known && (known.version === version ? known.by !== sender : !newer(version, known.version, 16));
     if (isOld || holder === this.node || (known && known.by !== sender && holder !== sender)) return;
-    this.cars.set(car, { station, by: sender, version, wheelbase });
+    this.cars.set(car, { station, by: sender, version, wheelbase, lacks: 0 });
     if (known?.station !== station) this.beatSoon();
   }
 

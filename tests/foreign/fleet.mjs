@@ -137,7 +137,7 @@ export class Fleet {
     this.listen();
     for (const one of this.others.filter(({ heard }) => heard > -Infinity)) {
       this.ask(one, 0, this.now);
-      one.heard = this.now - 1;
+      Object.assign(one, { heard: this.now - 1, wasSilent: true });
     }
   }
 
@@ -260,6 +260,11 @@ export class Fleet {
 
   #isHeard(peer) {
     if (peer.heard === -Infinity) this.ask(peer, 0, this.now + 400 * MS + 5 * MS * this.rank);
+    // J6, P1: it could say nothing, and made plans that nobody heard.
+    else if (!this.lives(peer)) {
+      const movedUs = peer.movedUs + this.now - peer.heard;
+      Object.assign(peer, { movedUs, waitsUs: this.now, wasSilent: true });
+    }
     peer.heard = this.now;
   }
 
@@ -282,6 +287,11 @@ export class Fleet {
     const isForAll = whom === 0 && (askers === 0 || Math.floor(askers / 2 ** (this.rank % 48)) % 2 === 1);
     peer.question = undefined;
     if (isForAll || whom === this.node) Object.assign(peer, { hasAnswered: true, isAsked: false });
+    // C2: a car that it has not named in three answers has left.
+    if (this.isObstacle(peer) || peer.beat.state === "STARTING") return;
+    for (const [car, one] of this.cars) {
+      if (one.by === peer.node && one.station !== OUTSIDE && ++one.lacks >= 3) this.cars.delete(car);
+    }
   }
 
   onSyncRequest({ sender, whom, boot_before }, peer) {

@@ -321,7 +321,7 @@ class Desk:
         free = len(self.candidates(now_us))
         taken = {box for box, until_us in self.taken.items() if until_us > now_us}
         taken |= {transport.box for transport in self.orders.open.values()}
-        taken |= {box for box in range(1, len(self.site.boxes) + 1) if not self._station_of(box)}
+        taken |= self._in_hands()
         while len(self.calls) < free:
             transport = self.orders.next(self.mirror, taken)
             if transport is None:
@@ -331,6 +331,15 @@ class Desk:
         if self.orders.missions or self.orders.open:
             self._look_at_us = self._look_at_us or now_us + LOOK_US
         return effects
+
+    def _in_hands(self) -> set[int]:
+        """Boxes that vehicles have the rights to and nobody can fetch; few, and looked for whenever one may be free."""
+        beliefs, vehicles, desk = self.fleet.tokens.beliefs, self.site.vehicles, self.site.desk
+        keys = [
+            key for known in (beliefs.verified, beliefs.hints) for key, one in known.items() if one.holder in vehicles
+        ]
+        boxes = {number & 0xFFFF for kind, number in keys if kind is TokenKind.CAR and number >> 16 == desk}
+        return {box for box in boxes if 0 < box <= len(self.site.boxes) and not self._station_of(box)}
 
     def _station_of(self, box: int) -> int:
         """Where a box stands for anybody to fetch; 0 while the right to it is with who has not told where it is.

@@ -1,4 +1,6 @@
-"""Another robot drives slower than it could, and then elsewhere: duties P4 and P8 of docs/protocol.md."""
+"""Another robot drives slower than it could, elsewhere, and is not heard: duties P1, P4, P8 of docs/protocol.md."""
+
+from dataclasses import replace
 
 from onboard.conform.cast import Cast
 from onboard.conform.checks import Check
@@ -26,6 +28,34 @@ SLOW = (
         "request-names-who-leads-elsewhere", "K9", "`predecessor` who passes right before me by the plans that I know"
     ),
 )
+
+
+SILENT = (
+    Check(
+        "plan-of-who-was-silent-counts",
+        "P1",
+        "silent for `T_silent` the next plan counts whatever its version",
+    ),
+)
+
+
+def silent(stage: Stage, cast: Cast) -> Play:
+    """Another robot is not heard for a while, and makes more plans meanwhile than their versions tell apart."""
+    rival = Rival(stage, cast, Desk(stage, cast, 0x1F00, 2_500))
+    rival.stands()
+    yield from stage.pause(3.0)
+    part, plan = cast.parts[rival.node], rival.plan
+    part.is_there = part.answers = False
+    yield from stage.pause(9.0)
+    cast.plans[rival.node] = replace(plan, version=(plan.version + 199) % 255 + 1)
+    part.is_there = part.answers = True
+    cast.beat(part)
+    stage.say(rival.plan)
+    right = cast.digest()
+    beat = yield from stage.hears(Heartbeat, lambda one: one.mirror_digest == right, 5.0)
+    stage.judge("plan-of-who-was-silent-counts", beat, f"never told the digest {right:04X}", stage.last(Heartbeat))
+    rival.stands()
+    yield from stage.pause(5.0)
 
 
 def slow(stage: Stage, cast: Cast) -> Play:
@@ -75,4 +105,7 @@ def _track(stage: Stage) -> int:
     return 0 if place is None else int(place.message.track)
 
 
-SCENES = (Scene("a slow robot", SLOW, slow, needs_car=True, needs_rival=True),)
+SCENES = (
+    Scene("a slow robot", SLOW, slow, needs_car=True, needs_rival=True),
+    Scene("a robot that was silent", SILENT, silent, needs_rival=True),
+)
