@@ -30,13 +30,8 @@ SLOW = (
 )
 
 
-SILENT = (
-    Check(
-        "plan-of-who-was-silent-counts",
-        "P1",
-        "silent for `T_silent` the next plan counts whatever its version",
-    ),
-)
+_COUNTS = "silent for `T_silent` the next plan counts whatever its version"
+SILENT = (Check("plan-of-who-was-silent-counts", "P1", _COUNTS),)
 
 
 def silent(stage: Stage, cast: Cast) -> Play:
