@@ -22,6 +22,8 @@ from onboard.work.order_life import NEXT, OrderEvent, OrderState, WorkOrder
 #: After power-up a desk listens so long before it calls, us: who has an order in hand says so with its first signs of
 #: life.
 LISTEN_US = 3_000_000
+#: A desk that hears nobody at all calls again after this, us: somebody who mends a cable takes longer.
+CUT_OFF_US = 10_000_000
 #: The counter is told how an order stands this often, us (dbc/cell.dbc, dbc/graph.dbc, dbc/turning.dbc).
 ANSWER_US = 2_000_000
 
@@ -143,6 +145,10 @@ class OrderDesk(ABC, Generic[AnOrder]):
         if event.winner:
             return self._goes_to(order, OrderEvent.WON, event.winner, now_us, event.call.call)
         refused = event.result is CallResult.REFUSED
+        if refused and not self.fleet.mirror.alive(now_us):
+            # Cut off from everybody: nobody has refused it.
+            order.calls = 0
+            return self.put(order, OrderEvent.NOT_WON, now_us, CUT_OFF_US)
         if refused and self.max_calls is not None and order.calls >= self.max_calls:
             return self.put(order, OrderEvent.HOPELESS, now_us)
         return self.put(order, OrderEvent.NOT_WON, now_us, self.call_again_us if refused else 0)

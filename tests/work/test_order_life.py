@@ -6,9 +6,19 @@ from itertools import product
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.contract.codes import CallResult, KindCode, Reason, TaskPhase
-from onboard.contract.messages import Award, Reference, TaskReport
+from onboard.contract.codes import (
+    CONTRACT_VERSION,
+    CallResult,
+    Criterion,
+    KindCode,
+    MachineState,
+    Operation,
+    Reason,
+    TaskPhase,
+)
+from onboard.contract.messages import Award, CallForProposals, Heartbeat, Reference, TaskReport
 from onboard.core.effects import Record, Send
+from onboard.core.negotiation import Closed
 from onboard.holon.holon import Holon
 from onboard.systems.cell.contracts import Goal
 from onboard.systems.cell.desk import GoalOrder
@@ -17,7 +27,7 @@ from onboard.systems.graph.desk import Visits
 from onboard.systems.registry import factory_for
 from onboard.systems.turning.desk import BatchOrder
 from onboard.systems.turning.lathe import TurningJob
-from onboard.work.order_desk import OrderDesk
+from onboard.work.order_desk import CUT_OFF_US, OrderDesk
 from onboard.work.order_life import NEXT, OVER, OrderEvent, OrderState, WorkOrder
 
 TASK = Reference(9, 1)
@@ -82,3 +92,23 @@ def test_nothing_follows_what_is_over_and_all_else_comes_to_an_end() -> None:
         while more := {to for (from_, _), to in NEXT.items() if from_ in reached} - reached:
             reached |= more
         assert OrderState.DONE in reached or state is OrderState.REFUSED
+
+
+@pytest.mark.parametrize("system", ["cell", "turning"])
+@pytest.mark.parametrize("is_heard", [True, False])
+def test_who_hears_nobody_at_all_refuses_nobody(system: str, is_heard: bool) -> None:
+    """A desk's cable was cut for two minutes, and its customers were sent away: no machine had refused anything."""
+    desk, order = desk_of(system), type(ORDERS[system])(**vars(ORDERS[system]))
+    desk.come_in(order, NOW_US)
+    machine = next(one for one in desk.fleet.site.machines.values() if one.kind is desk.takers)
+    if is_heard:
+        desk.fleet.mirror.on_heartbeat(
+            Heartbeat(machine.node_id, CONTRACT_VERSION, 0, 0, 1, machine.kind, MachineState.IDLE), NOW_US
+        )
+    order.state, order.calls = OrderState.CALLED, desk.max_calls or 0
+    call = CallForProposals(
+        desk.fleet.node_id, 7, TASK, Operation.MACHINE, machine.kind, Criterion.MONEY, 5, 0, 0, 0, 0, Reference(0, 0), 0
+    )
+    desk.negotiated(Closed(call, 0, CallResult.REFUSED, Reason.NO_BID, 5), NOW_US)
+    assert order.state is (OrderState.REFUSED if is_heard else OrderState.HEARD)
+    assert is_heard or order.due_us == NOW_US + CUT_OFF_US

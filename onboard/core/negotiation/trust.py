@@ -1,7 +1,7 @@
 """Who is left out of an initiator's calls, because it won tasks and did not do them (docs/protocol.md, A8).
 
-Who forfeits a task is out of its next calls; who forfeits several in a row, with nothing done in between, is out of all
-calls of this initiator, each time for four times as long. A task that is done ends that, or a restart of the initiator.
+Who forfeits a task is out of its next calls; who does so several times, with nothing done in between, is out of all of
+this initiator, each time for four times as long; a cut cable is one time. A task that is done ends that, or a restart.
 """
 
 from collections.abc import Callable, Iterator
@@ -18,8 +18,7 @@ OUT_OF_TASK_US = 120_000_000
 OUT_OF_ALL_US = 120_000_000
 #: No longer than this, us: a machine that was repaired needs nobody to say so.
 MOST_OUT_US = 3_600_000_000
-#: A task ended this much later than its winner bid counts against the winner where the others keep their dates, ms.
-#: Customers and traffic make half a minute.
+#: So much later than was bid counts against the winner where others keep their dates, ms (customers, traffic: 30 s).
 LATE_MS = 60_000
 #: Weight of the newest task in a machine's mean lateness, one in so many: one bad task does not decide, four do.
 MEAN_OF = 4
@@ -30,9 +29,10 @@ MOST_TASKS = 64
 
 @dataclass
 class _Record:
-    """What one machine's awards came to: fails in a row, until when it is out, and how late it is in the mean."""
+    """What one machine's awards came to: fails in a row, when last, until when it is out, how late in the mean."""
 
     fails: int = 0
+    failed_us: int | None = None
     out_until_us: int = 0
     late_ms: int | None = None
 
@@ -99,7 +99,7 @@ class Trust:
 
     def _fail(self, node: int, now_us: int) -> None:
         record = self._records.setdefault(node, _Record())
-        record.fails += 1
+        record.fails, record.failed_us = record.fails + (record.failed_us != now_us), now_us
         if record.fails > 1:
             record.out_until_us = now_us + min(MOST_OUT_US, OUT_OF_ALL_US << 2 * (record.fails - 2))
 
