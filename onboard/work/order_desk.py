@@ -126,15 +126,12 @@ class OrderDesk(ABC, Generic[AnOrder]):
         if machine is None or machine.kind is not self.takers:
             self.fleet.drops[Reason.NOT_OF_KIND] += 1
             return []
-        if order.is_over:
-            # Who missed that it was taken back would carry out all the same what its customer was refused.
-            is_lost = order.state is OrderState.REFUSED or order.winner != message.sender
-            is_claim = is_lost and message.phase is TaskPhase.AWARDED
-            return self.fleet.winners.remind(order.task, message.sender) if is_claim else []
-        if self._may_say(order, message.sender, now_us):
+        if not order.is_over and self._may_say(order, message.sender, now_us):
             return self._on_report(order, message, now_us)
-        # Who has lost it, or never won it, says nothing that counts.
-        is_claim = message.phase is TaskPhase.AWARDED and not order.named
+        # Who has lost it, or never won it, says nothing that counts. It hears so where it claims it: who missed that it
+        # was taken back would carry out all the same what its customer was refused.
+        is_its = order.state is OrderState.DONE and order.winner == message.sender
+        is_claim = message.phase is TaskPhase.AWARDED and not is_its and (order.is_over or not order.named)
         return self.fleet.winners.remind(order.task, message.sender) if is_claim else []
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:

@@ -36,7 +36,6 @@ from tests.kinds.board import taking_part
 from tests.kinds.test_changed_places import BAY, CAR, FAST, FIRST, OTHER, SECOND, SLOW, WHEELBASE_MM, Bay
 from tests.sites import one_floor
 
-NUMBER = car_token(*CAR).number
 #: Of the site's second compartment.
 CALLER = 2
 THEIRS, PARKED, FETCHED = Reference(CALLER, 1), Reference(CALLER, 1), Reference(CALLER, 2)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, Reason
-from onboard.contract.messages import CarAt, Heartbeat, Itinerary, Message, Progress, SyncDone
+from onboard.contract.messages import CarAt, Heartbeat, Message, Progress, SyncDone
 from onboard.core.mirror import MISSED_HEARTBEATS
 from onboard.holon.holon import Holon
 from onboard.ways.mirror import WayMirror, way_mirror
@@ -32,25 +32,21 @@ def planned(holon: Holon) -> int:
     return holon.mirror.itineraries[ROBOT].version
 
 
-def firm(version: int) -> Itinerary:
-    return goes(version)
-
-
 @pytest.mark.parametrize("missed", [100, 127, 128, 200, 254])
 def test_however_many_plans_were_missed_the_next_one_counts(missed: int) -> None:
     """Versions have 8 bits: after nine minutes of plans that a cut cable kept from it a new one looked older."""
-    bay = hears(BAY, BEAT, firm(4))
+    bay = hears(BAY, BEAT, goes(4))
     lives(bay, SILENT_US)
     version = (4 + missed) % 256 or 1
-    for word in (BEAT, firm(version)):
+    for word in (BEAT, goes(version)):
         bay.receive(word, SILENT_US + 1)
     assert planned(bay) == version
-    bay.receive(firm(version - 1 or 255), SILENT_US + 2)
+    bay.receive(goes(version - 1 or 255), SILENT_US + 2)
     assert planned(bay) == version, "and from then on the newest"
 
 
 def test_who_was_heard_all_the_time_is_judged_by_versions() -> None:
-    bay = hears(BAY, BEAT, firm(4), firm(200))
+    bay = hears(BAY, BEAT, goes(4), goes(200))
     assert planned(bay) == 4
 
 
