@@ -14,7 +14,7 @@ from onboard.contract.terminal_device import MissionKey
 from onboard.systems.terminal.generation import VehicleGeneration
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.missions import MissionBook, types_of
-from onboard.systems.terminal.plan import ActionPlan, ActionStep, PlanReader, to_frames
+from onboard.systems.terminal.plan import NOBODY_BEFORE, ActionPlan, ActionStep, PlanReader, to_frames
 from onboard.systems.terminal.search import BoxTransport, PlanSearch
 from onboard.systems.terminal.site import StationKind
 from onboard.systems.terminal.traffic import Traffic
@@ -149,6 +149,33 @@ def test_a_box_is_put_on_a_stack_after_all_that_are_fetched_from_it(first: str) 
     for owner, name, target in wanted if first == "fetches" else reversed(wanted):
         plan(picture, owner, name, target)
     assert stack_list(picture, "S3") == [11, 14]
+
+
+@pytest.mark.parametrize("begun", [0, 300 * SECOND])
+@pytest.mark.parametrize("over", [5, 6], ids=["to dock", "docked"])
+def test_who_stands_at_a_stack_for_a_box_under_one_that_another_fetches_leaves_it_and_comes_back(
+    begun: int, over: int
+) -> None:
+    """Power was cut while both came near, and the wrong one came first (campaign terminal, outages, seed 46)."""
+    picture = mirror(11)
+    plan(picture, 11, "B3", "S1")
+    traffic = picture.traffic
+    for step in range(over):
+        traffic.report(11, 1, step, (step + 1) * SECOND)
+    now = 400 * SECOND
+    upper = traffic.plans[11].plan
+    steps = tuple(step._replace(after=NOBODY_BEFORE) for step in upper.steps)
+    load = upper.loads[0]._replace(box=box("B4"), task=Reference(1, 4))
+    traffic.take_up(replace(upper, owner=12, begin=begun, steps=steps, loads=(load,)), now)
+    assert [(one.owner, one.why) for one in traffic.violations(now)] == [(11, "plans wait for each other")]
+    found = VehicleGeneration(SITE, SITE.machines[11], picture).again(now, version=2)
+    assert found is not None
+    assert [step.action.name for step in found.steps][:5] == ["UNDOCK", "GOTO", "DOCK", "PICK_UP", "UNDOCK"]
+    assert entities(found)[:3] == ["S2", "A4", "S2"]
+    assert [one.pick for one in found.loads] == [3]
+    picture.take_up(found, now)
+    assert not traffic.violations(now)
+    assert stack_list(picture, "S2") == [11, 12, 11]
 
 
 def test_nobody_bids_for_a_box_that_is_in_a_plan() -> None:

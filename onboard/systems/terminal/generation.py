@@ -4,11 +4,12 @@ from dataclasses import dataclass, field, replace
 
 from onboard.contract.codes import Operation
 from onboard.contract.messages import CallForProposals
+from onboard.contract.terminal import Action
 from onboard.core.negotiation import CallKey, Proposal
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine
 from onboard.systems.terminal.mirror import TerminalMirror
-from onboard.systems.terminal.plan import ActionPlan, Load
+from onboard.systems.terminal.plan import ActionPlan, ActionStep, Load
 from onboard.systems.terminal.routes import carry_us, free_flow_us, least_end_ms
 from onboard.systems.terminal.search import BoxTransport, FoundPlan, PlanSearch, remaining
 from onboard.systems.terminal.site import EntityKind, Terminal
@@ -88,16 +89,17 @@ class VehicleGeneration:
     def again(self, now_us: int, *, version: int) -> ActionPlan | None:
         """The loads of the plan in hand planned anew from the step in hand, around everybody's plans; None if no way.
 
-        What is done at a station is ended there first.
+        What is done at a station is ended there first; who stands at a stack too early leaves it, and comes back.
         """
         node, traffic = self.machine.node_id, self.mirror.traffic
         left = remaining(traffic, node, now_us)
         if left is None or not left.loads:
             return None
         at_station = self.site.entities[left.steps[0].entity].kind is EntityKind.STATION
-        kept, loads = _handled(left) if at_station else (None, left.loads)
+        kept, loads = self._at_station(left, now_us) if at_station else (None, left.loads)
         here = left.steps[0].entity if not at_station else self.site.entities[left.steps[0].entity].area
-        count = len(kept.steps) if kept is not None else 0
+        # What is picked up before it undocks, the last of the steps that come first.
+        count = len(kept.steps) - 1 if kept is not None else 0
         began = kept.end if kept is not None else left.begin
         # Where others will be without what is planned now.
         alone = copy_of(traffic)
@@ -106,27 +108,30 @@ class VehicleGeneration:
         search = self.search(now_us, alone)
         for load in loads:
             source = left.steps[load.pick].entity if load.pick < len(left.steps) else 0
-            if at_station and load.pick < count:
+            if load.pick < count:
                 source = 0
             job = BoxTransport(load.box, load.task, source, left.steps[load.put].entity, traffic.date_of(load))
             found = search.best(here, began, job, version=version, kept=kept)
             if found is None:
                 return None
             kept = found.plan
-            if at_station and load.pick < count:
+            if load.pick < count:
                 # It is picked up in the steps that are ended first.
                 kept = replace(kept, loads=(*kept.loads[:-1], kept.loads[-1]._replace(pick=load.pick)))
             began = kept.end
             here = self.site.entities[found.plan.steps[-1].entity].area
         return kept
 
-
-def _handled(left: ActionPlan) -> tuple[ActionPlan, tuple[Load, ...]]:
-    """The steps at the station in hand as a plan that comes first, and the loads that are not put down by then."""
-    count = left.visits()[0][1] + 1
-    loads = tuple(load for load in left.loads if load.put >= count)
-    done = tuple(load for load in left.loads if load.put < count)
-    return ActionPlan(left.owner, left.version, left.begin, left.steps[:count], done), loads
+    def _at_station(self, left: ActionPlan, now_us: int) -> tuple[ActionPlan, tuple[Load, ...]]:
+        """The steps at the station in hand as a plan that comes first, and the loads that are not put down by then."""
+        if self.mirror.traffic.stands_too_early(left.owner):
+            here, undock_us = left.steps[0], self.site.undock_us
+            out = ActionStep(Action.UNDOCK, here.entity, undock_us, max(now_us, left.begin) + undock_us, here.after)
+            return ActionPlan(left.owner, left.version, left.begin, (out,)), left.loads
+        count = left.visits()[0][1] + 1
+        loads = tuple(load for load in left.loads if load.put >= count)
+        done = tuple(load for load in left.loads if load.put < count)
+        return ActionPlan(left.owner, left.version, left.begin, left.steps[:count], done), loads
 
 
 def job_of(mirror: TerminalMirror, call: CallForProposals) -> BoxTransport:

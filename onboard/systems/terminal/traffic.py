@@ -56,6 +56,14 @@ class Owned:
         return self.current >= len(self.plan.steps)
 
 
+class PlannedPick(NamedTuple):
+    """Step ``step`` of a machine's plan picks a box up at a station."""
+
+    owner: int
+    step: int
+    station: int
+
+
 class Dates(NamedTuple):
     """Earliest dates of all nodes, and the machines whose plans contradict each other, so that there are none."""
 
@@ -285,20 +293,33 @@ class Traffic:
 
     def _stack_edges(self) -> list[DateConstraint]:
         """Upper box first (M17)."""
+        gap = self.site.gap_us
+        return [
+            DateConstraint(StepDate(upper.owner, upper.step + 1), StepDate(lower.owner, lower.step), gap)
+            for upper, lower in self._stacked()
+        ]
+
+    def _stacked(self) -> list[tuple[PlannedPick, PlannedPick]]:
+        """Each two boxes of one stack that plans are to fetch, the upper one first."""
         picks = {}
         for owner, owned in self.plans.items():
             for load in owned.plan.loads:
                 if owned.current <= load.pick < len(owned.plan.steps):
-                    picks[load.box] = (owner, load.pick, owned.plan.steps[load.pick].entity)
-        edges = []
-        for upper, (owner, step, station) in picks.items():
-            if self.site.entities[station].station is not StationKind.STACK:
+                    picks[load.box] = PlannedPick(owner, load.pick, owned.plan.steps[load.pick].entity)
+        found = []
+        for box, upper in picks.items():
+            if self.site.entities[upper.station].station is not StationKind.STACK:
                 continue
-            for lower in self.below.get(upper, ()):
-                if lower in picks and picks[lower][2] == station:
-                    other, pick, _ = picks[lower]
-                    edges.append(DateConstraint(StepDate(owner, step + 1), StepDate(other, pick), self.site.gap_us))
-        return edges
+            for lower in self.below.get(box, ()):
+                if lower in picks and picks[lower].station == upper.station:
+                    found += [(upper, picks[lower])]
+        return found
+
+    def stands_too_early(self, owner: int) -> bool:
+        """Whether a machine stands at a stack for a box that is under one that another's plan fetches there first."""
+        owned = self.plans[owner]
+        last = next(last for _, last in owned.plan.visits() if last >= owned.current)
+        return any(lower.owner == owner != upper.owner and lower.step <= last for upper, lower in self._stacked())
 
     # --- what follows ------------------------------------------------------------------------------------------
 
@@ -331,8 +352,12 @@ class Traffic:
         return found
 
     def _breaker(self, circle: frozenset[int], now: int) -> int:
-        """Whose plan is to be made anew to end a circle: the latest without which there is none, else the latest."""
-        ranked = sorted(circle, key=lambda owner: (self.plans[owner].plan.begin, owner), reverse=True)
+        """Whose plan is to be made anew to end a circle: the latest without which there is none, else the latest.
+
+        Before them who stands where another is to fetch first: no plan of that one's ends the circle.
+        """
+        begun = {owner: self.plans[owner].plan.begin for owner in circle}
+        ranked = sorted(circle, key=lambda owner: (self.stands_too_early(owner), begun[owner], owner), reverse=True)
         for owner in ranked:
             trial, owned = copy_of(self), self.plans[owner]
             _, last = next(visit for visit in owned.plan.visits() if visit[1] >= owned.current)
