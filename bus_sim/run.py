@@ -10,6 +10,7 @@ from functools import partial
 from hashlib import blake2s
 from typing import Any, Generic, Protocol, TypeVar
 
+from bus_sim.can.error_frames import ErrorsHeard
 from bus_sim.can.faults import InjectedFault
 from bus_sim.can.medium import Medium, Tap
 from bus_sim.can.node import SimulatedBus
@@ -235,8 +236,8 @@ class BusRun(Generic[PlantT]):
                     observer(word, time_us)
 
         if self.writer is not None:
-            self.fleet.tap(write, errors=True)
-        self.fleet.tap(self.seals.proved(on_fleet), errors=False)
+            self.fleet.tap(write)
+        self.fleet.tap(self.seals.proved(on_fleet), errors=ErrorsHeard.NONE)
         if self.writer is not None and self.options.devices:
             for node_id, medium in self.devices.items():
                 medium.tap(self._device_tap(self.site.machines[node_id].name))

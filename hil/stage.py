@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+from bus_sim.can.error_frames import ErrorsHeard
 from bus_sim.run import FLEET, BusRun
 from bus_sim.systems.stage import SystemStage
 from hil.device import Device
@@ -56,7 +57,7 @@ class TestBench:
             if message is not None:
                 self._hear(time_us, machine.name, message)
 
-        simulation.devices[machine.node_id].tap(on_device, errors=False)
+        simulation.devices[machine.node_id].tap(on_device, errors=ErrorsHeard.NONE)
 
     # --- what happens ------------------------------------------------------------------------------------------
 

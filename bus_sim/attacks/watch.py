@@ -8,6 +8,7 @@ from collections.abc import Collection
 from typing import Any, Final
 
 from bus_sim.campaign.recovery import ADMITTED
+from bus_sim.can.error_frames import ErrorsHeard
 from bus_sim.faults.injection import Injection
 from bus_sim.systems.stage import SystemStage
 from onboard.contract.codes import MachineState, Reason
@@ -48,7 +49,7 @@ class AttackWatch:
         self._stage = stage
         self._decode = stage.run.codecs.fleet.decode_part
         self._beat_us = stage.run.site.timing.heartbeat_us
-        stage.run.fleet.tap(self._on_frame, errors=False)
+        stage.run.fleet.tap(self._on_frame, errors=ErrorsHeard.NONE)
         stage.run.plant.timers.call_at(self._end_us, self._look)
 
     def is_over(self, now_us: int) -> bool:

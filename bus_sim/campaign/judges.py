@@ -7,6 +7,7 @@ neither finds anything.
 from functools import partial
 from typing import Any
 
+from bus_sim.can.error_frames import ErrorsHeard
 from bus_sim.can.medium import Medium, Tap
 from bus_sim.run import FLEET, BusRun
 from onboard.core.frame import Frame
@@ -28,7 +29,7 @@ class Judges:
 
     def _listen(self, channel: str, medium: Medium) -> None:
         hear: Tap = partial(self._hear, channel)
-        medium.tap(self._seals.proved(hear) if channel == FLEET else hear, errors=False)
+        medium.tap(self._seals.proved(hear) if channel == FLEET else hear, errors=ErrorsHeard.NONE)
 
     def _hear(self, channel: str, frame: Frame, time_us: int, _: str) -> None:
         self._checks.feed(time_us, channel, frame)

@@ -22,6 +22,17 @@ _LOCATION_ACK_SLOT: Final = 0x19
 _LARGEST_BYTE: Final = 0xFF
 
 
+class ErrorsHeard(Enum):
+    """Which error frames a monitor sees: of Linux's drivers those that change a counter (can.rst, berr-reporting off).
+
+    A lone node counts no attempt any more once it is error-passive, and makes thousands of them each second.
+    """
+
+    NONE = 0
+    COUNTED = 1
+    EVERY = 2
+
+
 class BusError(Enum):
     """What went wrong on the wire; the value is error type and location (``data[2]``, ``data[3]``)."""
 

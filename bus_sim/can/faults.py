@@ -193,12 +193,15 @@ class FaultInjector:
         self._receivers = frozenset(fault.receivers)
         self._wanted_id = fault.id_value & fault.id_mask
 
+    def is_at_work(self, time_us: int) -> bool:
+        """Whether frames that start at ``time_us`` may be struck."""
+        fault = self.fault
+        return fault.from_us <= time_us and (fault.until_us is None or time_us < fault.until_us)
+
     def concerns(self, frame: Frame, time_us: int) -> bool:
         """Whether this frame may be struck; to be asked once for each frame, as matches are counted."""
         fault = self.fault
-        if frame.arbitration_id & fault.id_mask != self._wanted_id or time_us < fault.from_us:
-            return False
-        if fault.until_us is not None and time_us >= fault.until_us:
+        if frame.arbitration_id & fault.id_mask != self._wanted_id or not self.is_at_work(time_us):
             return False
         if fault.extended is not None and frame.is_extended is not fault.extended:
             return False

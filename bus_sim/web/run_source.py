@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from datetime import datetime
 from typing import Any
 
+from bus_sim.can.error_frames import ErrorsHeard
 from bus_sim.can.faults import FaultKind, InjectedFault
 from bus_sim.can.medium import Tap
 from bus_sim.run import BusRun
@@ -51,7 +52,7 @@ class RunSource:
         run.observers.append(self.picture.feed)
         run.fleet.tap(self._count)
         for node, medium in run.devices.items():
-            medium.tap(self._device_tap(node), errors=False)
+            medium.tap(self._device_tap(node), errors=ErrorsHeard.NONE)
 
     def _count(self, frame: Frame, time_us: int, _sender: str) -> None:
         self.picture.count_frame(frame)

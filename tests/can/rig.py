@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Sequence
 
+from bus_sim.can.error_frames import ErrorsHeard
 from bus_sim.can.faults import InjectedFault
 from bus_sim.can.medium import Medium
 from bus_sim.can.node import AcceptanceFilter, NodeOptions, SimulatedBus
@@ -29,7 +30,9 @@ class Rig:
         self.log: list[tuple[int, Frame, str]] = []
         self.heard: dict[str, list[Heard]] = {}
         self.confirmed: dict[str, list[Heard]] = {}
-        self.medium.tap(lambda frame, time_us, sender: self.log.append((time_us, frame, sender)))
+        self.medium.tap(
+            lambda frame, time_us, sender: self.log.append((time_us, frame, sender)), errors=ErrorsHeard.EVERY
+        )
 
     def node(
         self,

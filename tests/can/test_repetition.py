@@ -7,6 +7,8 @@ from functools import partial
 
 import pytest
 
+from bus_sim.can.error_frames import ErrorsHeard
+from bus_sim.can.faults import FaultKind, InjectedFault
 from bus_sim.can.medium import Medium
 from bus_sim.can.node import NodeOptions, SimulatedBus
 from bus_sim.can.statistics import BusStatistics
@@ -25,10 +27,15 @@ class Day:
         self.seen: list[object] = []
         self.loop = VirtualTimeLoop()
         chance = random.Random(seed)
-        self.medium = Medium(self.loop, bit_rate=chance.choice((10_000, 83_333, 125_000, 500_000, 1_000_000)))
+        bit_rate = chance.choice((10_000, 83_333, 125_000, 500_000, 1_000_000))
+        struck_us = sorted(chance.sample(range(DAY_US), 2))
+        strikes = InjectedFault(FaultKind.CORRUPTION, from_us=struck_us[0], until_us=struck_us[1], probability=0.5)
+        self.medium = Medium(self.loop, bit_rate=bit_rate, faults=[strikes] if seed % 2 else [])
         if every_error:
-            self.medium.tap(lambda _frame, _time_us, _sender: None)
-        self.medium.tap(lambda frame, time_us, sender: self.note(sender, "tap", frame, time_us), errors=False)
+            self.medium.tap(lambda _frame, _time_us, _sender: None, errors=ErrorsHeard.EVERY)
+        self.medium.tap(
+            lambda frame, time_us, sender: self.note(sender, "tap", frame, time_us), errors=ErrorsHeard.NONE
+        )
         self.nodes: dict[str, SimulatedBus] = {}
         self.leaving: list[asyncio.Task[None]] = []
         for number in range(chance.randrange(10, 60)):
@@ -114,8 +121,8 @@ def moment(when_us: int, *, leaves: bool, every_error: bool) -> tuple[list[objec
     loop = VirtualTimeLoop()
     medium = Medium(loop, bit_rate=1_000_000)
     heard: list[object] = []
-    medium.tap(lambda *_: None, errors=every_error)
-    medium.tap(lambda *frame: heard.append(frame), errors=False)
+    medium.tap(lambda *_: None, errors=ErrorsHeard.EVERY if every_error else ErrorsHeard.COUNTED)
+    medium.tap(lambda *frame: heard.append(frame), errors=ErrorsHeard.NONE)
     sender = medium.attach("a")
     sender.send(std(0x55))
 
@@ -129,3 +136,16 @@ def moment(when_us: int, *, leaves: bool, every_error: bool) -> tuple[list[objec
     loop.run_until_complete(asyncio.sleep(0.005))
     loop.close()
     return heard, medium.statistics()
+
+
+def test_a_log_has_what_a_lone_node_counts_and_not_its_attempts_of_an_hour() -> None:
+    loop = VirtualTimeLoop()
+    medium = Medium(loop)
+    heard: list[Frame] = []
+    medium.tap(lambda frame, _time_us, _sender: heard.append(frame))
+    medium.attach("a").send(std(0x55))
+    loop.run_until_complete(asyncio.sleep(3600))
+    loop.close()
+    assert [frame.data[6] for frame in heard] == list(range(8, 129, 8))
+    assert medium.statistics().error_frames > 10_000_000
+    assert loop.events < 100

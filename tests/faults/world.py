@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 
+from bus_sim.can.error_frames import ErrorsHeard
 from bus_sim.faults.arm import arm
 from bus_sim.faults.bus import frame_faults
 from bus_sim.faults.injection import parse_injection
@@ -79,8 +80,8 @@ async def _watch(
         if message is not None:
             seen.desk.append(message)
 
-    simulation.devices[11].tap(on_device, errors=False)
-    simulation.devices[1].tap(on_desk, errors=False)
+    simulation.devices[11].tap(on_device, errors=ErrorsHeard.NONE)
+    simulation.devices[1].tap(on_desk, errors=ErrorsHeard.NONE)
     simulation.plant.street.add_all(stays(*[(0.0, leave_s)] * cars), ORIGIN_US)
     arm(simulation, injections)
     simulation.start()

@@ -5,6 +5,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+from bus_sim.can.error_frames import ErrorsHeard
 from bus_sim.can.faults import InjectedFault
 from bus_sim.options import RunOptions
 from bus_sim.run import FLEET, run_until
@@ -156,4 +157,4 @@ def _listen(scene: Scene, name: str, codec: Codec, node_id: int | None = None) -
         for word in singles(message) if message is not None else ():
             scene.said.append(Said(time_us, name, word))
 
-    medium.tap(on_frame, errors=False)
+    medium.tap(on_frame, errors=ErrorsHeard.NONE)

@@ -4,6 +4,7 @@ from collections import Counter
 
 import pytest
 
+from bus_sim.can.error_frames import ErrorsHeard
 from bus_sim.devices.link import BusDeviceLink
 from bus_sim.options import RunOptions
 from bus_sim.run import run_until
@@ -37,7 +38,7 @@ def said(name: str, *asked_s: float) -> Said:
                 if message is not None and not isinstance(message, StateRequest | TransportKey):
                     heard.append((time_us / 1e6, message))
 
-            bus.tap(hear, errors=False)
+            bus.tap(hear, errors=ErrorsHeard.NONE)
             for at_s in asked_s:
                 loop.call_at(at_s, asker.send, StateRequest(node))
         run.start()

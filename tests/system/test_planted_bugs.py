@@ -8,6 +8,7 @@ from functools import cache
 
 import pytest
 
+from bus_sim.can.error_frames import ErrorsHeard
 from bus_sim.options import RunOptions
 from bus_sim.run import FLEET, run_until
 from bus_sim.sites import find_site
@@ -69,7 +70,7 @@ async def _hunt(site: Site, bug: str, rule: str, limit_s: int, loop: VirtualTime
         def on_frame(frame: Frame, time_us: int, _: str) -> None:
             checks.feed(time_us, channel, frame)
 
-        medium.tap(on_frame, errors=False)
+        medium.tap(on_frame, errors=ErrorsHeard.NONE)
 
     for channel in (FLEET, *(machine.name for machine in site.machines.values())):
         listen(channel)

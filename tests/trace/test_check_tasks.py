@@ -27,6 +27,7 @@ from onboard.contract.messages import (
     Reference,
     Regeneration,
     Stamp,
+    SyncRequest,
 )
 from tests.sites import one_floor
 from tests.trace.checking import (
@@ -144,11 +145,16 @@ def test_a_call_that_is_never_closed_is_found() -> None:
     assert tell(STORY[:3]).broken(15) == {"calls-closed": 1}
 
 
-def test_a_call_whose_initiator_is_held_is_closed_when_it_goes_on() -> None:
-    held = Halted(1, 1, Reason.EMERGENCY_STOP, 240, needs_person=False, boot=1)
+@pytest.mark.parametrize(
+    "waits",
+    [Halted(1, 1, Reason.EMERGENCY_STOP, 240, needs_person=False, boot=1), SyncRequest(1, MR2)],
+    ids=["held", "asks in vain"],
+)
+def test_a_call_whose_initiator_waits_is_closed_when_it_goes_on(waits: Message) -> None:
+    """It asks in vain where its own words come to nobody (campaign terminal, outages, seed 44)."""
     tape = tell(STORY[:3])
     for second in range(2, 33, 2):
-        tape.say(second, held)
+        tape.say(second, waits)
     assert tape.broken(36) == {}
     assert tape.broken(60) == {"calls-closed": 1}
 
@@ -254,6 +260,15 @@ def test_who_remembers_a_lost_machines_car_does_not_say_to_have_it() -> None:
 def test_a_car_that_never_came_in_is_found_where_the_log_has_the_beginning() -> None:
     assert Tape(one_alley()).say(1, car_at(1, PLACE, 1)).broken() == {"cars-conserved": 1}
     assert Tape(one_alley(), started=False).say(1, car_at(1, PLACE, 1)).broken() == {}
+
+
+def test_a_car_may_have_come_and_gone_while_nobody_heard_its_compartment() -> None:
+    """The only other machine was off for minutes, and then the compartment (campaign level1, outages, seed 50574)."""
+    gone = car_at(1, OUTSIDE, 1, Reference(1, 3))
+    again = Heartbeat(1, 1, 1, 0, 2, KindCode.COMPARTMENT, MachineState.STARTING)
+    assert Tape(one_alley()).say(60, again, gone).broken() == {}
+    assert Tape(one_alley()).say(60, gone).broken() == {"cars-conserved": 1}
+    assert Tape(one_alley()).say(60, again, car_at(1, PLACE, 1)).broken() == {"cars-conserved": 1}
 
 
 def test_a_task_that_stays_open_is_found() -> None:

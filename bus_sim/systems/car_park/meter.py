@@ -4,6 +4,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from functools import partial
 
+from bus_sim.can.error_frames import ErrorsHeard
 from bus_sim.can.medium import Medium
 from onboard.contract.codes import TaskPhase
 from onboard.contract.messages import TaskReport
@@ -40,7 +41,7 @@ class Meter:
     def watch(self, fleet: Medium) -> None:
         """Watch a fleet bus that has not begun."""
         fleet.tap_queues(self._on_queued)
-        fleet.tap(self._on_end, errors=False)
+        fleet.tap(self._on_end, errors=ErrorsHeard.NONE)
 
     def listen(self, name: str, outgoing: Outgoing) -> None:
         """Take note of what one machine says; ``name`` is that of its node."""

@@ -15,6 +15,7 @@ from onboard.contract.messages import (
     LeftOut,
     Progress,
     Reference,
+    SyncRequest,
     TaskReport,
 )
 from onboard.trace.check.event import Finding, LogEvent
@@ -118,8 +119,8 @@ class CallsClosed(_CallRule):
     """Each call gets exactly one final outcome, at its deadline; an award is idempotent.
 
     A winner may give the task back before it was heard (REJECTED after AWARDED). An option that nobody
-    decides on lapses without a frame. A call whose initiator fell silent or started anew is over; one that is held
-    closes it when it goes on.
+    decides on lapses without a frame. A call whose initiator fell silent or started anew is over; one that is held, or
+    asks what it has missed, closes it when it goes on.
     """
 
     name = "calls-closed"
@@ -128,14 +129,19 @@ class CallsClosed(_CallRule):
 
     def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
-        #: When a machine last said that it is held, or has slept: it closes its calls once it goes on.
+        #: When a machine last said that it is held, has slept, or asked: it closes its calls once it goes on.
         self._held_us: dict[int, int] = {}
         #: Calls that somebody is still to close, in their order.
         self._open: dict[tuple[int, int], CallSeen] = {}
 
     def handlers(self) -> Handlers:
         """Beside calls, machines that do nothing any more for a while."""
-        return {**super().handlers(), Halted: self._on_halted, Heartbeat: self._on_heartbeat}
+        return {
+            **super().handlers(),
+            Halted: self._on_halted,
+            Heartbeat: self._on_heartbeat,
+            SyncRequest: self._on_question,
+        }
 
     def _on_heartbeat(self, event: LogEvent[Heartbeat]) -> None:
         if event.message.state is MachineState.OBSTACLE:
@@ -144,6 +150,9 @@ class CallsClosed(_CallRule):
     def _on_halted(self, event: LogEvent[Halted]) -> None:
         if event.message.sender == event.message.machine:
             self._held_us[event.message.sender] = event.time_us
+
+    def _on_question(self, event: LogEvent[SyncRequest]) -> None:
+        self._held_us[event.message.sender] = event.time_us
 
     def opened(self, seen: CallSeen) -> None:
         """It is to be closed, where the log tells when."""

@@ -71,6 +71,10 @@ class CarsConserved(Rule):
             return ""
         if not self.picture.has_site:
             return ""
+        started_again = self.picture.boots.get(claim.sender, 1) > 1
+        if started_again and claim.station == OUTSIDE and claim.car.origin == claim.sender:
+            # It came and went while nobody acknowledged a frame, and what was to say so was lost with that life.
+            return ""
         bay = way_site(self.picture.site).compartments.get(claim.sender)
         if bay is None or claim.station != bay.number or claim.car.origin != claim.sender:
             return f"is {_where(claim.station)} and never came in"
