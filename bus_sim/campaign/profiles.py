@@ -10,13 +10,15 @@ from bus_sim.faults.injection import Injection
 from bus_sim.faults.table import TEN_YEARS_MS, Value
 from bus_sim.systems.registry import simulated_of
 from onboard.contract.codes import KindCode
+from onboard.contract.constants import MOBILE_KINDS
 from onboard.core.site import Site
+from onboard.ways.site import TrackKind, way_site
 
 #: Faults begin in this span after power-up, s, unless a system says otherwise: all end before it is over.
 SPAN_S = (20.0, 900.0)
 #: So many faults a run, unless a profile has a number of its own.
 COUNT = (1, 4)
-COUNTS: Final[dict[str, tuple[int, int]]] = {"two-crashes": (2, 2), "pushes": (6, 6)}
+COUNTS: Final[dict[str, tuple[int, int]]] = {"two-crashes": (2, 2), "pushes": (6, 6), "operators": (3, 6)}
 
 #: At a rate, a fault that names a car names one of so many that came last, or the next: an older one has left.
 CARS_AROUND = 5
@@ -50,6 +52,15 @@ def _of(kind: KindCode) -> Callable[[random.Random, Site], str]:
         return chance.choice([machine.name for machine in site.machines.values() if machine.kind is kind])
 
     return choose
+
+
+def _movables(site: Site) -> list[str]:
+    """Machines that a person can hold."""
+    return [machine.name for machine in site.machines.values() if machine.kind in MOBILE_KINDS and not site.no_hold]
+
+
+def _movable(chance: random.Random, site: Site) -> str:
+    return chance.choice(_movables(site))
 
 
 _ROBOT, _COMPARTMENT = _of(KindCode.ROBOT), _of(KindCode.COMPARTMENT)
@@ -159,6 +170,25 @@ _OUTAGES: Final[dict[str, Draw]] = {
     "power_cut": lambda c, _: {"for_s": _lasting(20, 300, c), "seed": _seed(c)},
 }
 
+
+def _segment(chance: random.Random, site: Site) -> dict[str, Value]:
+    """One that can be blocked."""
+    ways = way_site(site)
+    alleys = [number for number, track in ways.tracks.items() if track.kind is not TrackKind.LIFT]
+    track = chance.choice(alleys)
+    return {"track": track, "index": chance.randint(1, ways.tracks[track].length)}
+
+
+#: Persons who stop machines, and let them go on; and machines that are off at such a time.
+_OPERATORS: Final[dict[str, Draw]] = {
+    "held": lambda c, s: {"target": _movable(c, s), "for_s": _lasting(5, 300, c)},
+    "blocked": lambda c, s: {**_segment(c, s), "for_s": _lasting(5, 300, c)},
+    "emergency_stop": lambda _, __: {},
+    "operate": lambda c, _: {"do": "stop", "for_s": _lasting(1, 120, c)},
+    "crash": _crash,
+    "pause": _CRASH["pause"],
+}
+
 PROFILES: Final[dict[str, dict[str, Draw]]] = {
     "none": {},
     "bus": _BUS,
@@ -168,6 +198,7 @@ PROFILES: Final[dict[str, dict[str, Draw]]] = {
     "pushes": _PUSHES,
     "all": {**_BUS, **_CRASH, **_PEOPLE, **_MORE, **_POWER},
     "clocks": _CLOCKS,
+    "operators": _OPERATORS,
     "outages": _OUTAGES,
     "power": {**_POWER, "crash": _crash, "pause": _CRASH["pause"], "power_cut": _CRASH["power_cut"]},
 }
@@ -178,7 +209,8 @@ _WITHOUT_TIME = frozenset({"lost_ticket", "linger", "oversize"})
 def kinds_for(profile: str, site: Site) -> dict[str, Draw]:
     """The kinds of a profile that are drawn for this site's system."""
     system = simulated_of(site)
-    return {kind: draw for kind, draw in PROFILES[profile].items() if system.draws(kind, site)}
+    without = set() if _movables(site) else {"held"}
+    return {kind: draw for kind, draw in PROFILES[profile].items() if system.draws(kind, site) and kind not in without}
 
 
 def draw_faults(profile: str, seed: int, site: Site, span_s: tuple[float, float] = SPAN_S) -> tuple[Injection, ...]:

@@ -36,6 +36,7 @@ ACTIONS: Final[dict[str, Action]] = {
     "sensor_flaky": devices.sensor_flaky,
     "actuator_stuck": devices.actuator_stuck,
     "emergency_stop": operators.emergency_stop,
+    "held": operators.held,
     "operate": operators.operate,
 }
 #: What is there from power-up on and waits for its time by itself.

@@ -12,11 +12,13 @@ from onboard.contract.messages import Blocked, Clear, EmergencyStop, Message
 from onboard.core.site import Segment
 from onboard.operate.commands import CommandRequest, maker_of
 from onboard.operate.names import OperateError
-from onboard.operate.order import OperatorCommand
+from onboard.operate.order import DONE, OperatorCommand
 from onboard.operate.station import OperatorStation
 
 #: The station's node-ID: 251 to 255 are kept for gateways and tools (dbc/fleet.dbc).
 STATION = 251
+#: Whoever could not let a machine go, as it was off, tries again after this, us.
+AGAIN_US = 30_000_000
 
 
 def blocked(simulation: BusRun[Any], injection: Injection) -> None:
@@ -31,6 +33,22 @@ def blocked(simulation: BusRun[Any], injection: Injection) -> None:
 def emergency_stop(simulation: BusRun[Any], _: Injection) -> None:
     """Somebody presses the button: every machine holds for half a minute, or until an operator lets it go on."""
     _say(simulation, EmergencyStop(STATION, Reason.OPERATOR))
+
+
+def held(simulation: BusRun[Any], injection: Injection) -> None:
+    """A person holds a machine, and lets it go some time later, again and again until it says that it goes on."""
+    give(simulation, CommandRequest("hold", machine=injection.target))
+    if injection.number("for_s"):
+        simulation.plant.timers.call_at(injection.until_us, partial(_let_go, simulation, injection.target))
+
+
+def _let_go(simulation: BusRun[Any], name: str) -> None:
+    def ended(status: int | None) -> None:
+        if status != DONE:
+            again_us = simulation.loop.now_us() + AGAIN_US
+            simulation.plant.timers.call_at(again_us, partial(_let_go, simulation, name))
+
+    give(simulation, CommandRequest("release", machine=name), ended)
 
 
 def operate(simulation: BusRun[Any], injection: Injection) -> None:

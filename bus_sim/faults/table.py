@@ -293,6 +293,11 @@ KINDS: Final[Mapping[str, Kind]] = {
         },
     ),
     "emergency_stop": Kind(Group.PEOPLE, "an operator holds all machines at once, for half a minute", {"at_s": _AT}),
+    "held": Kind(
+        Group.PEOPLE,
+        "a person holds a machine that moves about; after for_s, lets it go on (0: never)",
+        _one(for_s=_seconds(120.0)),
+    ),
     "operate": Kind(
         Group.PEOPLE,
         "a person gives a command of onboard operate and agrees; target: whom hold, release, go or regenerate name",

@@ -22,11 +22,13 @@ from onboard.contract.codes import KindCode
 BEGIN_S = 12.0
 #: A run is given up after so many times what an order takes, and once more for each that is usual: they may all wait.
 PATIENCE = 20
-#: Kinds of fault that campaigns draw: those of the buses, of controllers and of their clocks that all machines know.
+#: Kinds of fault that campaigns draw: those of the buses, of controllers and of their clocks that all machines know,
+#: and persons who stop machines.
 DRAWN = frozenset(
     {
         *("burst", "bit_errors", "lossy", "reorder", "bus_off", "partition", "overflow", "babble", "attack"),
         *("crash", "pause", "slow_node", "disk_full", "power_cut", "drift", "clock_jump"),
+        *("held", "emergency_stop", "operate"),
     }
 )
 

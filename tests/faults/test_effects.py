@@ -7,8 +7,8 @@ import pytest
 
 from bus_sim.systems.car_park.plant.customer import CustomerState, VisitOutcome
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.contract.codes import DeskInput, DoorName, DoorPosition, MachineState, Reason
-from onboard.contract.messages import DeskEvent, DriveOrder, DriveState, Halted, Heartbeat
+from onboard.contract.codes import DeskInput, DoorName, DoorPosition, MachineState, ManualMode, Reason
+from onboard.contract.messages import DeskEvent, DriveOrder, DriveState, Halted, Heartbeat, ManualState
 from onboard.core.frame import Frame
 from onboard.core.journal_state import JournalState
 from onboard.ports.bus import ErrorState
@@ -346,6 +346,20 @@ def test_a_car_that_is_too_long_is_refused() -> None:
         CustomerState.GONE,
         VisitOutcome.TOO_LARGE,
     )
+
+
+@pytest.mark.parametrize(
+    ("also", "earliest_s", "latest_s"), [((), 35, 40), (("crash:target=MR1,at_s=33,restart_s=20",), 53, 90)]
+)
+def test_a_person_holds_a_machine_and_lets_it_go_once_it_can_be_asked(
+    also: tuple[str, ...], earliest_s: float, latest_s: float
+) -> None:
+    seen = watch("held:target=MR1,at_s=20,for_s=15", *also, seconds=100)
+    said = [(t / 1e6, m.manual_mode) for t, m in seen.fleet if isinstance(m, ManualState) and m.sender == ROBOT]
+    held_s = [at_s for at_s, mode in said if mode is ManualMode.HELD]
+    let_go_s = min(at_s for at_s, mode in said if mode is not ManualMode.HELD and at_s > held_s[0])
+    assert 20 < held_s[0] < 21
+    assert max(earliest_s, held_s[-1]) < let_go_s < latest_s
 
 
 def test_a_door_is_forced_when_both_are_locked() -> None:

@@ -3,7 +3,9 @@
 from collections.abc import Callable
 
 from onboard.contract.graph import EdgeNotice, EdgeState, NodeAnswer, NodeVerdict, RobotAt, TurnSignal
+from onboard.contract.messages import TokenGrant
 from onboard.systems.graph.fields import NO_NODE
+from onboard.systems.graph.rights import edge_token
 from onboard.systems.graph.site import FactoryGraph
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Finding, LogEvent
@@ -11,10 +13,14 @@ from onboard.trace.check.holds import LetGoAgain
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Handlers, Rule
+from onboard.trace.check.tokens_seen import token_named
 
 
 class OneAnEdge(Rule):
-    """Robots that tell that they are on an edge are alone there, and the edge is one of the graph (rows G03, G08)."""
+    """Robots that tell that they are on an edge are alone there, and the edge is one of the graph (rows G03, G08).
+
+    Who gives the right to an edge away has left it: it may crash before it says where it has come to.
+    """
 
     name = "one-an-edge"
     title = "no two robots are on one edge, and none beside the graph"
@@ -26,8 +32,16 @@ class OneAnEdge(Rule):
         self._on: dict[int, frozenset[int]] = {}
 
     def handlers(self) -> Handlers:
-        """Robots' words on where they are."""
-        return {RobotAt: self._on_robot}
+        """Robots' words on where they are, and rights that they give away."""
+        return {RobotAt: self._on_robot, TokenGrant: self._on_grant}
+
+    def _on_grant(self, event: LogEvent[TokenGrant]) -> None:
+        ends = self._on.get(event.message.sender)
+        if ends is None:
+            return
+        left = edge_token(*ends)
+        if token_named(event.message) == (left.kind, left.number):
+            del self._on[event.message.sender]
 
     def _on_robot(self, event: LogEvent[RobotAt]) -> None:
         at, site = event.message, self.picture.site
