@@ -233,7 +233,7 @@ class WayMirror(CarMirror):
     def stands(self, node: int, now_us: int) -> bool:
         """Whether a machine that is heard has stood for too long where its plan does not leave it."""
         known = self.aside.get(node)
-        if known is not None and known.reason is Reason.NODE_SILENT:
+        if known is not None and known.reason is not Reason.FALSE_STATEMENT:
             self.standing.returned(node, known.since_us, now_us)
         return self.standing.stands(node, now_us)
 

@@ -97,12 +97,12 @@ class Standing:
         """A machine begins a new life: that it stood in the one before says nothing of this one."""
         self._seen.pop(node, None)
 
-    def returned(self, node: int, silent_since_us: int, now_us: int) -> None:
-        """A machine is heard again: as long as it was silent it could not say what it waits for."""
+    def returned(self, node: int, since_us: int, now_us: int) -> None:
+        """A machine may take part again: silent, or held, it could neither go nor say what it waits for."""
         seen = self._seen.get(node)
         if seen is not None and not seen.stands:
             seen.spoke_us = now_us
-            seen.late_us = None if seen.late_us is None else seen.late_us + now_us - silent_since_us
+            seen.late_us = None if seen.late_us is None else min(now_us, seen.late_us + now_us - since_us)
 
     def stands(self, node: int, now_us: int) -> bool:
         """Whether a machine has stood for too long where its plan does not leave it.

@@ -260,12 +260,17 @@ export class Fleet {
 
   #isHeard(peer) {
     if (peer.heard === -Infinity) this.ask(peer, 0, this.now + 400 * MS + 5 * MS * this.rank);
-    // J6, P1: it could say nothing, and made plans that nobody heard.
+    // P1: it made plans that nobody heard.
     else if (!this.lives(peer)) {
-      const movedUs = peer.movedUs + this.now - peer.heard;
-      Object.assign(peer, { movedUs, waitsUs: this.now, wasSilent: true });
+      this.#couldNotGo(peer, peer.heard);
+      peer.wasSilent = true;
     }
     peer.heard = this.now;
+  }
+
+  /** J6: since then it was an obstacle, and has not stood. */
+  #couldNotGo(peer, since) {
+    Object.assign(peer, { movedUs: peer.movedUs + this.now - since, waitsUs: this.now });
   }
 
   onHeartbeat(word, peer) {
@@ -274,8 +279,9 @@ export class Fleet {
     const isAnew = peer.boot !== undefined && isOther;
     if (isAnew) this.ask(peer, peer.boot, this.now);
     if (isAnew) Object.assign(peer, { plan: undefined, isStarted: true });
+    if (peer.halted || (peer.beat && !LETTING.includes(peer.beat.state))) this.#couldNotGo(peer, peer.beatUs);
     if (state !== "OBSTACLE" && state !== "STOPPED") peer.halted = false;
-    Object.assign(peer, { beat: word, boot, known: state === "STARTING" ? peer.known : boot });
+    Object.assign(peer, { beat: word, beatUs: this.now, boot, known: state === "STARTING" ? peer.known : boot });
     if (this.isStranger(word)) return;
     const isSame = [this.digest(), ...this.digests.map(([, one]) => one)].includes(mirror_digest);
     peer.apart = isSame || !this.plan ? 0 : peer.apart + 1;

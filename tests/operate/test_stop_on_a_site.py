@@ -1,5 +1,7 @@
 """stop and go on a running site: who stands, for how long, and that everybody is served afterwards."""
 
+import pytest
+
 from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
@@ -53,6 +55,15 @@ def test_stop_is_confirmed_by_all_and_holds_until_go() -> None:
     assert stop.lines[-1][1] == "node 252 has lifted this stop"
     assert {f"{name} goes on" for name in names} <= {line for _, line in go.lines}
     assert any("MR1 stands: emergency stop by node 251" in line for _, line in go.lines)
+
+
+@pytest.mark.parametrize("at_s", [64, 82])
+def test_who_has_a_car_aboard_at_a_stop_goes_on_with_it_after_a_minute(at_s: float) -> None:
+    """It was said to stand, where its plan had left meanwhile, and a person had to release it: one was not served."""
+    scene, (stop,) = played((at_s, CommandRequest("stop", for_us=60_000_000)))
+    assert_all_served(scene)
+    assert stop.status == 0
+    assert not [one for _, one in scene.all(Halted) if one.reason is not Reason.EMERGENCY_STOP]
 
 
 def test_a_stop_that_is_no_longer_said_ends_by_itself() -> None:

@@ -92,12 +92,16 @@ def test_of_a_keeper_that_has_lost_its_journal_all_remember_the_cars(robot: Holo
     assert places(robot) == [HERE]
 
 
-def test_who_was_silent_has_not_said_that_it_stands() -> None:
-    """A robot was back from a bus that was off, said what it waits for, and stood already by what all believed."""
+@pytest.mark.parametrize("why", [Reason.NODE_SILENT, Reason.EMERGENCY_STOP, Reason.POSITION_UNKNOWN])
+def test_who_could_not_go_has_not_stood(why: Reason) -> None:
+    """A robot was back from a bus that was off, said what it waits for, and stood already by what all believed.
+
+    So did all that had a car aboard after an emergency stop of a minute (drawn car parks, operators, 5665).
+    """
     mirror = WayMirror(one_floor(), BAY)
     mirror.hear(Progress(ROBOT, 1, 0, 1, 3, 0, 0), 0)
     mirror.on_itinerary(goes(), 0)
-    mirror.set_aside(ROBOT, frozenset(), Reason.NODE_SILENT, SILENT_US)
+    mirror.set_aside(ROBOT, frozenset(), why, SILENT_US)
     back_us = RUN_MS * 1000 + WAITS_AFTER_US
     assert not mirror.stands(ROBOT, back_us)
     mirror.admit(ROBOT, back_us)
