@@ -31,6 +31,7 @@ from onboard.contract.messages import (
 )
 from tests.sites import one_floor
 from tests.trace.checking import (
+    ER1,
     MR1,
     MR2,
     Tape,
@@ -42,6 +43,7 @@ from tests.trace.checking import (
     one_alley,
     power_up,
     report,
+    two_floors,
 )
 
 BAY, PLACE, OTHER_PLACE = 0x0104, 0x0106, 0x0107
@@ -147,12 +149,16 @@ def test_a_call_that_is_never_closed_is_found() -> None:
 
 @pytest.mark.parametrize(
     "waits",
-    [Halted(1, 1, Reason.EMERGENCY_STOP, 240, needs_person=False, boot=1), SyncRequest(1, MR2)],
-    ids=["held", "asks in vain"],
+    [
+        Halted(1, 1, Reason.EMERGENCY_STOP, 240, needs_person=False, boot=1),
+        SyncRequest(1, MR2),
+        Halted(1, ER1, Reason.NODE_SILENT, 0, needs_person=False, boot=1),
+    ],
+    ids=["held", "asks in vain", "hears no bus time"],
 )
 def test_a_call_whose_initiator_waits_is_closed_when_it_goes_on(waits: Message) -> None:
-    """It asks in vain where its own words come to nobody (campaign terminal, outages, seed 44)."""
-    tape = tell(STORY[:3])
+    """It asks in vain where its own words come to nobody (campaign terminal, outages, seed 44; cell, 60)."""
+    tape = Tape(two_floors()).say(1, call(), BusTime(ER1, 1_000_000))
     for second in range(2, 33, 2):
         tape.say(second, waits)
     assert tape.broken(36) == {}

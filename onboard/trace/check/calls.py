@@ -9,6 +9,7 @@ from onboard.contract.constants import NOBODY
 from onboard.contract.messages import (
     Award,
     Bid,
+    BusTime,
     CallForProposals,
     Halted,
     Heartbeat,
@@ -120,7 +121,7 @@ class CallsClosed(_CallRule):
 
     A winner may give the task back before it was heard (REJECTED after AWARDED). An option that nobody
     decides on lapses without a frame. A call whose initiator fell silent or started anew is over; one that is held, or
-    asks what it has missed, closes it when it goes on.
+    asks what it has missed, or does not hear who tells the time of the bus, closes it when it goes on.
     """
 
     name = "calls-closed"
@@ -131,6 +132,8 @@ class CallsClosed(_CallRule):
         super().__init__(picture, report)
         #: When a machine last said that it is held, has slept, or asked: it closes its calls once it goes on.
         self._held_us: dict[int, int] = {}
+        #: Who told the time of the bus last.
+        self._teller = NOBODY
         #: Calls that somebody is still to close, in their order.
         self._open: dict[tuple[int, int], CallSeen] = {}
 
@@ -141,14 +144,18 @@ class CallsClosed(_CallRule):
             Halted: self._on_halted,
             Heartbeat: self._on_heartbeat,
             SyncRequest: self._on_question,
+            BusTime: self._on_bus_time,
         }
+
+    def _on_bus_time(self, event: LogEvent[BusTime]) -> None:
+        self._teller = event.message.sender
 
     def _on_heartbeat(self, event: LogEvent[Heartbeat]) -> None:
         if event.message.state is MachineState.OBSTACLE:
             self._held_us[event.message.sender] = event.time_us
 
     def _on_halted(self, event: LogEvent[Halted]) -> None:
-        if event.message.sender == event.message.machine:
+        if event.message.machine in (event.message.sender, self._teller):
             self._held_us[event.message.sender] = event.time_us
 
     def _on_question(self, event: LogEvent[SyncRequest]) -> None:
