@@ -37,9 +37,16 @@ def emergency_stop(simulation: BusRun[Any], _: Injection) -> None:
 
 def held(simulation: BusRun[Any], injection: Injection) -> None:
     """A person holds a machine, and lets it go some time later, again and again until it says that it goes on."""
-    give(simulation, CommandRequest("hold", machine=injection.target))
-    if injection.number("for_s"):
-        simulation.plant.timers.call_at(injection.until_us, partial(_let_go, simulation, injection.target))
+
+    def stands(_: int | None) -> None:
+        then_us = max(injection.until_us, simulation.loop.now_us())
+        simulation.plant.timers.call_at(then_us, partial(_let_go, simulation, injection.target))
+
+    give(simulation, CommandRequest("hold", machine=injection.target), stands if injection.number("for_s") else _done)
+
+
+def _done(_: int | None) -> None:
+    """Nothing follows."""
 
 
 def _let_go(simulation: BusRun[Any], name: str) -> None:
@@ -56,9 +63,7 @@ def operate(simulation: BusRun[Any], injection: Injection) -> None:
     give(simulation, wish_of(injection))
 
 
-def give(
-    simulation: BusRun[Any], asked: CommandRequest, ended: Callable[[int | None], None] = lambda status: None
-) -> None:
+def give(simulation: BusRun[Any], asked: CommandRequest, ended: Callable[[int | None], None] = _done) -> None:
     """The same of a command in its own words; ``ended`` is told its exit status, None where it could not be given."""
 
     def over(done: "asyncio.Task[int | None]") -> None:

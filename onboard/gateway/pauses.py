@@ -50,8 +50,14 @@ class Pauses:
     def feed(self, message: Message, now_us: int) -> list[Closed]:
         """Take up a machine's word."""
         asked = self._asked.get(message.sender) if isinstance(message, ManualState) else None
-        if not isinstance(message, ManualState) or asked is None or message.number != asked.order.number:
+        if not isinstance(message, ManualState) or asked is None:
             return []
+        if message.number != asked.order.number:
+            if asked.give_up_us is not None:
+                return []
+            # It had answered mine, so that this is newer: mine, said again, would be an order of now.
+            del self._asked[message.sender]
+            return [(message.sender, asked.action, "another order came before it was over")]
         if message.manual_mode is not asked.order.manual_mode:
             # An order of another life had this number: the machine takes mine for that one, said again.
             asked.order = self._order(message.sender, asked.action)

@@ -40,7 +40,11 @@ class HoldCommand(OperatorCommand):
         """The machine's own word that it is held and stands, or goes on, ends the order."""
         if self.status is not None:
             return
-        if self._pauses.feed(message, now_us):
+        closed = self._pauses.feed(message, now_us)
+        if closed and closed[0][-1]:
+            self.tell(f"{self._machine.name}: {closed[0][-1]}")
+            self.end([self._machine.name])
+        elif closed:
             self.tell(f"{self._machine.name} " + ("is held, and stands" if self._holds else "goes on by itself"))
             self.status = DONE
         elif self._begins_nothing(message):

@@ -9,10 +9,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import ManualMode
-from onboard.contract.messages import ManualOrder, ManualState
+from onboard.contract.messages import Halted, ManualOrder, ManualState, Message
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.journal_records import Entry, records_in
 from onboard.core.records import ManualRecord
+
+
+def says_held(message: Message) -> bool:
+    """Whether a machine says that it is held, by a person or by a stop."""
+    if isinstance(message, ManualState):
+        return message.manual_mode is not ManualMode.AUTOMATIC
+    return isinstance(message, Halted) and message.machine == message.sender
 
 
 @dataclass

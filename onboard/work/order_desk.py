@@ -17,6 +17,7 @@ from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import JournalRecord
 from onboard.core.negotiation import Closed, NegotiationEvent, RequestedTerms
 from onboard.core.negotiation.winners import STANDS_AFTER_US
+from onboard.work.manual import says_held
 from onboard.work.order_life import NEXT, OrderEvent, OrderState, WorkOrder
 
 #: After power-up a desk listens so long before it calls, us: who has an order in hand says so with its first signs of
@@ -118,7 +119,9 @@ class OrderDesk(ABC, Generic[AnOrder]):
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
-        """Reports about orders of mine, by machines that can carry one out."""
+        """Reports about orders of mine, by machines that can carry one out, and who of them is held."""
+        if says_held(message):
+            self.fleet.negotiation.trust.excuse(message.sender)
         if not isinstance(message, TaskReport) or message.task not in self.orders:
             return []
         order = self.orders[message.task]

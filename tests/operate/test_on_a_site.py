@@ -6,7 +6,7 @@ from itertools import pairwise
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import MachineState, ManualMode, Reason
-from onboard.contract.messages import Blocked, Clear, Heartbeat, ManualOrder
+from onboard.contract.messages import Blocked, Clear, Heartbeat, ManualOrder, ManualState
 from onboard.core.site import Segment
 from onboard.operate.blocks import Mark
 from onboard.operate.commands import Maker
@@ -64,6 +64,17 @@ def test_a_machine_is_held_and_released_by_its_own_word() -> None:
     assert states == {MachineState.OBSTACLE}
     last = [beat.state for _, beat in scene.all(Heartbeat) if beat.sender == MR1.node_id][-1]
     assert last is MachineState.IDLE and let_go.asked.startswith("Is nobody in the way of MR1")
+    scene.assert_sound()
+
+
+def test_who_is_let_go_by_another_before_it_has_come_to_rest_is_not_held_again() -> None:
+    """The first station would have said its order again, every five seconds (drawn terminals, operators, 705)."""
+    hold = partial(HoldCommand, machine=MR1, holds=True, seed=5)
+    release = partial(HoldCommand, machine=MR1, holds=False, seed=9)
+    scene, (held, let_go) = played((46, hold), (48.5, release))
+    assert let_go.status == 0 and "MR1 goes on by itself" in let_go.text
+    assert held.status == 1 and "MR1: another order came before it was over" in held.text
+    assert scene.all(ManualState)[-1][1].manual_mode is ManualMode.AUTOMATIC
     scene.assert_sound()
 
 

@@ -55,6 +55,10 @@ class Trust:
         while len(self._given) > MOST_TASKS:
             del self._given[next(iter(self._given))]
 
+    def excuse(self, node: int) -> None:
+        """A machine is held: whatever it has in hand is late by nobody's word."""
+        self._given = {task: (who, None if who == node else end) for task, (who, end) in self._given.items()}
+
     def winner(self, task: Reference) -> int | None:
         """Who was given a task that is neither done nor forfeited."""
         found = self._given.get(task)

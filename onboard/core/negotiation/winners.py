@@ -50,14 +50,7 @@ class Winners:
     _kept: set[Reference] = field(default_factory=set)
     _blamed: dict[int, int] = field(default_factory=dict)
 
-    def takes(
-        self,
-        task: Reference,
-        winner: int,
-        now_us: int,
-        call: int = 0,
-        stands_us: int = STANDS_AFTER_US,
-    ) -> None:
+    def takes(self, task: Reference, winner: int, now_us: int, call: int = 0, stands_us: int = STANDS_AFTER_US) -> None:
         """Somebody has a task from now on, as after a restart of mine; ``call`` is which it has won, 0 for unknown.
 
         It may stand for ``stands_us`` where what it does changes nothing that is told for longer than traffic does.

@@ -14,7 +14,9 @@ from onboard.contract.messages import (
     BayState,
     CallForProposals,
     CarAt,
+    Halted,
     Itinerary,
+    ManualState,
     Message,
     Reference,
     TaskReport,
@@ -31,6 +33,7 @@ from onboard.systems.car_park.bay_memory import BayMemory, job_record, winner_re
 from onboard.systems.car_park.site import car_park
 from onboard.ways.mirror import WayFleet
 from onboard.ways.tokens import car_token
+from onboard.work.manual import says_held
 
 #: Calls remembered to know which car an award is about; older ones are long closed.
 MAX_CALLS = 64
@@ -102,6 +105,8 @@ class Stewardship:
                     return self.won(car, message.winner, message.task, message.task_version)
             case Award() if message.result is CallResult.WITHDRAWN and self._park.quiet_moves:
                 return self.call_off(message.task)
+            case ManualState() | Halted() if says_held(message):
+                self.fleet.negotiation.trust.excuse(message.sender)
             case TokenGrant() if message.token_kind is TokenKind.CAR and message.holder == self.fleet.node_id:
                 return self._state_anew(custody.car_of(message), message.version)
         return []

@@ -46,6 +46,7 @@ from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.systems.terminal.vehicle import terminal
 from onboard.ways.cars import CarFleet, car_fleet, car_mirror
 from onboard.ways.tokens import car_token
+from onboard.work.manual import says_held
 from onboard.work.order_life import OrderEvent
 from onboard.work.plain import NoEstimator
 
@@ -160,6 +161,8 @@ class Desk:
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Plans, reports, boxes; what another desk calls for; what became of my tasks."""
         self.mirror.hear(message, now_us)
+        if says_held(message):
+            self.fleet.negotiation.trust.excuse(message.sender)
         match message:
             case CallForProposals(operation=Operation.TRANSPORT):
                 self.taken[message.car.number] = now_us + self.site.timing.call_window_us + LOOK_US
