@@ -12,7 +12,7 @@ from onboard.contract.messages import Blocked, Clear, EmergencyStop, Message
 from onboard.core.site import Segment
 from onboard.operate.commands import CommandRequest, maker_of
 from onboard.operate.names import OperateError
-from onboard.operate.order import DONE, OperatorCommand
+from onboard.operate.order import NOT_CONFIRMED, OperatorCommand
 from onboard.operate.station import OperatorStation
 
 #: The station's node-ID: 251 to 255 are kept for gateways and tools (dbc/fleet.dbc).
@@ -51,7 +51,7 @@ def _done(_: int | None) -> None:
 
 def _let_go(simulation: BusRun[Any], name: str) -> None:
     def ended(status: int | None) -> None:
-        if status != DONE:
+        if status == NOT_CONFIRMED:
             again_us = simulation.loop.now_us() + AGAIN_US
             simulation.plant.timers.call_at(again_us, partial(_let_go, simulation, name))
 
