@@ -21,6 +21,7 @@ from onboard.contract.codes import (
 from onboard.contract.messages import (
     CallForProposals,
     CarAt,
+    Halted,
     Heartbeat,
     ManualOrder,
     ManualState,
@@ -161,8 +162,6 @@ class Desk:
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Plans, reports, boxes; what another desk calls for; what became of my tasks."""
         self.mirror.hear(message, now_us)
-        if says_held(message):
-            self.fleet.negotiation.trust.excuse(message.sender)
         match message:
             case CallForProposals(operation=Operation.TRANSPORT):
                 self.taken[message.car.number] = now_us + self.site.timing.call_window_us + LOOK_US
@@ -176,8 +175,8 @@ class Desk:
                 self.fleet.winners.works(message.sender, (message.version, message.step), now_us)
             case CarAt() | TokenGrant():
                 self._is_moved = True
-            case ManualState():
-                self._on_manual(message)
+            case ManualState() | Halted():
+                self._on_held(message)
             case BoxOrder() if message.desk == self.fleet.node_id:
                 return self._ordered(message, now_us)
         return []
@@ -281,6 +280,12 @@ class Desk:
                 if transport is not None and not transport.urgent:
                     effects += self._withdraw(terms, now_us)
         return effects + self.call_next(now_us)
+
+    def _on_held(self, word: ManualState | Halted) -> None:
+        if says_held(word):
+            self.fleet.negotiation.trust.excuse(word.sender)
+        if isinstance(word, ManualState):
+            self._on_manual(word)
 
     def _on_manual(self, state: ManualState) -> None:
         (self.held.discard if state.manual_mode is ManualMode.AUTOMATIC else self.held.add)(state.sender)
