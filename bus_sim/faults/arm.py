@@ -16,6 +16,7 @@ from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.system import Action
 from onboard.config.problems import nearest
 from onboard.core.site import Site
+from onboard.operate.names import OperateError, movable_of
 
 #: What each kind that any system can have does at its time; kinds that are frame faults have nothing here.
 ACTIONS: Final[dict[str, Action]] = {
@@ -58,6 +59,11 @@ def check_targets(faults: Iterable[AnyFault], site: Site) -> None:
                             f"fault {str(fault)!r}: {key}={name}: no such machine on site {site.name}; "
                             f"{nearest(name, known)}"
                         )
+        if fault.kind == "held":
+            try:
+                movable_of(site, fault.target)
+            except OperateError as error:
+                raise ValueError(f"fault {str(fault)!r}: {error}") from error
 
 
 def actions_for(site: Site) -> Mapping[str, Action]:

@@ -95,3 +95,9 @@ def test_a_mistake_is_told_in_one_line(text: str, told: str) -> None:
 def test_a_machine_that_is_not_there_is_told_with_the_nearest_name() -> None:
     with pytest.raises(ValueError, match=r"target=MR9: no such machine on site small; did you mean \"MR"):
         check_targets([parse_injection("crash:target=MR9,at_s=1")], find_site("small"))
+
+
+@pytest.mark.parametrize(("site", "target", "why"), [("small", "IOC1", "use block, or stop"), ("turning", "L1", "use")])
+def test_who_cannot_be_held_is_refused_before_the_run(site: str, target: str, why: str) -> None:
+    with pytest.raises(ValueError, match=f"target={target}.*{why}"):
+        check_targets([parse_injection(f"held:at_s=20,target={target}")], find_site(site))
