@@ -5,6 +5,7 @@ import os
 import re
 import signal
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from bus_sim.run import FLEET, BusRun
 from bus_sim.sites import site_text
 from bus_sim.systems.registry import simulated_names
 from onboard.contract.messages import Heartbeat, Message
+from onboard.operate.names import OperateError, movable_of
 from onboard.systems.contract import codecs_for
 from onboard.systems.registry import system_names
 from onboard.trace.candump_reader import CandumpReader
@@ -153,13 +155,34 @@ def test_it_is_published(system: str, run: Callable[..., str], monkeypatch: pyte
 def faults_on(system: str) -> list[str]:
     """One fault of each kind that any system can have."""
     names = [one.name for one in site_of(system).machines.values()]
-    settings = {"target": names[-1], "receivers": names[-1], "members": names[-1], "name": "mutated", "do": "stop"}
     found = []
     for kind in (*FRAME_FAULTS, *ACTIONS):
+        if not (targets := can_be_held(system) if kind == "held" else names):
+            continue
+        last = targets[-1]
+        settings = {"target": last, "receivers": last, "members": last, "name": "mutated", "do": "stop"}
         known = KINDS[kind].settings
         given = [f"{key}={settings[key]}" for key in settings if key in known and known[key].default is None]
         found.append(f"{kind}:" + ",".join([*given, "at_s=6"]))
     return found
+
+
+def can_be_held(system: str) -> list[str]:
+    """Names of the machines that a person may hold; desks, lathes and robots in step are none of them."""
+    names = []
+    for one in site_of(system).machines.values():
+        with suppress(OperateError):
+            names.append(movable_of(site_of(system), one.name).name)
+    return names
+
+
+@every_system
+def test_each_machine_is_held_or_the_run_is_refused_in_one_line(system: str, run: Callable[..., str]) -> None:
+    last = list(site_of(system).machines.values())[-1].name
+    holdable = last in can_be_held(system)
+    said = run(system, "--fault", f"held:target={last},at_s=1", "--speed", "max", seconds=2.0, statuses=(0, 1, 2))
+    assert (f"fault 'held:target={last},at_s=1.0': {last}" in said) != holdable
+    assert holdable or said.count("\n") == 1
 
 
 @every_system
