@@ -133,7 +133,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--scenario",
         type=Path,
         metavar="FILE",
-        help="site, customers, seed and faults from this file; of the other options only --trace and --json go with it",
+        help="site, customers, seed and faults from this file; only --trace, --devices and --json go with it",
     )
     add_processes(parser.add_argument_group("every machine in a process of its own"))
     # Not in the help: a mistake put into this run on purpose, to see the judges find it (PlantedBug).
@@ -254,14 +254,14 @@ def _speed(text: str | None) -> float | None:
 
 def _run_scenario(args: argparse.Namespace) -> int:
     """A scenario says everything itself: what the command line says besides would be passed over in silence."""
-    free = ("scenario", "trace", "json")
+    free = ("scenario", "trace", "devices", "json")
     for name, usual in vars(_usual()).items():
         if name not in free and getattr(args, name) != usual:
             option = "SITE" if name == "site" else f"--{name.removesuffix('_s').replace('_', '-')}"
             raise OptionError(f"{option}: does not go with --scenario; write it into the file, or leave it out")
     from bus_sim.campaign.command import run_scenario  # noqa: PLC0415  # other runs are no campaign
 
-    return run_scenario(args.scenario, args.trace, args.json)
+    return run_scenario(args.scenario, args.trace, args.json, devices=args.devices)
 
 
 def _usual() -> argparse.Namespace:

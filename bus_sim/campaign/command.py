@@ -322,8 +322,10 @@ def read_seeds(text: str) -> range:
     return range(int(first), int(last or first) + 1)
 
 
-def run_scenario(path: Path, trace: Path | None, json_file: Path | None) -> int:
+def run_scenario(path: Path, trace: Path | None, json_file: Path | None, *, devices: bool = False) -> int:
     """Play one scenario file as a campaign plays it, and tell what came of it; 0 where everybody was served or told.
+
+    ``devices``: the trace has the device buses too.
 
     Raises ``ConfigError`` with one line for each mistake in the file.
     """
@@ -337,7 +339,7 @@ def run_scenario(path: Path, trace: Path | None, json_file: Path | None) -> int:
     )
     for fault in scenario.faults:
         console.print(f"fault        {fault}", highlight=False, markup=False, soft_wrap=True)
-    report = play(site, scenario, trace=trace)
+    report = play(site, scenario, trace=trace, devices=devices)
     told = [
         f"outcome      {report.verdict.value}",
         f"{table.who([report]):<13}served {report.served}   told why {report.told}   waiting {report.waiting}   "

@@ -18,7 +18,12 @@ from onboard.ways.site import TrackKind, way_site
 SPAN_S = (20.0, 900.0)
 #: So many faults a run, unless a profile has a number of its own.
 COUNT = (1, 4)
-COUNTS: Final[dict[str, tuple[int, int]]] = {"two-crashes": (2, 2), "pushes": (6, 6), "operators": (3, 6)}
+COUNTS: Final[dict[str, tuple[int, int]]] = {
+    "two-crashes": (2, 2),
+    "pushes": (6, 6),
+    "operators": (3, 6),
+    "devices": (3, 6),
+}
 
 #: At a rate, a fault that names a car names one of so many that came last, or the next: an older one has left.
 CARS_AROUND = 5
@@ -189,6 +194,34 @@ _OPERATORS: Final[dict[str, Draw]] = {
     "pause": _CRASH["pause"],
 }
 
+#: Worn and loose parts, and boards that are busy with something else, for as long as it takes until somebody comes.
+_DEVICES: Final[dict[str, Draw]] = {
+    "sensor_off": lambda c, s: {"target": _machine(c, s), "for_s": _lasting(0.5, 300, c)},
+    "sensor_flaky": lambda c, s: {
+        "target": _machine(c, s),
+        "probability": round(c.uniform(0.05, 0.95), 2),
+        "for_s": _lasting(30, 300, c),
+        "seed": _seed(c),
+    },
+    "actuator_stuck": lambda c, s: {"target": _machine(c, s), "for_s": _lasting(0.5, 300, c)},
+    "actuator_slow": lambda c, s: {
+        "target": _movable(c, s),
+        "factor": round(c.uniform(0.05, 0.9), 2),
+        "for_s": _lasting(30, 300, c),
+    },
+    "actuator_halfway": lambda c, s: {
+        "target": _movable(c, s),
+        "after_s": _lasting(0.1, 10, c),
+        "for_s": _lasting(0.5, 300, c),
+    },
+    "slow": lambda c, s: {
+        "target": _any(c, s),
+        "factor": round(10 ** c.uniform(0.3, 2), 1),
+        "for_s": _lasting(30, 300, c),
+    },
+    "crash": _crash,
+}
+
 PROFILES: Final[dict[str, dict[str, Draw]]] = {
     "none": {},
     "bus": _BUS,
@@ -198,6 +231,7 @@ PROFILES: Final[dict[str, dict[str, Draw]]] = {
     "pushes": _PUSHES,
     "all": {**_BUS, **_CRASH, **_PEOPLE, **_MORE, **_POWER},
     "clocks": _CLOCKS,
+    "devices": _DEVICES,
     "operators": _OPERATORS,
     "outages": _OUTAGES,
     "power": {**_POWER, "crash": _crash, "pause": _CRASH["pause"], "power_cut": _CRASH["power_cut"]},

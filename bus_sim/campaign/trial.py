@@ -40,13 +40,19 @@ class TrialWatch(Protocol):
         """Whether all is known that it looks for, at loop time ``now_us``; the trial goes on until then."""
 
 
-def stage_of(site: Site, scenario: FaultScenario, loop: VirtualTimeLoop, trace: Path | None = None) -> SystemStage[Any]:
+def stage_of(
+    site: Site, scenario: FaultScenario, loop: VirtualTimeLoop, trace: Path | None = None, *, devices: bool = False
+) -> SystemStage[Any]:
     """A scenario's run, connected and not switched on; only faults of single frames are there.
+
+    ``devices``: its trace has the device buses too.
 
     Raises ``DemandError`` for orders that the site cannot be brought, and for faults that it cannot have.
     """
     check_faults(scenario.faults, site)
-    options = RunOptions(seed=scenario.seed, trace=trace, faults=scenario.faults, demand=scenario.demand)
+    options = RunOptions(
+        seed=scenario.seed, trace=trace, devices=devices, faults=scenario.faults, demand=scenario.demand
+    )
     return simulated_of(site).stage(site, options, loop)
 
 
@@ -56,14 +62,23 @@ def play(
     *,
     usual_wait_s: float | None = None,
     trace: Path | None = None,
+    devices: bool = False,
     watch: TrialWatch | None = None,
 ) -> TrialReport:
     """Play a scenario; ``usual_wait_s`` is the longest wait without its faults, where it is known."""
+
+    async def begin() -> TrialReport:
+        stage = stage_of(site, scenario, loop, trace, devices=devices)
+        arm(stage.run, scenario.faults)
+        if watch is not None:
+            watch.begin(stage)
+        return await play_stage(stage, scenario, usual_wait_s, loop, watch)
+
     loop = VirtualTimeLoop()
     loop.event_limit = event_limit(scenario.limit_s)
     try:
         with wall_limit(wall_limit_s(scenario.limit_s)):
-            return run_on(loop, _play(site, scenario, usual_wait_s, trace, loop, watch))
+            return run_on(loop, begin())
     except (WallLimitError, *HANGS) as hang:
         return hung(scenario, loop, hang)
     except DemandError:
@@ -78,21 +93,6 @@ def hung(scenario: FaultScenario, loop: VirtualTimeLoop, why: BaseException) -> 
     # parse CPython 3.11 breaks that off.
     loop.set_exception_handler(lambda _loop, _context: None)
     return TrialReport(scenario, RunVerdict.HUNG, simulated_s=loop.now_us() / 1e6, error=str(why))
-
-
-async def _play(
-    site: Site,
-    scenario: FaultScenario,
-    usual_wait_s: float | None,
-    trace: Path | None,
-    loop: VirtualTimeLoop,
-    watch: TrialWatch | None,
-) -> TrialReport:
-    stage = stage_of(site, scenario, loop, trace)
-    arm(stage.run, scenario.faults)
-    if watch is not None:
-        watch.begin(stage)
-    return await play_stage(stage, scenario, usual_wait_s, loop, watch)
 
 
 async def play_stage(

@@ -7,6 +7,8 @@ import pytest
 from bus_sim.cli import main
 from bus_sim.faults.injection import parse_injection
 from bus_sim.faults.scenario import FaultScenario, load_scenario
+from bus_sim.run import FLEET
+from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Arrivals
 from onboard.config.problems import ConfigError
 
@@ -85,3 +87,8 @@ def test_a_scenario_is_played_and_told(tmp_path: Path, capsys: pytest.CaptureFix
     assert "outcome      served" in told
     assert trace.stat().st_size > 0
     assert '"verdict": "served"' in figures.read_text(encoding="utf-8")
+    with_devices = tmp_path / "devices.log"
+    assert main(["run", "--scenario", str(path), "--trace", str(with_devices), "--devices"]) == 0
+    lines = with_devices.read_text(encoding="ascii").splitlines(keepends=True)
+    assert {one.split()[1] for one in lines} == {FLEET, *(one.name for one in find_site("small").machines.values())}
+    assert "".join(one for one in lines if one.split()[1] == FLEET) == trace.read_text(encoding="ascii")

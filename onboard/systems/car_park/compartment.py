@@ -245,8 +245,7 @@ class Compartment:
 
     def statements(self, now_us: int) -> list[Effect]:
         """The cars in my custody and the tokens that I hold."""
-        told = self.desks.statements() + self.promises.statements()
-        told += self.pipeline.times.statements()
+        told = self.desks.statements() + self.promises.statements() + self.pipeline.times.statements()
         return self.stewardship.car_statements() + self.fleet.tokens.statements() + told
 
     # --- the desk ----------------------------------------------------------------------------------------------
@@ -273,9 +272,8 @@ class Compartment:
         if self.stewardship.left is not None and self.memory.was_granted:
             return self._park_again(self.stewardship.left, now_us)
         effects = self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
-        if not self._is(DoorName.OUTPUT, DoorPosition.LOCKED):
-            return effects
-        return effects + self.pipeline.void() + self._to_free()
+        is_shut = self._is(DoorName.OUTPUT, DoorPosition.LOCKED)
+        return effects + (self.pipeline.void() + self._to_free() if is_shut else [])
 
     def _park_again(self, left: CarAt, now_us: int) -> list[Effect]:
         """My journal is lost and my rights are new: whatever was meant with the car in my bay, it is parked."""
@@ -448,16 +446,19 @@ class Compartment:
         return [*self.outputs.door(DoorName.INPUT, DoorAction.OPEN), self.outputs.show(text, job.car)]
 
     def _when_handover(self, now_us: int) -> list[Effect]:
-        """A car is its driver's to take: it was fetched for him, or nobody came to park it, which is tried again."""
+        """A car is its driver's: fetched for him, or nobody came to park it; tried again, at once by the key."""
         assert self.bay is not None and self.job is not None
         is_open = self._is(DoorName.INPUT, DoorPosition.OPEN)
         if is_open and not self.bay.load_kg and not self.bay.person_inside:
             return self._left(self.job)
         if not self.job.is_given_back:
             return []
-        if not is_open or self.bay.person_inside:
+        self._key = self._key if self.bay.person_inside else None
+        is_asked = self._key is not None and self.job.car not in self.tickets
+        if not is_open or (self.bay.person_inside and not is_asked):
             self.job.wait(now_us)
-        elif self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
+        elif is_asked or (self.job.retry_at_us is not None and self.job.retry_at_us <= now_us):
+            self.job.retry_at_us = now_us
             self._go(BayPhase.LOCKING)
             return self._when_locking(now_us)
         return []
