@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from functools import lru_cache
 
-from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.ways.kept import Kept
 from onboard.ways.reach import passages
@@ -45,19 +44,18 @@ def open_refuges(site: WaySite, standing: Iterable[Segment]) -> frozenset[Segmen
     if site.is_charted:
         return _rest(site, frozenset(segment.track for segment in standing))
     alleys = [track.number for track in site.tracks.values() if track.kind is TrackKind.ALLEY]
-    robots = sum(machine.kind is KindCode.ROBOT for machine in site.machines.values())
-    if len(alleys) == 1 and not 1 < robots <= len(site.spurs):
+    if len(alleys) == 1 and not 1 < len(site.robots) <= len(site.spurs):
         return refuges(site)
     street = {station.track for station in site.compartments.values()}
     # With compartments on all floors, the lowest of them has to be the one that stays free.
     closed = (street if street < set(alleys) else {min(alleys)}) | {segment.track for segment in standing}
-    if robots > 1:
+    if len(site.robots) > 1:
         closed |= passages(site)
     return _without(refuges(site), frozenset(closed))
 
 
 def _rest(site: WaySite, taken: frozenset[int]) -> frozenset[Segment]:
-    if site.robots <= 1:
+    if len(site.robots) <= 1:
         return refuges(site)
     return _without(_rests.of(site), taken)
 

@@ -126,9 +126,9 @@ class WaySite(Site):
         return [bay.segment for use, bay in uses_of if use in uses]
 
     @cached_property
-    def robots(self) -> int:
-        """How many machines move by themselves along its tracks."""
-        return sum(1 for machine in self.machines.values() if machine.kind is KindCode.ROBOT)
+    def robots(self) -> tuple[int, ...]:
+        """Node-IDs of the machines that move by themselves along its tracks, rising."""
+        return tuple(node for node, machine in sorted(self.machines.items()) if machine.kind is KindCode.ROBOT)
 
     @cached_property
     def lifts(self) -> tuple[int, ...]:

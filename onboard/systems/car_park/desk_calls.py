@@ -372,9 +372,12 @@ class DeskCalls:
         """Nobody can bring a car here whose ticket waits: its desk calls for another bay, or this if all have tried.
 
         Once for each car until a machine is back: where no bay can be reached its customer is not sent round and round.
+        Not at all while no robot can come: at another bay it would be the same.
         """
         car, node, obstacles = task.car, self.fleet.node_id, self.fleet.mirror.obstacles.machines
         others = [bay for bay in self.generation.exits() if bay != node and bay not in obstacles]
+        if obstacles.keys() >= set(self.park.robots):
+            return []
         asked, received = self.asked.get(car), self.received.get(car)
         is_mine = received is not None or (asked is not None and asked.winner == node)
         if not (self.is_on and others and is_mine and car in self.tickets) or car in self.generation.given_up:

@@ -9,7 +9,7 @@ for who waits for calls (``resting.py``).
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from onboard.contract.codes import KindCode, Operation
+from onboard.contract.codes import Operation
 from onboard.contract.messages import CallForProposals
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.site import CarPark, DeskPolicy, class_of_end
@@ -75,8 +75,7 @@ def _rests(park: CarPark, fronts: Sequence[Segment]) -> list[Segment]:
     for slot in sorted(open_refuges(park, ())):
         away_us = min((roads.shortest_us(front, slot) for front in fronts), default=FOREVER)
         nearest[slot.track] = min((away_us, slot), nearest.get(slot.track, (FOREVER, slot)))
-    robots = sum(one.kind is KindCode.ROBOT for one in park.machines.values())
-    return [slot for _, slot in sorted(nearest.values())[:robots]]
+    return [slot for _, slot in sorted(nearest.values())[: len(park.robots)]]
 
 
 _ways: Kept[CarPark, dict[Segment, FetchWays]] = Kept(_find_ways)

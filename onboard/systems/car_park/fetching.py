@@ -47,12 +47,14 @@ def _is_told(site: CarPark, place: Segment) -> bool:
 
 def _starts(site: CarPark) -> list[Segment]:
     """A slot of each stretch where a robot may rest; of a lone one any refuge."""
-    return [min(slots) for slots in resting_room(site).stretches.values()] if site.robots > 1 else [min(refuges(site))]
+    if len(site.robots) <= 1:
+        return [min(refuges(site))]
+    return [min(slots) for slots in resting_room(site).stretches.values()]
 
 
 def _legs(site: CarPark, start: Segment, place: Segment, out: Segment) -> int:
     """How many legs the soonest way takes where all others rest; more than can be told where there is none."""
-    others = [one for one in _starts(site) if one != start][: site.robots - 1]
+    others = [one for one in _starts(site) if one != start][: len(site.robots) - 1]
     visits, ends = (Visit(place, 1), Visit(out, 1)), open_refuges(site, others)
     search = planning(site, Reservations(), 0, start, 0, visits, ends, MAX_EXPANSIONS, dict.fromkeys(site.lifts, 0))
     route = _whole(search)

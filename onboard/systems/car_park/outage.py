@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import DeskText, KindCode, LegAction, Operation
+from onboard.contract.codes import DeskText, LegAction, Operation
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import Reference
 from onboard.core.authority import segment_token
@@ -74,23 +74,25 @@ class Outage:
 
         Or whose car is aboard of who stands, or where there is no way to.
         """
-        job = self.calls.job
+        job, robots = self.calls.job, self.fleet.mirror.site.robots
         fetched = [task for task in self.calls.in_hand() if task.operation is Operation.RETRIEVE]
         if job is None or phase not in _WAITS:
+            out_us = self._out_from_us(robots)
             return {
                 **{task.car: self._no_way_us(task.car) for task in fetched},
-                **{car: _first(self._aboard_us(car), self._no_way_us(car)) for car in self.tickets},
+                **{car: _first(out_us, self._aboard_us(car), self._no_way_us(car)) for car in self.tickets},
             }
-        robots = [one.node_id for one in self.fleet.site.machines.values() if one.kind is KindCode.ROBOT]
         bay_us = _first(
             self._out_from_us([job.winner] if job.winner else robots),
             self._out_from_us([self._in_front()]),
             self._rides_us(job.winner),
+            self._nowhere_us(job.winner),
         )
         due = {car: _first(bay_us, self._aboard_us(car), self._no_way_us(car)) for car in self.tickets}
         for task in fetched:
-            out_us = self._out_from_us([task.winner] if task.winner else robots)
-            due[task.car] = _first(bay_us, out_us, self._rides_us(task.winner), self._no_way_us(task.car))
+            its_us = self._out_from_us([task.winner] if task.winner else robots)
+            on_way_us = self._rides_us(task.winner), self._nowhere_us(task.winner)
+            due[task.car] = _first(bay_us, its_us, *on_way_us, self._no_way_us(task.car))
         return due
 
     def _no_way_us(self, car: Reference) -> int | None:
@@ -110,6 +112,19 @@ class Outage:
             if leg.action is LegAction.RIDE and from_bus_ms(leg.end_ms, near_us) > near_us - OUT_AFTER_US:
                 lifts.append(self.fleet.site.stewards[leg.track])
         return _first(*(self._out_from_us([lift]) for lift in lifts))
+
+    def _nowhere_us(self, node: int) -> int | None:
+        """When a machine counts as stuck whose plan is over and did not lead here, while another is out.
+
+        That stands before all its refuges, or in the only way: whoever has the task waits for it, at ease.
+        """
+        plan, obstacles = self.fleet.mirror.itineraries.get(node), self.fleet.mirror.obstacles.machines
+        if plan is None or not plan.legs or not obstacles or node in obstacles:
+            return None
+        if any((leg.track, leg.to_index, leg.side) == tuple(self.calls.station) for leg in plan.legs):
+            return None
+        over_us = from_bus_ms(plan.legs[-1].end_ms, self._looked_us)
+        return max(over_us, min(one.since_us for one in obstacles.values())) + OUT_AFTER_US
 
     def _in_front(self) -> int:
         """Who has the right to the slot in front of the bay: while it stands there nobody else comes."""

@@ -11,7 +11,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.contract.codes import CallResult, KindCode, LegAction, Operation, Reason, TaskPhase
+from onboard.contract.codes import CallResult, LegAction, Operation, Reason, TaskPhase
 from onboard.contract.constants import NOBODY
 from onboard.contract.messages import CallForProposals, Itinerary, Message, Reference, TaskReport, TokenRefusal
 from onboard.core.effects import Effect, Report, Send
@@ -87,9 +87,8 @@ class QuietMoves:
         self.free = FreePlaces(self.park, self.fleet.node_id, self.fleet.mirror, Program(self.park), {})
         self._rest_us = QUIET_US + STAGGER_US * sorted(self.park.compartments).index(self.fleet.node_id)
         self._stewards = set(self.park.stewards.values())
-        robots = sum(one.kind is KindCode.ROBOT for one in self.park.machines.values())
         #: So many robots may have work when one more is asked to move a car: the others are there for customers.
-        self._most_at_work = max(1, robots // 2) - 1
+        self._most_at_work = max(1, len(self.park.robots) // 2) - 1
 
     @property
     def task(self) -> BayTask | None:

@@ -10,7 +10,6 @@ from onboard.systems.car_park.room import (
     MORE,
     ranges_text,
     refuge_tracks,
-    robots_of,
     robots_text,
     room_text,
     tracks_text,
@@ -31,7 +30,7 @@ def lines(site: CarPark) -> list[str]:
         _places_line(site),
         _reached_line(site),
         machines_line(site, _KINDS),
-        f"{_room_words(site)}, {robots_text(robots_of(site))}",
+        f"{_room_words(site)}, {robots_text(len(site.robots))}",
         *_battery_lines(site),
         *(_loss_line(site, lift) for lift in lifts),
         *_one_way_lines(site),
@@ -50,8 +49,8 @@ def _battery_lines(site: CarPark) -> list[str]:
 
 def _room_words(site: CarPark) -> str:
     """How many robots can rest together; a lone one in more places, where nobody else has to pass."""
-    if robots_of(site) > 1 or not site.is_charted:
-        return room_text(site, robots_of(site))
+    if len(site.robots) > 1 or not site.is_charted:
+        return room_text(site, len(site.robots))
     lone = tracks_text(site, refuge_tracks(site, 1))
     return f"{room_text(site, MORE)}; a lone one may rest on {lone}"
 

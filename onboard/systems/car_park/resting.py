@@ -68,8 +68,7 @@ class Resting:
         uses, node = self.park.bay_uses, self.fleet.node_id
         bays = [(n, one) for n, one in sorted(self.park.compartments.items()) if uses.get(n) is not BayUse.EXIT]
         self._heard.extend(station.segment for _, station in bays)
-        robots = [n for n, machine in sorted(self.park.machines.items()) if machine.kind is KindCode.ROBOT]
-        self._rest_us = REST_US + STAGGER_US * robots.index(node)
+        self._rest_us = REST_US + STAGGER_US * self.park.robots.index(node)
         self.out_of_reach = OutOfReach(self.park)
 
     @property

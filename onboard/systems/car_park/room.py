@@ -11,7 +11,6 @@ from itertools import groupby
 from onboard.config.fleet import FleetReader
 from onboard.config.reader import TomlTable
 from onboard.config.toml_lines import path_text
-from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.ways.reach import passages
 from onboard.ways.refuges import open_refuges
@@ -20,11 +19,6 @@ from onboard.ways.site import TrackKind, WaySite
 
 #: More robots than a lone one, which nobody has to pass.
 MORE = 2
-
-
-def robots_of(site: WaySite) -> int:
-    """How many carriers the site has."""
-    return sum(1 for machine in site.machines.values() if machine.kind is KindCode.ROBOT)
 
 
 def refuge_tracks(site: WaySite, robots: int) -> list[int]:
@@ -40,7 +34,7 @@ def refuge_tracks(site: WaySite, robots: int) -> list[int]:
 
 def check_room(root: TomlTable, site: WaySite, fleet: FleetReader) -> None:
     """Note too few refuges as one problem, else each home where a robot may not stand for ever."""
-    robots = robots_of(site)
+    robots = len(site.robots)
     tracks = refuge_tracks(site, robots)
     if robots > len(tracks):
         remedy = "take robots away, or add floors or [[spurs]]: each takes one more"

@@ -55,7 +55,7 @@ class Option:
 
 def size_of(site: CarPark) -> Size:
     """The size of a site."""
-    return Size(site.robots, len(site.lifts), len(site.compartments))
+    return Size(len(site.robots), len(site.lifts), len(site.compartments))
 
 
 def option_of(template: str, name: str, size: Size) -> Option:

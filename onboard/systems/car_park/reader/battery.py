@@ -4,7 +4,7 @@ from onboard.config.reader import TomlTable
 from onboard.core.site import Segment
 from onboard.systems.car_park.battery import Battery
 from onboard.systems.car_park.reader.layout import Layout, one_position
-from onboard.systems.car_park.room import refuge_tracks, robots_of, robots_text
+from onboard.systems.car_park.room import refuge_tracks, robots_text
 from onboard.ways.refuges import open_refuges
 from onboard.ways.site import WaySite
 
@@ -59,7 +59,7 @@ def _read_chargers(table: TomlTable, layout: Layout, homes: list[Segment]) -> tu
 
 def check_chargers(table: TomlTable, site: WaySite, battery: Battery) -> None:
     """Note chargers where no robot may stand for ever, and too few: then one would have to drive another away."""
-    open_ones, robots = open_refuges(site, ()), robots_of(site)
+    open_ones, robots = open_refuges(site, ()), len(site.robots)
     closed = [segment for segment in battery.chargers if segment not in open_ones]
     if closed:
         what = f"no robot may stand for ever at {', '.join(map(str, closed))}"
