@@ -154,7 +154,7 @@ class _RidingGeneration(CarParkGeneration):
     life: int = 0
 
     def reroute(
-        self, origin: Segment, start_us: int, works: list[StationWork], now_us: int
+        self, origin: Segment, start_us: int, works: list[StationWork], now_us: int, *, asks: bool = False
     ) -> tuple[CarStep, ...] | None:
         """Onto the platform, up or down, and off it, as far as that is not done."""
         goal = self.goal

@@ -146,7 +146,7 @@ class PricedGeneration(CarParkGeneration):
         return None if cost is None else Proposal(cost, None, (solution,), ())
 
     def reroute(
-        self, origin: Segment, start_us: int, works: list[StationWork], now_us: int
+        self, origin: Segment, start_us: int, works: list[StationWork], now_us: int, *, asks: bool = False
     ) -> tuple[CarStep, ...] | None:
         """The same handlings."""
         return tuple(_step(work) for work in works)

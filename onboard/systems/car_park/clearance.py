@@ -1,13 +1,13 @@
 """Whether the others can make room for a plan: who stands in its way, and whose way back it counts on to yield."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import Grade, KindCode
 from onboard.contract.messages import Stamp
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment
-from onboard.systems.car_park.program import standing_itinerary, steps_of, to_itinerary
+from onboard.systems.car_park.program import CarStep, standing_itinerary, steps_of, to_itinerary
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.effort import Effort
 from onboard.ways.mirror import WayMirror
@@ -87,6 +87,14 @@ class Clearance:
                 return None
             found[node] = place, self.mirror.reservations.standing_since(node) or now_us
         return found
+
+    def give_way(self, steps: Sequence[CarStep], start_us: int, now_us: int) -> bool:
+        """Whether each machine that only stands in the way finds another refuge in time, around these and all plans."""
+        mine = to_itinerary(self.node, 1, Grade.FIRM, Stamp(to_bus_ms(now_us), 0, 0), list(steps))
+        plan = BegunItinerary(mine, start_us)
+        standing = self.standing_in(plan, now_us)
+        taken = self.mirror.reservations.copy()
+        return standing is not None and self.have_room(plan, standing, taken, now_us) is not None
 
     def have_room(
         self, plan: BegunItinerary, waiting: Mapping[int, tuple[Segment, int]], taken: Reservations, now_us: int

@@ -256,7 +256,7 @@ class CarParkGeneration:
             asked_us = max(self._deadline_us(call, now_us), now_us) + YIELDING_US
             best, more = yield from self._search(call, now_us, start, reservations.with_way_given(asked_us))
             alternatives += more
-            if best is not None and not self._have_room(best, now_us):
+            if best is not None and not self.clearance.give_way(best.steps, best.start_us, now_us):
                 best = None
         if best is not None and behind_bids and not self._can_bid(best, now_us):
             best = None
@@ -266,15 +266,6 @@ class CarParkGeneration:
         """Whether one itinerary can tell it with what may be won before it, and the battery lasts for it."""
         is_short = can_be_told(solution, self.tentative.values())
         return is_short and self.charging.lasts(self.program, solution, now_us)
-
-    def _have_room(self, solution: Solution, now_us: int) -> bool:
-        """Whether each machine that only stands in the way finds another refuge in time, around this and all plans."""
-        mine = to_itinerary(self.machine.node_id, 1, Grade.FIRM, Stamp(to_bus_ms(now_us), 0, 0), list(solution.steps))
-        plan = BegunItinerary(mine, solution.start_us)
-        standing = self.clearance.standing_in(plan, now_us)
-        if standing is None:
-            return False
-        return self.clearance.have_room(plan, standing, self.mirror.reservations.copy(), now_us) is not None
 
     def _past_retreats(
         self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], best: Solution | None
@@ -402,16 +393,20 @@ class CarParkGeneration:
         return None if isinstance(route, NoRoute) else route
 
     def reroute(
-        self, origin: Segment, start_us: int, works: list[StationWork], now_us: int
+        self, origin: Segment, start_us: int, works: list[StationWork], now_us: int, *, asks: bool = False
     ) -> tuple[CarStep, ...] | None:
         """The same work by another way, from standing at ``origin`` at bus time ``start_us``; None where there is none.
 
-        Without work the way to another refuge: so a machine that only stands gives way.
+        Without work the way to another refuge: so a machine that only stands gives way. Who ``asks`` counts on that.
         """
         visits = tuple(self._work_visit(work, now_us) for work in works)
         others = self.mirror.reservations_at(origin, start_us, may_stay=not works and start_us <= now_us)
+        others = others.with_way_given(now_us + YIELDING_US) if asks else others
         route = self.effort.whole(self._plan(others, origin, start_us, visits, now_us))
-        return None if route is None or len(route.legs) + 3 > MAX_STEPS else steps_of(route, works)  # a few are kept
+        if route is None or len(route.legs) + 3 > MAX_STEPS:  # a few are kept
+            return None
+        steps = steps_of(route, works)
+        return None if asks and not self.clearance.give_way(steps, start_us, now_us) else steps
 
     def _work_visit(self, work: StationWork, now_us: int) -> Visit:
         if work.handling is CarHandling.TAKE and work.station in self.site.compartments.values():

@@ -374,12 +374,15 @@ class GoingAround:
         works = self.program.works()
         kept, origin, start_us = self.turning((), now_us)
         steps = self.generation.reroute(origin, start_us, self._ahead(works, kept), now_us)
+        assert self._since_us is not None
+        lost, is_late = self.untouched(), now_us - self._since_us >= KEEP_US
+        if steps is None and is_late and not lost:
+            # With a car aboard: who only stands in its way gives it, as it may stand in theirs.
+            steps = self.generation.reroute(origin, start_us, self._ahead(works, kept), now_us, asks=True)
         if steps is not None and not self._is_trapped(now_us):
             self._since_us = self._retry_at_us = None
             return self.take_up(kept, steps, works, now_us)
-        assert self._since_us is not None
-        lost = self.untouched()
-        if now_us - self._since_us < KEEP_US or not lost:
+        if not is_late or not lost:
             return []
         task = lost[-1]
         effects: list[Effect] = [Report(f"gives task {task.origin}.{task.number} back: no way")]
