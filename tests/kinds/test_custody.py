@@ -1,10 +1,12 @@
 """The custody of a car: its token and the word where it stands are passed on together, whatever fails in between."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import pytest
 
 from onboard.contract.codes import (
+    CallResult,
     DeskInput,
     DeskText,
     DoorPosition,
@@ -19,6 +21,7 @@ from onboard.contract.codes import (
 )
 from onboard.contract.constants import ANY_STATION, OUTSIDE
 from onboard.contract.messages import (
+    Award,
     BayState,
     BusTime,
     CallForProposals,
@@ -46,6 +49,7 @@ from onboard.systems.car_park.bay_memory import winner_record
 from onboard.systems.car_park.site import CarPark
 from onboard.systems.registry import factory_for
 from onboard.ways.tokens import car_token
+from tests.kinds.board import CALL
 from tests.sites import one_floor
 
 SITE = one_floor()
@@ -53,6 +57,8 @@ BAY, ROBOT, STRANGER = 1, 11, 200
 CAR, TASK, WHEELBASE_MM = Reference(BAY, 1), Reference(BAY, 7), 2_600
 HERE = SITE.compartments[BAY].number
 PLACE = SITE.places[0].number
+#: A second compartment.
+ANOTHER = '[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,9)"\n'
 Entry = dict[str, str | int]
 PARKING: Entry = {"record": "job", "task_origin": BAY, "task": 1, "operation": int(Operation.PARK)}
 PARKING |= {"car_origin": BAY, "car": 1, "wheelbase_mm": WHEELBASE_MM}
@@ -99,8 +105,7 @@ def put_down(station: int = PLACE, version: int = 2) -> CarAt:
 
 def test_who_keeps_one_station_takes_no_car_that_stands_in_anothers() -> None:
     """All that it heard of the car is where it was before: it had it on paper there, and nobody had it where it is."""
-    other = '[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,9)"\n'
-    site = one_floor(extra=other)
+    site = one_floor(extra=ANOTHER)
     keeper = machine(BAY, GIVEN, site)
     keeper.receive(put_down(site.compartments[2].number), 1)
     assert not [word for word in said(keeper.receive(grant(3), 2)) if isinstance(word, TokenHeld)]
@@ -248,3 +253,20 @@ def test_a_steward_that_was_held_counts_no_winner_as_lost_by_that_time() -> None
             now_us for word in words if isinstance(word, TaskReport) and word.phase is TaskPhase.FORFEITED
         ]
     assert given_back_us and given_back_us[0] >= let_go_us + LOST_AFTER_US
+
+
+@pytest.mark.parametrize("word", ["call", "withdrawal"])
+def test_a_steward_says_that_a_winner_is_lost_until_its_task_is_called_anew_or_off(word: str) -> None:
+    """Of a car that nobody could fetch one said so every other second for half an hour (drawn car park 5799)."""
+    winner = dict(winner_record(CAR, ROBOT, TASK, 1).entry)
+    entries = [token_entry("token_held", 3, BAY), journalled_place(BAY, PLACE, 3), winner]
+    steward, forfeited_us = machine(BAY, entries, one_floor(extra=ANOTHER)), list[int]()
+    call = replace(CALL, sender=2, task=TASK, operation=Operation.RETRIEVE, from_station=PLACE, to_station=HERE)
+    call = replace(call, car=CAR)
+    withdrawn = Award(2, 0, 0, TASK, 0, CallResult.WITHDRAWN, Reason.CANCELLED)
+    for now_us in range(100_000, 60_000_000, 100_000):
+        words = said(steward.wake(now_us))
+        forfeited_us += [now_us for one in words if isinstance(one, TaskReport) and one.phase is TaskPhase.FORFEITED]
+        if now_us == 40_000_000:
+            steward.receive(call if word == "call" else withdrawn, now_us)
+    assert len(forfeited_us) > 5 and 38_000_000 <= forfeited_us[-1] <= 40_000_000

@@ -113,7 +113,7 @@ TIMES: dict[str, tuple[Time, ...]] = {
     "lifts": (Time("T_sill", sill.ASK_AGAIN_US, _FIXED, "a lift's word that does not come is asked for"),),
     "custody": (
         Time("T_unheard", stewardship.UNHEARD_AFTER_US, _FIXED, "the right to fetch is taken from a deaf winner"),
-        Time("T_forfeit", stewardship.SAY_AGAIN_US, _FIXED, "FORFEITED is said again until it is awarded anew"),
+        Time("T_forfeit", stewardship.SAY_AGAIN_US, _FIXED, "FORFEITED is said again until it is called anew"),
     ),
     "queue": (
         Time("T_retry", bay_task.RETRY_US, _FIXED, "a task that nobody could do is called for again; doubled"),

@@ -242,6 +242,7 @@ class BayCalls:
                 return [Report(f"car {task.car.number} is nowhere to be fetched from")]
             source, sink = where.number, source
         task.retry_at_us = None
+        self.stewardship.called(task.task)
         return list(self.fleet.negotiation.open(task.terms(source, sink, self.floor), now_us))
 
     def call_for_who_comes(self, car: Reference, ready_us: int, now_us: int) -> list[Effect]:

@@ -42,7 +42,7 @@ MOST_GONE = 4
 #: A winner that has said nothing for so long since its award does not know of it, or does not act on it, us: a little
 #: longer than its initiator says the award again at a quick pace.
 UNHEARD_AFTER_US = 6_000_000
-#: FORFEITED is said again this often until the task is awarded anew, us: a lost word would leave a customer waiting.
+#: FORFEITED is said again this often until the task is called anew, us: a lost word would leave a customer waiting.
 SAY_AGAIN_US = 2_000_000
 
 
@@ -95,6 +95,7 @@ class Stewardship:
                 self._acts(message)
                 return self._put_right(message) if isinstance(message, TaskReport) else []
             case CallForProposals() if self._is_for_a_car(message):
+                self.called(message.task)
                 self._cars_of_calls[message.sender, message.call] = message.car
                 while len(self._cars_of_calls) > MAX_CALLS:
                     del self._cars_of_calls[next(iter(self._cars_of_calls))]
@@ -103,8 +104,9 @@ class Stewardship:
                 if car is not None and self._is_news(car, message):
                     self._unheard_us[car] = now_us
                     return self.won(car, message.winner, message.task, message.task_version)
-            case Award() if message.result is CallResult.WITHDRAWN and self._park.quiet_moves:
-                return self.call_off(message.task)
+            case Award() if message.result is CallResult.WITHDRAWN:
+                self.called(message.task)
+                return self.call_off(message.task) if self._park.quiet_moves else []
             case ManualState() | Halted() if says_held(message):
                 self.fleet.negotiation.trust.excuse(message.sender)
             case TokenGrant() if message.token_kind is TokenKind.CAR and message.holder == self.fleet.node_id:
@@ -168,6 +170,12 @@ class Stewardship:
             return []
         return self.won(car, report.sender, task, successor(version, TASK_VERSION_BITS))
 
+    def called(self, task: Reference) -> None:
+        """Whoever calls for a task, or wants nobody to do it, knows that its winner has no right any more."""
+        if self._say_at_us:
+            for car in [car for car, (one, _) in self.tasks.items() if one == task]:
+                self._say_at_us.pop(car, None)
+
     def call_off(self, task: Reference) -> list[Effect]:
         """Nobody is to move a car any more; who has a right to it already does so all the same, or gives it back."""
         mine = [(car, version) for car, (one, version) in self.tasks.items() if one == task and self._is_untouched(car)]
@@ -229,7 +237,7 @@ class Stewardship:
         return [*noted, job_record(*memory.job, memory.car_class)]
 
     def review(self, now_us: int) -> list[Effect]:
-        """Take the right to fetch a car from winners that are lost, and say so until it is awarded anew."""
+        """Take the right to fetch a car from winners that are lost, and say so until it is called anew or off."""
         if self.fleet.admissions != self._admissions:
             self._admissions, self._since_us = self.fleet.admissions, now_us
             self._unheard_us = dict.fromkeys(self._unheard_us, now_us)
