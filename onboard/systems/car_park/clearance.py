@@ -12,7 +12,7 @@ from onboard.systems.car_park.site import CarPark
 from onboard.ways.effort import Effort
 from onboard.ways.mirror import WayMirror
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
-from onboard.ways.refuges import open_refuges
+from onboard.ways.refuges import open_refuges, refuges
 from onboard.ways.reservations import Reservations
 from onboard.ways.retreats import HeldBack, held_back
 from onboard.ways.sipp import NoRoute, planning
@@ -34,6 +34,12 @@ class Clearance:
     mirror: WayMirror
     node: int
     effort: Effort = field(default_factory=Effort)
+
+    def ends(self) -> tuple[frozenset[Segment], ...]:
+        """Where a plan may end; and where that of who is left alone may to which no such way leads."""
+        open_ones = open_refuges(self.site, self.mirror.others_standing())
+        is_alone = self.mirror.obstacles.machines.keys() >= set(self.site.robots) - {self.node}
+        return (open_ones, refuges(self.site)) if is_alone else (open_ones,)
 
     def held_back(self, stamp: Stamp, from_us: int, now_us: int) -> dict[int, HeldBack]:
         """Plans whose ways back would yield to work under ``stamp``, without what of them begins after ``from_us``."""
@@ -69,7 +75,7 @@ class Clearance:
         end = final_position(self.site, plan.itinerary)
 
         def is_free() -> bool:
-            if end not in open_refuges(self.site, self.mirror.others_standing()):
+            if not any(end in ends for ends in self.ends()):
                 return False
             meets = self.mirror.reservations.conflicts(self.node, windows)
             return met.issuperset(meets) and all(self.mirror.plans.get(one) is plans.get(one) for _, one in meets)
@@ -110,9 +116,9 @@ class Clearance:
         for node, (place, since_us) in waiting.items():
             ends.remove(final_position(self.site, self.mirror.itineraries[node]))
             start_us = max(now_us, since_us)
-            refuges = open_refuges(self.site, [end for end in ends if end is not None])
+            open_ones = open_refuges(self.site, [end for end in ends if end is not None])
             floors = self.mirror.lift_floors(now_us, start_us, taken)
-            search = planning(self.site, taken, node, place, start_us, (), refuges, MAX_EXPANSIONS, floors)
+            search = planning(self.site, taken, node, place, start_us, (), open_ones, MAX_EXPANSIONS, floors)
             route = self.effort.whole(search)
             if isinstance(route, NoRoute):
                 return None

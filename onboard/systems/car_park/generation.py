@@ -35,7 +35,6 @@ from onboard.systems.car_park.site import CarPark, class_of_end, end_at, one_a_s
 from onboard.ways.effort import Effort, Search
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayMirror
-from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import FOREVER, Reservations
 from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_ends, free_flow_us, planning
 from onboard.ways.told_way import TOLERANCE_US, BegunItinerary
@@ -379,18 +378,14 @@ class CarParkGeneration:
     def _plan(
         self, reservations: Reservations, origin: Segment, start_us: int, visits: tuple[Visit, ...], now_us: int
     ) -> Search[Route | None]:
-        route = yield from planning(
-            self.site,
-            reservations,
-            self.machine.node_id,
-            origin,
-            start_us,
-            visits,
-            self._refuges(),
-            MAX_EXPANSIONS,
-            self.mirror.lift_floors(now_us, start_us, reservations),
-        )
-        return None if isinstance(route, NoRoute) else route
+        node, floors = self.machine.node_id, self.mirror.lift_floors(now_us, start_us, reservations)
+        for ends in self.clearance.ends():
+            route = yield from planning(
+                self.site, reservations, node, origin, start_us, visits, ends, MAX_EXPANSIONS, floors
+            )
+            if not isinstance(route, NoRoute):
+                return route
+        return None
 
     def reroute(
         self, origin: Segment, start_us: int, works: list[StationWork], now_us: int, *, asks: bool = False
@@ -412,10 +407,6 @@ class CarParkGeneration:
         if work.handling is CarHandling.TAKE and work.station in self.site.compartments.values():
             return self._visits(work.call, work.station, now_us)[0]
         return Visit(work.station.segment, self.handling_us(work.station))
-
-    def _refuges(self) -> frozenset[Segment]:
-        """Where this robot may end."""
-        return open_refuges(self.site, self.mirror.others_standing())
 
     def _lower_bounds(
         self,

@@ -22,6 +22,8 @@ from onboard.ways.mirror import WayFleet
 
 #: Who is an obstacle for so long does not come soon, us: a restart takes 10 s, and two in a row have taken 30 s.
 OUT_AFTER_US = 30_000_000
+#: A word about another car stands so long before the bay's own is shown again, us: time to read it, and to go.
+READ_US = 15_000_000
 #: In these the bay waits for a robot.
 _WAITS = (BayPhase.LOCKING, BayPhase.AWAITING, BayPhase.OPENING, BayPhase.SERVING)
 
@@ -36,6 +38,8 @@ class Outage:
     tickets: deque[Reference]
     _told: set[Reference] = field(default_factory=set)
     _looked_us: int = 0
+    #: Since when a word about another car has stood where the bay's own, that nobody comes, did.
+    _covered_us: int | None = None
 
     def review(self, phase: BayPhase, now_us: int) -> list[Effect]:
         """Tell each who waits once that nobody comes, and again that it is to be waited for once somebody may."""
@@ -54,11 +58,25 @@ class Outage:
         ]
         self._told.update(untold)
         told = [self.outputs.show(DeskText.PLEASE_WAIT, car) for car in again]
-        return told + [self.outputs.show(DeskText.OUT_OF_ORDER, car) for car in untold]
+        told += [self.outputs.show(DeskText.OUT_OF_ORDER, car) for car in untold]
+        return told + self._shown_again(now_us)
+
+    def _shown_again(self, now_us: int) -> list[Effect]:
+        """Who comes to a bay that waits for nobody reads that, and not where somebody else was sent."""
+        job, shown = self.calls.job, self.outputs.shown
+        if job is None or job.car not in self._told or shown is None or shown[0] is DeskText.OUT_OF_ORDER:
+            self._covered_us = None
+            return []
+        self._covered_us = now_us if self._covered_us is None else self._covered_us
+        if now_us < self._covered_us + READ_US:
+            return []
+        self._covered_us = None
+        return [self.outputs.show(DeskText.OUT_OF_ORDER, job.car)]
 
     def next_wake(self, phase: BayPhase) -> int | None:
         """When those who wait are to be told, bus us; None where they were, or none waits, or a robot may come."""
-        return _first(*(due_us for car, due_us in self._due_us(phase).items() if car not in self._told))
+        covered_us = None if self._covered_us is None else self._covered_us + READ_US
+        return _first(covered_us, *(due_us for car, due_us in self._due_us(phase).items() if car not in self._told))
 
     def _is_open(self, car: Reference) -> bool:
         """Whether nobody has won its task, or the bay's: who wins that now may give it back in a moment."""
@@ -99,7 +117,12 @@ class Outage:
         """When the first machine counts as out, or a way as blocked, where nobody could fetch a car."""
         if self.calls.in_vain.task(car) is None:
             return None
-        return _first(*(one.since_us + OUT_AFTER_US for one in self.fleet.mirror.obstacles.machines.values()))
+        return self._hindered_us()
+
+    def _hindered_us(self) -> int | None:
+        """When the first machine counts as out; long ago where a way is blocked, which a person has said."""
+        obstacles = self.fleet.mirror.obstacles
+        return 0 if obstacles.blocked else _first(*(one.since_us + OUT_AFTER_US for one in obstacles.machines.values()))
 
     def _rides_us(self, node: int) -> int | None:
         """When a lift counts as out by which a machine rides, or is to ride, on its way to the bay by its plan."""
@@ -114,17 +137,16 @@ class Outage:
         return _first(*(self._out_from_us([lift]) for lift in lifts))
 
     def _nowhere_us(self, node: int) -> int | None:
-        """When a machine counts as stuck whose plan is over and did not lead here, while another is out.
+        """When a machine counts as stuck whose plan is over and did not lead here, while something is in the way.
 
-        That stands before all its refuges, or in the only way: whoever has the task waits for it, at ease.
+        That is before all its refuges, or in the only way: whoever has the task waits for it, at ease.
         """
-        plan, obstacles = self.fleet.mirror.itineraries.get(node), self.fleet.mirror.obstacles.machines
-        if plan is None or not plan.legs or not obstacles or node in obstacles:
+        plan, hindered_us = self.fleet.mirror.itineraries.get(node), self._hindered_us()
+        if plan is None or not plan.legs or hindered_us is None or node in self.fleet.mirror.obstacles.machines:
             return None
         if any((leg.track, leg.to_index, leg.side) == tuple(self.calls.station) for leg in plan.legs):
             return None
-        over_us = from_bus_ms(plan.legs[-1].end_ms, self._looked_us)
-        return max(over_us, min(one.since_us for one in obstacles.values())) + OUT_AFTER_US
+        return max(hindered_us, from_bus_ms(plan.legs[-1].end_ms, self._looked_us) + OUT_AFTER_US)
 
     def _in_front(self) -> int:
         """Who has the right to the slot in front of the bay: while it stands there nobody else comes."""
