@@ -11,6 +11,7 @@ from onboard.contract.codes import Criterion, KindCode, Operation
 from onboard.contract.messages import CallForProposals, Reference
 from onboard.contract.terminal import Action, Verb
 from onboard.contract.terminal_device import MissionKey
+from onboard.systems.contract import codecs_for
 from onboard.systems.terminal.generation import VehicleGeneration
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.missions import MissionBook, types_of
@@ -320,3 +321,17 @@ def test_a_plan_is_read_as_it_was_told_and_inert_while_a_frame_is_missing() -> N
     assert [(one.action, one.entity, one.end, one.after) for one in read.steps] == [
         (one.action, one.entity, one.end, one.after) for one in told.steps
     ]
+
+
+@pytest.mark.parametrize("by_h", [38, -38, 29_089])
+def test_a_plan_is_told_whatever_bus_time_was_set_to_amid_it(by_h: int) -> None:
+    """A vehicle whose clock, and the bus's, had jumped halted for a time that no frame tells (terminals 732, 737)."""
+    told = plan(mirror(), 14, "B4", "S1", now=200_000_000 * SECOND)
+    over = [step._replace(end=step.end - by_h * 3_600 * SECOND) for step in told.steps[:2]]
+    told = replace(told, begin=told.begin - by_h * 3_600 * SECOND, steps=(*over, *told.steps[2:]))
+    codec, reader, read = codecs_for(SITE).fleet, PlanReader(SITE), None
+    for frame in to_frames(told):
+        codec.encode(frame)
+        read = reader.feed(frame, told.end)  # type: ignore[arg-type]  # frames of a plan
+    assert read is not None
+    assert [one.end for one in read.steps[2:]] == [one.end for one in told.steps[2:]]

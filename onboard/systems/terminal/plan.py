@@ -14,6 +14,8 @@ from onboard.systems.terminal.site import EntityKind, Terminal
 #: Most steps of a plan: their numbers have five bits, and 31 means none.
 MAX_STEPS = 31
 NO_STEP = 31
+#: Farthest that a step ends after its plan's begin, us: 24 bits of ms (PlanStep, dbc/terminal.dbc), 4.6 h.
+FARTHEST_US = (2**24 - 1) * 1000
 
 
 class EntityStay(NamedTuple):
@@ -95,14 +97,20 @@ def handling_steps(site: Terminal, station: int, action: Action) -> list[ActionS
 
 
 def to_frames(plan: ActionPlan) -> list[Message]:
-    """A plan as it is told."""
-    frames: list[Message] = [
-        PlanHead(plan.owner, plan.version, len(plan.steps), len(plan.loads), to_bus_ms(plan.begin))
-    ]
+    """A plan as it is told.
+
+    Where bus time was set by hours meanwhile, steps that are over have the times of before: they are told as over at
+    its begin or its end, and the begin so near that all can be told.
+    """
+    ends = [step.end for step in plan.steps]
+    begin = min(plan.begin, *ends) if ends else plan.begin
+    begin = max(begin, plan.end - FARTHEST_US)
+    frames: list[Message] = [PlanHead(plan.owner, plan.version, len(plan.steps), len(plan.loads), to_bus_ms(begin))]
     for number, load in enumerate(plan.loads):
         frames.append(PlanTask(plan.owner, plan.version, number, load.pick, load.put, load.box, load.task))
     for number, step in enumerate(plan.steps):
-        end_ms = (to_bus_ms(step.end) - to_bus_ms(plan.begin)) % BUS_MS_MODULUS
+        end = min(max(step.end, begin), plan.end)
+        end_ms = (to_bus_ms(end) - to_bus_ms(begin)) % BUS_MS_MODULUS
         frames.append(PlanStep(plan.owner, plan.version, number, step.action, step.entity, end_ms, *step.after))
     return frames
 
