@@ -82,3 +82,18 @@ def test_that_nobody_comes_is_shown_again_when_somebody_else_has_been_sent_on() 
     bay.outputs.show(DeskText.GO_TO, OTHER, 2)
     said_us = desk.now_us
     assert read(desk, 120 * SECOND_US)[DeskText.OUT_OF_ORDER] == pytest.approx(said_us + READ_US, abs=SECOND_US)
+
+
+def test_a_bay_that_has_sensed_nothing_yet_is_not_woken_to_tell_anybody() -> None:
+    """Its sensors are off, and the only robot silent: it would have been woken at once, for ever."""
+    desk = Desk()
+    bay = desk.holon.behaviour
+    assert isinstance(bay, Compartment)
+    desk.holon.receive(BEAT, desk.now_us)
+    bay.tickets.append(CAR)
+    while desk.now_us < 90 * SECOND_US:
+        desk.now_us += SECOND_US // 2
+        desk.holon.wake(desk.now_us)
+        due_us = bay.next_wake()
+        assert due_us is None or due_us > desk.now_us
+    assert ROBOT in bay.fleet.mirror.obstacles.machines

@@ -37,9 +37,9 @@ class Clearance:
 
     def ends(self) -> tuple[frozenset[Segment], ...]:
         """Where a plan may end; and where that of who is left alone may to which no such way leads."""
-        open_ones = open_refuges(self.site, self.mirror.others_standing())
+        open_ones, all_ones = open_refuges(self.site, self.mirror.others_standing()), refuges(self.site)
         is_alone = self.mirror.obstacles.machines.keys() >= set(self.site.robots) - {self.node}
-        return (open_ones, refuges(self.site)) if is_alone else (open_ones,)
+        return (open_ones, all_ones) if is_alone and open_ones != all_ones else (open_ones,)
 
     def held_back(self, stamp: Stamp, from_us: int, now_us: int) -> dict[int, HeldBack]:
         """Plans whose ways back would yield to work under ``stamp``, without what of them begins after ``from_us``."""

@@ -92,6 +92,9 @@ class Outage:
 
         Or whose car is aboard of who stands, or where there is no way to.
         """
+        if phase is BayPhase.STARTING:
+            # Until its own sensors have said something it tells nobody anything.
+            return {}
         job, robots = self.calls.job, self.fleet.mirror.site.robots
         fetched = [task for task in self.calls.in_hand() if task.operation is Operation.RETRIEVE]
         if job is None or phase not in _WAITS:
