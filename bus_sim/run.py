@@ -4,10 +4,11 @@ Same seed, same options: the same candump log, byte for byte.
 """
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from hashlib import blake2s
+from itertools import count
 from typing import Any, Generic, Protocol, TypeVar
 
 from bus_sim.can.error_frames import ErrorsHeard
@@ -111,6 +112,8 @@ class BusRun(Generic[PlantT]):
     after_crash: list[Callable[[Machine], None]] = field(default_factory=list)
     #: Told when a person has had a machine's rights made anew.
     after_repair: list[Callable[[], None]] = field(default_factory=list)
+    #: Numbers for people with a tool: several may come to the bus at one moment, each under a name of its own.
+    visitors: Iterator[int] = field(default_factory=lambda: count(1))
 
     def __post_init__(self) -> None:
         #: By node-ID the site file that a machine has; who is not among them has no controller yet.

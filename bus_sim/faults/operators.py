@@ -17,7 +17,7 @@ from onboard.operate.station import OperatorStation
 
 #: The station's node-ID: 251 to 255 are kept for gateways and tools (dbc/fleet.dbc).
 STATION = 251
-#: Whoever could not let a machine go, as it was off, tries again after this, us.
+#: Whoever could not let a machine go, as it was off or held by more than that, tries again after this, us.
 AGAIN_US = 30_000_000
 
 
@@ -51,7 +51,8 @@ def _done(_: int | None) -> None:
 
 def _let_go(simulation: BusRun[Any], name: str) -> None:
     def ended(status: int | None) -> None:
-        if status == NOT_CONFIRMED:
+        # None: it could not be given, as to a machine that an emergency stop holds too.
+        if status in (NOT_CONFIRMED, None):
             again_us = simulation.loop.now_us() + AGAIN_US
             simulation.plant.timers.call_at(again_us, partial(_let_go, simulation, name))
 
@@ -76,7 +77,7 @@ def give(simulation: BusRun[Any], asked: CommandRequest, ended: Callable[[int | 
 
 async def _operate(simulation: BusRun[Any], asked: CommandRequest) -> int | None:
     loop, site = simulation.loop, simulation.site
-    who = f"operator {asked.command} {loop.now_us()}"
+    who = f"operator {asked.command} {next(simulation.visitors)}"
     seals = simulation.seals.are_used
     bus = simulation.tool_bus(who, STATION) if seals else simulation.fleet.attach(who, None)
 
@@ -115,6 +116,6 @@ def wish_of(injection: Injection) -> CommandRequest:
 
 
 def _say(simulation: BusRun[Any], message: Message) -> None:
-    bus = simulation.tool_bus(f"operator {simulation.loop.now_us()}", STATION)
+    bus = simulation.tool_bus(f"operator {next(simulation.visitors)}", STATION)
     for frame in simulation.codecs.fleet.encode(message):
         bus.send(frame)
