@@ -20,9 +20,9 @@ neither (it does not). Only a record too long for a slot takes two syncs, line f
 
 import json
 import zlib
-from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cache
 from hashlib import blake2s
 from itertools import chain, islice
 from typing import NamedTuple
@@ -42,6 +42,8 @@ _LINK_BYTES = 8
 _LINK_CHARS = 2 * _LINK_BYTES
 _CRC_CHARS = 8
 _FIELDS = 3
+#: One for all records: to make one takes as long as to use it.
+_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
 _UNREADABLE = "its seal cannot be read"
 
 
@@ -87,6 +89,8 @@ class Appending(NamedTuple):
     line: Write
     slot: Write
     in_two: bool
+    #: The newest lines that the slot holds, this one among them.
+    copies: tuple[bytes, ...]
 
 
 @dataclass
@@ -99,21 +103,21 @@ class Tail:
     link: bytes
     end: int
     #: The newest lines, as many as a slot holds.
-    copies: deque[bytes] = field(default_factory=deque)
+    copies: tuple[bytes, ...] = ()
 
     def appending(self, entry: Entry) -> Appending:
         """What to write for one more record; nothing has changed here until ``take`` is called with it."""
         line = _line(self.link, self.records + 1, _json(entry))
-        copies = _as_fit([*self.copies, line], _room(self.owner))
-        slot = _slot(Seal(self.owner, self.identity, self.records + 1, line[:_LINK_CHARS].decode(), tuple(copies)))
+        copies = _as_fit((*self.copies, line), _room(self.owner))
+        slot = _slot(Seal(self.owner, self.identity, self.records + 1, line[:_LINK_CHARS].decode(), copies))
         place = (self.records + 1) % 2 * SLOT_BYTES
-        return Appending(Write(self.end, line), Write(place, slot), not copies)
+        return Appending(Write(self.end, line), Write(place, slot), not copies, copies)
 
     def take(self, appending: Appending) -> None:
         """The record that ``appending`` made is on the medium: the next one is chained to it."""
         line = appending.line.data
         self.records, self.end, self.link = self.records + 1, self.end + len(line), line[:_LINK_CHARS]
-        self.copies = deque(_as_fit([*self.copies, line], _room(self.owner)))
+        self.copies = appending.copies
 
 
 @dataclass(frozen=True)
@@ -140,10 +144,10 @@ def begin(owner: str, identity: str, entries: Iterable[Entry] = ()) -> tuple[byt
         lines.append(_line(link, number, _json(entry)))
         link = lines[-1][:_LINK_CHARS]
     records = len(lines) - 1
-    copies = _as_fit(lines[1:], _room(owner))
-    slot = _slot(Seal(owner, identity, records, link.decode(), tuple(copies)))
+    copies = _as_fit(tuple(lines[1:]), _room(owner))
+    slot = _slot(Seal(owner, identity, records, link.decode(), copies))
     content = slot + slot + b"".join(lines)
-    return content, Tail(owner, identity, records, link, len(content), deque(copies))
+    return content, Tail(owner, identity, records, link, len(content), copies)
 
 
 def read(content: bytes, owner: str, name: str) -> Reading:
@@ -181,8 +185,8 @@ def _compare(content: bytes, seal: Seal, lines: list[SealedLine], name: str) -> 
         state = JournalState.MENDED
     every = [*lines, *restored]
     mending = b"".join(line.text for line in restored)
-    copies = _as_fit([line.text for line in every[1:]], _room(seal.owner))
-    tail = Tail(seal.owner, seal.identity, len(every) - 1, every[-1].link, end + len(mending), deque(copies))
+    copies = _as_fit(tuple(line.text for line in every[1:]), _room(seal.owner))
+    tail = Tail(seal.owner, seal.identity, len(every) - 1, every[-1].link, end + len(mending), copies)
     mended = sum(line.number > 0 for line in restored)
     why = f"{name}: {mended} records restored from their second copy" if restored else ""
     condition = JournalCondition(state, 0, mended, why)
@@ -277,18 +281,19 @@ def _link(before: bytes, body: bytes) -> bytes:
 
 
 def _json(entry: Entry) -> bytes:
-    return json.dumps(dict(entry), sort_keys=True, separators=(",", ":")).encode()
+    return _ENCODER.encode(dict(entry)).encode()
 
 
 # --- slots -----------------------------------------------------------------------------------------------------
 
 
+@cache
 def _room(owner: str) -> int:
     """Bytes that a slot has for copies of records."""
     return SLOT_BYTES - 300 - 2 * len(json.dumps(owner))
 
 
-def _as_fit(lines: list[bytes], room: int) -> list[bytes]:
+def _as_fit(lines: tuple[bytes, ...], room: int) -> tuple[bytes, ...]:
     """The newest lines that fit into ``room`` bytes."""
     taken = 0
     for index in range(len(lines) - 1, -1, -1):

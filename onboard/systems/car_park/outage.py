@@ -44,6 +44,9 @@ class Outage:
     def review(self, phase: BayPhase, now_us: int) -> list[Effect]:
         """Tell each who waits once that nobody comes, and again that it is to be waited for once somebody may."""
         self._looked_us = now_us
+        if self._is_nobody_out() and not self._told:
+            self._covered_us = None
+            return []
         due = self._due_us(phase)
         is_out = {car: due_us is not None and now_us >= due_us for car, due_us in due.items()}
         in_doubt = {car for car in self._told if car in is_out and not is_out[car] and self._is_open(car)}
@@ -76,7 +79,14 @@ class Outage:
     def next_wake(self, phase: BayPhase) -> int | None:
         """When those who wait are to be told, bus us; None where they were, or none waits, or a robot may come."""
         covered_us = None if self._covered_us is None else self._covered_us + READ_US
+        if self._is_nobody_out():
+            return covered_us
         return _first(covered_us, *(due_us for car, due_us in self._due_us(phase).items() if car not in self._told))
+
+    def _is_nobody_out(self) -> bool:
+        """Whether no machine is in the way and no way blocked, so that nobody is due to be told anything."""
+        obstacles = self.fleet.mirror.obstacles
+        return not (obstacles.machines or obstacles.blocked)
 
     def _is_open(self, car: Reference) -> bool:
         """Whether nobody has won its task, or the bay's: who wins that now may give it back in a moment."""
