@@ -5,12 +5,12 @@ calls for nothing twice: it listens first, because whoever has an order in hand 
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar, Generic, TypeVar
 
 from onboard.contract.codes import CallResult, KindCode, MachineState, Reason, TaskPhase
-from onboard.contract.messages import Message, Reference, SyncRequest, TaskReport
+from onboard.contract.messages import ManualState, Message, Reference, SyncRequest, TaskReport
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect, Record, Send, Tell
@@ -19,6 +19,7 @@ from onboard.core.negotiation import Closed, NegotiationEvent, RequestedTerms
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.work.manual import says_held
 from onboard.work.order_life import NEXT, OrderEvent, OrderState, WorkOrder
+from onboard.work.told_once import ToldOnce
 
 #: After power-up a desk listens so long before it calls, us: who has an order in hand says so with its first signs of
 #: life.
@@ -48,6 +49,10 @@ class OrderDesk(ABC, Generic[AnOrder]):
     kind: KindCode = KindCode.DESK
     orders: dict[Reference, AnOrder] = field(default_factory=dict)
     _listen_until_us: int | None = None
+    #: Machines in which a person has a hand, and orders for which nobody bid when they were last called for.
+    _held: set[int] = field(default_factory=set)
+    _refused: set[Reference] = field(default_factory=set)
+    _told: ToldOnce = field(default_factory=ToldOnce)
 
     def __post_init__(self) -> None:
         self.replay()
@@ -122,6 +127,9 @@ class OrderDesk(ABC, Generic[AnOrder]):
         """Reports about orders of mine, by machines that can carry one out, and who of them is held."""
         if says_held(message):
             self.fleet.negotiation.trust.excuse(message.sender)
+        if isinstance(message, ManualState):
+            (self._held.add if says_held(message) else self._held.discard)(message.sender)
+            return self._told.news(self._waiting())
         if not isinstance(message, TaskReport) or message.task not in self.orders:
             return []
         order = self.orders[message.task]
@@ -151,7 +159,9 @@ class OrderDesk(ABC, Generic[AnOrder]):
             return self.put(order, OrderEvent.NOT_WON, now_us, CUT_OFF_US)
         if refused and self.max_calls is not None and order.calls >= self.max_calls:
             return self.put(order, OrderEvent.HOPELESS, now_us)
-        return self.put(order, OrderEvent.NOT_WON, now_us, self.call_again_us if refused else 0)
+        (self._refused.add if refused else self._refused.discard)(order.task)
+        again = self.put(order, OrderEvent.NOT_WON, now_us, self.call_again_us if refused else 0)
+        return again + self._told.news(self._waiting())
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """A desk keeps no rights."""
@@ -184,6 +194,17 @@ class OrderDesk(ABC, Generic[AnOrder]):
     def statements(self, now_us: int) -> list[Effect]:
         """Nothing: a desk of this kind has neither an itinerary nor cars in its custody."""
         return []
+
+    def _waiting(self) -> Iterator[tuple[str, str]]:
+        """Orders that wait for a person to let a machine go: it has them, or nobody else can do them."""
+        machines = self.fleet.site.machines
+        for order in self.orders.values():
+            origin, number = order.task
+            name = f"order {number}" if origin == self.fleet.node_id else f"order {number} of node {origin}"
+            if order.state is OrderState.IN_HAND and order.winner in self._held:
+                yield name, f"{machines[order.winner].name} has it, and is held"
+            elif self._held and order.task in self._refused and not order.is_over:
+                yield name, "nobody can do it while machines are held"
 
     # --- orders ------------------------------------------------------------------------------------------------
 
@@ -276,6 +297,7 @@ class OrderDesk(ABC, Generic[AnOrder]):
         if (order.state, event) not in NEXT:
             return []
         order.winner, order.may_be_won, order.is_begun = winner, False, False
+        self._refused.discard(order.task)
         self.note_price(order)
         effects = self.put(order, event, now_us)
         self._watch(order, now_us, call)
