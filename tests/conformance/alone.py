@@ -1,6 +1,6 @@
 """One machine alone, with its journal, among others that live: what it says, and when."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import TypeVar
 
 from onboard.contract.codes import CONTRACT_VERSION, MachineState
@@ -33,14 +33,15 @@ class Alone:
             if isinstance(one, Record):
                 self.journal.append(one.entry)
 
-    def passes(self, seconds: float, step_us: int = SECOND, *, silent: int = 0) -> None:
+    def passes(self, seconds: float, step_us: int = SECOND, *, silent: int = 0, held: Collection[int] = ()) -> None:
         """Time goes by, and all the others tell that they live, but who is ``silent``."""
         until_us = self.now_us + round(seconds * SECOND)
         while self.now_us < until_us:
             self.now_us += step_us
             for node, machine in self.site.machines.items():
                 if node not in (self.node, silent):
-                    beat = Heartbeat(node, CONTRACT_VERSION, self.site.digest, 0, 1, machine.kind, MachineState.IDLE)
+                    state = MachineState.WAITING if node in held else MachineState.IDLE
+                    beat = Heartbeat(node, CONTRACT_VERSION, self.site.digest, 0, 1, machine.kind, state)
                     self.hears(beat)
             while (due_us := self.holon.next_wake()) is not None and due_us <= self.now_us:
                 self._take(self.holon.wake(self.now_us))

@@ -62,9 +62,12 @@ def box(name: str) -> int:
 class Counter(Alone):
     """A desk among vehicles that live."""
 
-    def __init__(self, entries: Iterable[Entry] = (), boot: int = 1) -> None:
+    def __init__(self, entries: Iterable[Entry] = (), boot: int = 1, says: Iterable[Message] = ()) -> None:
+        """``says`` are words of others while it starts."""
         super().__init__(site(), DESK, entries, boot)
-        self.passes(20)
+        self.passes(2)
+        self.hears(*says)
+        self.passes(18)
 
     def answers(self) -> list[tuple[int, bool]]:
         """Said at the counter: mission, and whether it is taken."""
@@ -191,6 +194,19 @@ def test_what_its_winner_gives_back_is_called_for_again() -> None:
     assert {one.car.number for one in news} == {box("B4")}
 
 
+@pytest.mark.parametrize("has_won", [True, False])
+def test_who_won_a_task_as_the_desks_power_failed_has_it_and_else_it_is_called_for_again(has_won: bool) -> None:
+    """Of boxes wanted by their type one more was fetched, and another mission got one too few."""
+    first = Counter()
+    first.senses(load(count=1))
+    (task,) = {one.task for one in first.sent(CallForProposals)}
+    claim = TaskReport(R1, task, TaskPhase.AWARDED, place("S1"), Reason.NONE)
+    again = Counter(first.journal, boot=2, says=[claim] if has_won else [])
+    assert (again.sent(CallForProposals) == []) is has_won
+    again.hears(TaskReport(R1, task, TaskPhase.DONE, place("S1"), Reason.NONE))
+    assert any(f"task {task.number} is done" in line for line in again.reported()) is has_won
+
+
 def test_a_box_for_which_another_desk_calls_is_not_called_for() -> None:
     desk, other = Counter(), Counter()
     other.senses(*tranship(9, "B4"))
@@ -272,14 +288,17 @@ def test_a_key_for_what_is_no_vehicle_is_nothing() -> None:
     assert desk.sent(ManualOrder) == []
 
 
-def test_for_vehicles_that_are_held_nothing_is_called() -> None:
+@pytest.mark.parametrize("is_heard", [True, False])
+def test_for_vehicles_that_are_held_nothing_is_called(is_heard: bool) -> None:
+    """Nor for ever for who was let go while the desk was deaf (drawn 892)."""
     desk = Counter()
     desk.hears(*(ManualState(node, 1, ManualMode.HELD, at_rest=True) for node in site().vehicles))
     desk.senses(load())
-    desk.passes(20)
+    desk.passes(20, held=site().vehicles)
     assert desk.answers() == [(7, True)] and desk.sent(CallForProposals) == []
-    desk.hears(ManualState(R1, 2, ManualMode.AUTOMATIC, at_rest=False))
-    desk.passes(20)
+    if is_heard:
+        desk.hears(ManualState(R1, 2, ManualMode.AUTOMATIC, at_rest=False))
+    desk.passes(20, held=set(site().vehicles) - {R1})
     assert len({one.task for one in desk.sent(CallForProposals)}) == 1, "one vehicle is free, so one box"
 
 
@@ -336,3 +355,28 @@ def test_a_slot_is_not_given_to_a_vehicle_that_has_told_no_plan_through_it() -> 
     slot = site().entities[place("C1")].number << 8 | 1
     desk.hears(TokenRequest(R1, TokenKind.SEGMENT, slot, 0, 0, 0))
     assert [one.reason for one in desk.sent(TokenRefusal)] == [Reason.MIRROR_BEHIND]
+
+
+@pytest.mark.parametrize(("name", "why"), [("B3", Reason.TOKEN_NOT_GRANTABLE_YET), ("B4", None)])
+def test_a_box_under_another_is_nobodys_yet(name: str, why: Reason | None) -> None:
+    """Row M17: whoever had the right to it would keep the stack to itself while the other stands on it."""
+    desk = Counter()
+    steps = (Action.DOCK, Action.PICK_UP, Action.UNDOCK)
+    desk.hears(Itinerary(R1, 1, Grade.FIRM, Stamp(1, DESK, 1), ()))
+    desk.hears(PlanHead(R1, 1, len(steps), 1, 20_000))
+    desk.hears(PlanTask(R1, 1, 0, 1, 2, box(name), Reference(DESK, 1)))
+    for number, action in enumerate(steps):
+        desk.hears(PlanStep(R1, 1, number, action, place("S2"), 2_000 * (number + 1), 0, 0))
+    origin, number = site().box(box(name))
+    desk.hears(TokenRequest(R1, TokenKind.CAR, origin << 16 | number, 0, 0, 0))
+    assert [one.reason for one in desk.sent(TokenRefusal)] == ([] if why is None else [why])
+    assert len(desk.sent(TokenGrant)) == (why is None)
+
+
+def test_who_claims_a_task_that_the_desk_does_not_know_hears_that_nobody_has_it() -> None:
+    """It was silent while its desk took it back, and called for that box under another name."""
+    desk = Counter()
+    desk.hears(TaskReport(R1, Reference(DESK, 99), TaskPhase.AWARDED, place("S4"), Reason.NONE))
+    assert [(one.task, one.winner) for one in desk.sent(Award)] == [(Reference(DESK, 99), 0)]
+    desk.hears(TaskReport(R1, Reference(QUAY, 99), TaskPhase.AWARDED, place("S4"), Reason.NONE))
+    assert len(desk.sent(Award)) == 1, "it is not this desk's"

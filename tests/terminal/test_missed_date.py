@@ -37,7 +37,7 @@ def heads(messages: Sequence[Message]) -> list[tuple[int, int]]:
 
 def test_m16_m31_m35_a_date_about_to_be_missed_makes_one_plan_anew_and_it_is_kept() -> None:
     usual, before = run("S10", "16:04", 15, None)
-    held, said = run("S10", "16:04", 15, ("R1", 103, 60))
+    held, said = run("S10", "16:04", 15, ("R1", 87, 29))
     assert (usual.is_good, usual.touched, held.is_good, held.touched) == (True, 0, True, 1)
     assert not any(one.late_us for one in (*usual.deliveries, *held.deliveries))
 

@@ -180,7 +180,7 @@ def test_m22_m34_one_robots_delay_is_known_of_all_at_once() -> None:
 
 def test_m06_m16_only_the_plan_that_misses_its_date_is_violated() -> None:
     """A date "before 16:03" travels with the call in ms from the day's begin; held for long, R1 alone will miss it."""
-    more = missions("B4", before="16:03") + missions("B3", "B2") + held("R1", 40, 120)
+    more = missions("B4", before="16:03") + missions("B3", "B2") + held("R1", 45, 120)
     where = site(2, more)
 
     def check(heard: Sequence[Timed]) -> None:
@@ -189,12 +189,12 @@ def test_m06_m16_only_the_plan_that_misses_its_date_is_violated() -> None:
         assert terms == {4: 180_000, 3: 0, 2: 0}
         mine = [one.sender for _, one in heard if isinstance(one, PlanTask) and one.box == 4]
         assert mine[:1] == [R1]
-        for at_s, late in ((ENTERS_S + 1, []), (LEAVES_S + 40, []), (110, [R1])):
+        for at_s, late in ((ENTERS_S + 1, []), (LEAVES_S + 40, []), (103, [R1])):
             mirror = listener(where, heard, at_s * SECOND)
             assert mirror.traffic.plans.keys() == set(ROBOTS)
             assert [one.owner for one in mirror.traffic.violations(at_s * SECOND)] == late, at_s
 
-    shown_at(check, said(2, more, until_s=112), CallForProposals, TaskTerms, PlanHead, PlanStep, PlanTask)
+    shown_at(check, said(2, more, until_s=104), CallForProposals, TaskTerms, PlanHead, PlanStep, PlanTask)
 
 
 # --- which box, which robot, which way --------------------------------------------------------------------------------

@@ -42,9 +42,12 @@ from onboard.core.site import Machine, Site
 from onboard.systems.terminal.memory import box_record, read_boxes
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.missions import MissionBook, Transport
+from onboard.systems.terminal.rights import verdict
 from onboard.systems.terminal.routes import least_end_ms
 from onboard.systems.terminal.site import EntityKind, Terminal
+from onboard.systems.terminal.traffic import GIVE_BACK_US
 from onboard.systems.terminal.vehicle import terminal
+from onboard.systems.terminal.waiting import WaitingOrders
 from onboard.ways.cars import CarFleet, car_fleet, car_mirror
 from onboard.ways.tokens import car_token
 from onboard.work.manual import says_held
@@ -58,6 +61,9 @@ LOOK_US = 5_000_000
 LANE_REPEAT_US = 5_000_000
 #: An order by hand that its vehicle has not answered is said again after this, us (dbc/terminal.dbc).
 MANUAL_AGAIN_US = 1_000_000
+#: After power-up whoever has won a task that was called for has said so after this, us: twice what it takes until it
+#: says so again (``planner.SAY_US``), and some more.
+DOUBT_US = 12_000_000
 #: A task that was won and is in no plan for so long is called anew, us: its winner gave it up or lost it.
 LOST_US = 120_000_000
 
@@ -107,11 +113,15 @@ class Desk:
     held: set[int] = field(default_factory=set)
     _manual: dict[int, ManualOrder] = field(default_factory=dict)
     _manual_at_us: int | None = None
-    _told_buried: set[int] = field(default_factory=set)
+    _waiting: WaitingOrders = field(init=False)
+    #: Tasks of my earlier life that were called for, and until when their winners may say so.
+    _doubtful: set[Reference] = field(default_factory=set)
+    _doubtful_until_us: int = 0
 
     def __post_init__(self) -> None:
         self.orders = MissionBook(self.site, self.fleet.node_id)
         self.orders.replay(self.fleet.entries)
+        self._waiting = WaitingOrders(self.orders, self.mirror)
 
     @property
     def site(self) -> Terminal:
@@ -136,9 +146,9 @@ class Desk:
         return 0
 
     def start(self, now_us: int) -> list[Effect]:
-        """Tasks that were called for and not won are called for again; those that were won go on."""
-        for task in [one for one in self.orders.open if one not in self.orders.won]:
-            self.orders.give_back(task, OrderEvent.NOT_WON)
+        """Tasks that were won go on; those that were called for may have been, and are called for again if not."""
+        self._doubtful = {one for one in self.orders.open if one not in self.orders.won}
+        self._doubtful_until_us = now_us + DOUBT_US
         self._won_at_us = dict.fromkeys(self.orders.won, now_us)
         self._look_at_us = now_us + LOOK_US
         self.mirror.remember(read_boxes(self.fleet.node_id, self.fleet.node_id, self.fleet.entries))
@@ -168,7 +178,10 @@ class Desk:
             case TaskReport():
                 return self._reported(message, now_us)
             case Heartbeat():
-                return self.mirror.ask(message)
+                if message.state is not MachineState.WAITING:
+                    # Whoever missed that it was let go hears it go on.
+                    self.held.discard(message.sender)
+                return self.mirror.on_beat(message, now_us)
             case PlanHead():
                 self._is_new = True
             case StepReport():
@@ -189,18 +202,15 @@ class Desk:
         self.calls.pop(task, None)
         if event.result is CallResult.AWARDED:
             return self.won(task, event.winner, now_us, event.call.call)
+        if event.result is CallResult.REFUSED and task in self.orders.open:
+            self._waiting.refused.add(self.orders.open[task].mission)
         self.orders.give_back(task, OrderEvent.NOT_WON)
         self._look_at_us = now_us + (LOOK_US if event.result is CallResult.REFUSED else 1)
         return [Record(self.orders.record())]
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Slots in the plans' order; a box to the machine whose plan carries it."""
-        if key.kind is TokenKind.SEGMENT:
-            return self._may_enter(key.number >> 8, key.number & 0xFF, requester)
-        if key.kind is TokenKind.CAR:
-            carries = self.mirror.in_plans(key.number & 0xFFFF) == requester
-            return Reason.NONE if carries else Reason.MIRROR_BEHIND
-        return Reason.TOKEN_NOT_GRANTABLE_YET
+        return verdict(self.mirror, key, requester)
 
     def advance(self, now_us: int) -> list[Effect]:
         """Open the next call where a robot is about to be free; tell blocked lanes again; look after won tasks."""
@@ -214,7 +224,7 @@ class Desk:
         if self._is_new or (self._look_at_us is not None and self._look_at_us <= now_us):
             self._is_new = False
             self._look_at_us = now_us + LOOK_US if self.orders.missions or self.orders.open else None
-            effects += self._look_after(now_us) + self.call_next(now_us) + self._tell_buried()
+            effects += self._look_after(now_us) + self.call_next(now_us) + self._waiting.news(now_us)
         return effects
 
     def next_wake(self) -> int | None:
@@ -293,18 +303,6 @@ class Desk:
         if order is not None and order.number == state.number:
             del self._manual[state.sender]
 
-    def _tell_buried(self) -> list[Effect]:
-        """Nobody clears a stack by itself (row M08): the operator is told once what waits for what."""
-        found = [pair for pair in self.orders.buried(self.mirror) if pair[0] not in self._told_buried]
-        self._told_buried.update(box for box, _ in found)
-        names = self.site.boxes
-        return [
-            Report(
-                f"box {names[box - 1].name} waits: {names[upper - 1].name} is above it, and nobody ordered that away"
-            )
-            for box, upper in found
-        ]
-
     def _withdraw(self, terms: RequestedTerms, now_us: int) -> list[Effect]:
         self.interrupted += 1
         effects: list[Effect] = []
@@ -382,17 +380,24 @@ class Desk:
         """A robot has the task, by ``call`` where it is known."""
         if not self.orders.goes_to(task, winner):
             return []
+        self._doubtful.discard(task)
         self.fleet.winners.takes(task, winner, now_us, call)
+        self._waiting.refused.discard(self.orders.open[task].mission)
+        self.mirror.void.discard((task, winner))
         self._won_at_us[task] = now_us
         self._look_at_us = now_us + 1
         return [Record(self.orders.record())]
 
     def _reported(self, report: TaskReport, now_us: int) -> list[Effect]:
-        if report.task not in self.orders.open:
-            return []
         if report.sender not in self.site.vehicles:
-            self.fleet.drops[Reason.NOT_OF_KIND] += 1
+            self.fleet.drops[Reason.NOT_OF_KIND] += report.task in self.orders.open
             return []
+        if report.task not in self.orders.open:
+            # Taken back, and called for under another name, while who had it was silent.
+            is_claim = report.phase is TaskPhase.AWARDED and report.task.origin == self.fleet.node_id
+            return self.fleet.winners.remind(report.task, report.sender) if is_claim else []
+        if report.task in self._doubtful and report.phase in (TaskPhase.AWARDED, TaskPhase.LOADED):
+            return self.won(report.task, report.sender, now_us)
         if self.orders.won.get(report.task) != report.sender:
             # Who has lost a task, or never won it, says nothing that counts: where its box stands tells whether it is
             # done.
@@ -420,17 +425,41 @@ class Desk:
         reason = self.fleet.winners.lost(task, now_us)
         if reason is Reason.NONE:
             return []
-        if not self._station_of(transport.box) or self.mirror.in_plans(transport.box) is not None:
+        if not self._station_of(transport.box) or not self._is_unbegun(transport, now_us):
             self.fleet.winners.keeps(task)
             return []
         self._won_at_us.pop(task, None)
         self.calls.pop(task, None)
         self.orders.give_back(task, OrderEvent.TAKEN_BACK)
-        return [*self.fleet.winners.take_back(task, reason, now_us), Record(self.orders.record())]
+        said = self.fleet.winners.take_back(task, reason, now_us)
+        for one in said:
+            if isinstance(one, Send):
+                self.mirror.hear(one.message, now_us)
+        return [*said, Record(self.orders.record())]
+
+    def _is_unbegun(self, transport: Transport, now_us: int) -> bool:
+        """Whether a box is in nobody's plan, or its winner is out for long and cannot have it: the right is mine."""
+        owner = self.mirror.in_plans(transport.box)
+        since_us = self.mirror.traffic.out.get(transport.winner, now_us)
+        is_mine = self.fleet.tokens.holds(car_token(*self.site.box(transport.box)))
+        return owner is None or (is_mine and owner == transport.winner and now_us - since_us >= GIVE_BACK_US)
+
+    def _resolve(self, now_us: int) -> list[Effect]:
+        """Of tasks that were called for as my power failed: who has won one says so, or has it in its plan."""
+        effects: list[Effect] = []
+        for task in sorted(self._doubtful):
+            owned = self.mirror.traffic.carrying(task)
+            if owned is not None:
+                effects += self.won(task, owned.plan.owner, now_us)
+            elif now_us >= self._doubtful_until_us:
+                self._doubtful.discard(task)
+                self.orders.give_back(task, OrderEvent.NOT_WON)
+                effects.append(Record(self.orders.record()))
+        return effects
 
     def _look_after(self, now_us: int) -> list[Effect]:
         """A won task whose box is at its target is done, though nobody was heard saying so; one in no plan is lost."""
-        effects: list[Effect] = []
+        effects = self._resolve(now_us) if self._doubtful else []
         for task, one in list(self.orders.open.items()):
             effects += self._take_back(task, one, now_us)
         for task, winner in list(self.orders.won.items()):
@@ -448,7 +477,7 @@ class Desk:
                 effects += [Report(f"node {winner} has lost task {task.number}"), Record(self.orders.record())]
         return effects
 
-    # --- lanes and rights --------------------------------------------------------------------------------------
+    # --- lanes -------------------------------------------------------------------------------------------------
 
     def _seen(self, sensor: LaneSensor, now_us: int) -> list[Effect]:
         """A change on a lane is told to all robots (row M36)."""
@@ -466,22 +495,3 @@ class Desk:
 
     def _lanes_told(self) -> list[Effect]:
         return [Send(state) for state in self._lanes.values()]
-
-    def _may_enter(self, entity: int, slot: int, requester: int) -> Reason:
-        """The first in the entity's list that is not there yet, unless the slot is one further on along a lane."""
-        place = self.site.entities.get(entity)
-        if place is None or requester not in self.site.vehicles:
-            return Reason.NOT_AUTHORISED
-        if place.kind is EntityKind.LANE and slot > 1:
-            return Reason.NONE
-        traffic = self.mirror.traffic
-        row = traffic.lists.get(entity, [])
-        mine = next((n for n, one in enumerate(row) if one.owner == requester and not traffic.is_inside(one)), None)
-        if mine is None:
-            return Reason.MIRROR_BEHIND
-        before = row[:mine]
-        waiting = [one for one in before if not traffic.is_inside(one)]
-        if place.kind is EntityKind.CROSSING and place.capacity > 1:
-            same = [one for one in before if self.mirror.entry_slot(entity, one.owner) == slot]
-            return Reason.TOKEN_NOT_GRANTABLE_YET if same or len(before) >= place.capacity else Reason.NONE
-        return Reason.TOKEN_NOT_GRANTABLE_YET if waiting else Reason.NONE

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 from onboard.contract.codes import Operation
-from onboard.contract.messages import CallForProposals
+from onboard.contract.messages import CallForProposals, Reference
 from onboard.contract.terminal import Action
 from onboard.core.negotiation import CallKey, Proposal
 from onboard.core.serial import to_bus_ms
@@ -13,7 +13,10 @@ from onboard.systems.terminal.plan import ActionPlan, ActionStep, Load
 from onboard.systems.terminal.routes import carry_us, free_flow_us, least_end_ms
 from onboard.systems.terminal.search import BoxTransport, FoundPlan, PlanSearch, remaining
 from onboard.systems.terminal.site import EntityKind, Terminal
-from onboard.systems.terminal.traffic import Traffic, copy_of
+from onboard.systems.terminal.traffic import Traffic, copy_of, is_for_good
+
+#: So many stations are tried, the nearest first, as a way out of a lane. Ours: the first is mostly good enough.
+MOST_WAYS_OUT = 3
 
 
 @dataclass
@@ -58,7 +61,7 @@ class VehicleGeneration:
         if self.promised - {CallKey(call.sender, call.call)}:
             return None
         found = self.plan(job_of(self.mirror, call), now_us, version=1)
-        if found is None:
+        if found is None or is_for_good(found.plan.end, now_us):
             return None
         return Proposal(to_bus_ms(found.plan.end), None, (found.plan.end, found.plan.steps), ())
 
@@ -94,7 +97,7 @@ class VehicleGeneration:
         node, traffic = self.machine.node_id, self.mirror.traffic
         left = remaining(traffic, node, now_us)
         if left is None or not left.loads:
-            return None
+            return None if left is None else self._way_out(left, now_us, version)
         at_station = self.site.entities[left.steps[0].entity].kind is EntityKind.STATION
         kept, loads = self._at_station(left, now_us) if at_station else (None, left.loads)
         here = left.steps[0].entity if not at_station else self.site.entities[left.steps[0].entity].area
@@ -121,6 +124,50 @@ class VehicleGeneration:
             began = kept.end
             here = self.site.entities[found.plan.steps[-1].entity].area
         return kept
+
+    def _way_out(self, left: ActionPlan, now_us: int, version: int) -> ActionPlan | None:
+        """Who has given all back gets out of its lane: to a station that can be reached, and out of it again.
+
+        Plans end in an area, which is come to from a station.
+        """
+        here, site = left.steps[0].entity, self.site
+        if site.entities[here].kind in (EntityKind.AREA, EntityKind.STATION):
+            return None
+        alone = copy_of(self.mirror.traffic)
+        alone.take_up(replace(left, steps=left.steps[:1]), now_us)
+        search, found = self.search(now_us, alone), list[FoundPlan]()
+        ways = {one: free_flow_us(site, here, one) for one, place in site.entities.items() if place.area}
+        for station in sorted((one for one, way in ways.items() if way is not None), key=lambda one: ways[one] or 0):
+            one = search.best(here, left.begin, BoxTransport(0, Reference(0, 0), 0, station), version=version)
+            found += [one] if one is not None else []
+            if len(found) == MOST_WAYS_OUT:
+                break
+        best = min(found, key=lambda one: one.plan.end, default=None)
+        if best is None:
+            return None
+        steps = tuple(step for step in best.plan.steps if step.action is not Action.PUT_DOWN)
+        return replace(best.plan, steps=steps, loads=())
+
+    def without(self, boxes: set[int], now_us: int, *, version: int) -> ActionPlan | None:
+        """What is left of the plan in hand without these boxes, which are picked up last of all; None without a plan.
+
+        It ends where the last other box is put down. Where there is none it goes on to the next station of the plan,
+        and comes out of it again, since plans end in an area; one that is in an area stays there.
+        """
+        left = remaining(self.mirror.traffic, self.machine.node_id, now_us)
+        if left is None:
+            return None
+        kept = tuple(load for load in left.loads if load.box not in boxes)
+        steps = left.steps
+        if kept:
+            steps = steps[: max(load.put for load in kept) + 2]
+        elif self.site.entities[steps[0].entity].kind is EntityKind.AREA:
+            steps = ()
+        else:
+            pick = min(load.pick for load in left.loads)
+            out = next(number for number, step in enumerate(steps) if step.action is Action.UNDOCK)
+            steps = (*steps[: min(pick, out)], steps[out])
+        return replace(left, version=version, steps=steps, loads=kept)
 
     def _at_station(self, left: ActionPlan, now_us: int) -> tuple[ActionPlan, tuple[Load, ...]]:
         """The steps at the station in hand as a plan that comes first, and the loads that are not put down by then."""

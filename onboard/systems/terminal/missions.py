@@ -150,7 +150,7 @@ class MissionBook:
             station = mirror.station_of(box)
             if not station or station == order.target or box in taken or mirror.in_plans(box) is not None:
                 continue
-            if all(mirror.in_plans(upper) is not None for upper in mirror.above(box)):
+            if mirror.is_free(box):
                 return box
         return None
 

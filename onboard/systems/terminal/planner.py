@@ -3,9 +3,10 @@
 from collections import deque
 from dataclasses import dataclass, field, replace
 
-from onboard.contract.codes import Grade, Reason, TaskPhase, TokenKind
-from onboard.contract.messages import CallForProposals, Itinerary, Stamp, TaskReport
+from onboard.contract.codes import Grade, KindCode, Reason, TaskPhase, TokenKind
+from onboard.contract.messages import Award, CallForProposals, Itinerary, Stamp, TaskReport
 from onboard.contract.terminal import Assignment, StepReport, StepResult
+from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.negotiation import Awarded, NegotiationEvent, PreAssigned, Released
@@ -14,10 +15,11 @@ from onboard.systems.terminal.body import VehicleParts
 from onboard.systems.terminal.generation import VehicleGeneration, job_of
 from onboard.systems.terminal.memory import plan_record, read_plan
 from onboard.systems.terminal.mirror import TerminalMirror
-from onboard.systems.terminal.plan import ActionPlan, Load, PlanReader, to_frames
+from onboard.systems.terminal.plan import NO_STEP, ActionPlan, Load, PlanReader, to_frames
 from onboard.systems.terminal.search import BoxTransport, remaining
 from onboard.systems.terminal.site import Terminal
-from onboard.systems.terminal.traffic import Owned
+from onboard.systems.terminal.traffic import GIVE_BACK_US, Owned, is_for_good
+from onboard.ways.tokens import car_token
 
 #: A violated plan that cannot be bettered is looked at again after this, us: others' plans change within seconds.
 AGAIN_US = 10_000_000
@@ -54,6 +56,12 @@ class Planner:
     _turn_at_us: int | None = None
     #: The step in hand, and since when the right to go on from it is refused.
     _refused: tuple[int, int] | None = None
+    #: Since when I do not go on, and could give something back, us.
+    _out_since_us: int | None = None
+    #: Boxes that were given back: the right to one may have been on its way, and goes back too.
+    dropped: set[int] = field(default_factory=set)
+    #: ``TerminalMirror.given_up`` when boxes under others were last looked at.
+    _given_up: int = 0
 
     @property
     def site(self) -> Terminal:
@@ -73,6 +81,8 @@ class Planner:
     def start(self, now_us: int) -> None:
         """After a restart the journal knows the plan and how far it has come."""
         plan, over = read_plan(self.fleet.node_id, self.fleet.entries)
+        rights = {key.number & 0xFFFF for key in self.fleet.tokens.held if key.kind is TokenKind.CAR}
+        self.dropped = rights - {load.box for load in (plan.loads if plan is not None else ())}
         if plan is None:
             return
         self.version = plan.version
@@ -117,8 +127,13 @@ class Planner:
         if owned is not None and owned.current:
             effects.append(Send(self.report(owned, owned.current - 1, owned.began)))
         node = self.fleet.node_id
-        waiting = [TaskReport(node, job.task, TaskPhase.AWARDED, job.target, Reason.NONE) for job in self.queue]
-        return effects + [Send(report) for report in waiting]
+        waiting = [(job.task, job.target) for job in self.queue]
+        if owned is not None and self.fleet.tokens.refused:
+            # To whose box I am refused the right may have been given to another meanwhile.
+            refused = [one for one in owned.plan.loads if self._box_token(one) in self.fleet.tokens.refused]
+            waiting += [(one.task, owned.plan.steps[one.put].entity) for one in refused]
+        reports = [TaskReport(node, task, TaskPhase.AWARDED, target, Reason.NONE) for task, target in waiting]
+        return effects + [Send(report) for report in reports]
 
     def over(self, now_us: int) -> list[Effect]:
         """The plan is over; under a version of its own, so that whoever missed the report asks."""
@@ -153,18 +168,21 @@ class Planner:
         self.generation.has_queue = True
 
     def _plan_next(self, now_us: int) -> list[Effect]:
-        """Put the oldest task won behind what is planned; forfeit one whose box is in a plan: two desks wanted it."""
+        """Put the oldest task won behind what is planned.
+
+        One whose box is in a plan is forfeited, as two desks wanted it, and one under a box that nobody is to fetch.
+        """
         if not self.queue or (self._queue_at_us is not None and now_us < self._queue_at_us):
             return []
         job = self.queue[0]
-        if self.mirror.in_plans(job.box) is not None:
+        if self.mirror.in_plans(job.box) is not None or not self.mirror.is_free(job.box):
             self._drop_first()
             return [Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.FORFEITED, job.source, Reason.NONE))]
         if self.mirror.traffic.dates(now_us).circle:
             # While plans wait for each other there are no dates to put anything behind: one is made anew first.
             return []
         found = self.generation.plan(job, now_us, version=successor(self.version, 8))
-        if found is None:
+        if found is None or is_for_good(found.plan.end, now_us):
             self._queue_at_us = now_us + AGAIN_US
             return []
         self._drop_first()
@@ -174,9 +192,15 @@ class Planner:
         """What is only done in my turn; I wake for the turn in which something is due."""
         turn_us = self._turn_us(now_us)
         effects: list[Effect] = []
+        if self.generation.is_held or self.generation.mirror.traffic.out or self._out_since_us is not None:
+            self._note_out(now_us)
         if turn_us == now_us:
             effects = self._plan_next(now_us) + self._mend(now_us)
             effects = effects or self._tell_anew(now_us)
+            if not effects and self._out_since_us is not None:
+                effects = self._give_back(now_us)
+            if not effects and self.generation.mirror.given_up != self._given_up:
+                effects = self._leave_buried(now_us)
             turn_us = self._turn_us(now_us + TURN_US)
         due_us = self._planning_due(now_us)
         self._turn_at_us = max(turn_us, self._turn_us(due_us)) if due_us is not None else None
@@ -192,7 +216,7 @@ class Planner:
         keys = [key for key, why in self.fleet.tokens.refused.items() if why is not_yet]
         # A box's right has no list: who has won it is all that its keeper goes by.
         refused = [key.number >> 8 for key in keys if key.kind is TokenKind.SEGMENT]
-        if owned is None or not refused:
+        if owned is None or not refused or self.mirror.traffic.waits_for_good(self.fleet.node_id, now_us):
             self._refused = None
             return []
         if self._refused is None or self._refused[0] != owned.current:
@@ -203,6 +227,79 @@ class Planner:
         self._refused = None
         left = remaining(self.mirror.traffic, self.fleet.node_id, now_us)
         return [] if left is None else self._adopt(replace(left, version=successor(self.version, 8)), now_us)
+
+    def _note_out(self, now_us: int) -> None:
+        """Since when I am held, or behind somebody who does not go on, with something that I have not begun."""
+        traffic, node = self.mirror.traffic, self.fleet.node_id
+        is_out = self.generation.is_held or traffic.waits_for_good(node, now_us)
+        if not is_out or not self._unbegun():
+            self._out_since_us = None
+        elif self._out_since_us is None:
+            self._out_since_us = now_us
+
+    def ordered_by_hand(self) -> None:
+        """A person is at work with this vehicle, perhaps step by step: the minute begins anew."""
+        self._out_since_us = None
+
+    def _unbegun(self) -> list[Load]:
+        """Loads of the plan that are not picked up, and to whose boxes I have no right yet."""
+        owned, tokens = self.owned, self.fleet.tokens
+        if owned is None:
+            return []
+        coming = [one for one in owned.plan.loads if owned.current <= one.pick < NO_STEP]
+        return [one for one in coming if not tokens.holds(self._box_token(one))]
+
+    def _box_token(self, load: Load) -> TokenKey:
+        return car_token(*self.site.box(load.box))
+
+    def _give_back(self, now_us: int) -> list[Effect]:
+        """Others may do what I have not begun, while I do not go on; what is aboard, or being picked up, stays mine."""
+        since_us, owned = self._out_since_us or now_us, self.owned
+        if owned is None or now_us < since_us + GIVE_BACK_US or not self._is_settled(owned):
+            return []
+        self._out_since_us = None
+        return self._drop(self._unbegun(), now_us)
+
+    def _leave_buried(self, now_us: int) -> list[Effect]:
+        """A box under one that its fetcher has given back goes back too: nobody else could come to that stack."""
+        owned = self.owned
+        if owned is not None and not self._is_settled(owned):
+            return []
+        self._given_up = self.mirror.given_up
+        loads = self._unbegun()
+        first = min((one.pick for one in loads if not self.mirror.is_free(one.box)), default=None)
+        return [] if first is None else self._drop([one for one in loads if one.pick >= first], now_us)
+
+    def lost(self, award: Award, now_us: int) -> list[Effect]:
+        """A task of my plan is another's, or nobody's: its desk took it back while I was silent."""
+        owned, desk = self.owned, self.site.machines.get(award.sender)
+        if owned is None or all(load.task != award.task for load in owned.plan.loads) or not self._is_settled(owned):
+            return []
+        loads = self._unbegun() if desk is not None and desk.kind is KindCode.DESK else []
+        first = min((one.pick for one in loads if one.task == award.task), default=None)
+        # What comes after it was planned from where that would have been put down.
+        return [] if first is None else self._drop([one for one in loads if one.pick >= first], now_us)
+
+    def _is_settled(self, owned: Owned) -> bool:
+        """Whether nothing is ordered, and the body is where the step in hand is.
+
+        Just come into the next entity it reports that step first: a plan made anew then would begin behind it, and lead
+        from where it is no more.
+        """
+        move = self.body.move
+        is_there = move is not None and move.entity == owned.plan.steps[owned.current].entity
+        return is_there and not (self.body.is_moving or self.body.is_handling)
+
+    def _drop(self, loads: list[Load], now_us: int) -> list[Effect]:
+        boxes, node = {one.box for one in loads}, self.fleet.node_id
+        plan = self.generation.without(boxes, now_us, version=successor(self.version, 8))
+        if plan is None:
+            return []
+        for one in loads:
+            self.fleet.tokens.forget(self._box_token(one))
+            self.dropped.add(one.box)
+        words = [TaskReport(node, one.task, TaskPhase.FORFEITED, 0, Reason.NONE) for one in loads]
+        return [*self._adopt(plan, now_us), *(Send(word) for word in words)]
 
     def _is_first(self, entity: int) -> bool:
         """Whether nobody is before me in an entity's list but those inside, and there is room beside them."""
@@ -216,6 +313,8 @@ class Planner:
     def _planning_due(self, now_us: int) -> int | None:
         """When there is something to plan, or to look at."""
         times = [self._again_at_us, self._patience_at_us]
+        if self._out_since_us is not None:
+            times.append(self._out_since_us + GIVE_BACK_US)
         if self.owned is not None and self.fleet.tokens.refused:
             times.append(now_us + TELL_US)
         if self.queue:
@@ -276,7 +375,7 @@ class Planner:
     def _mend(self, now_us: int) -> list[Effect]:
         """Make my plan anew if it is violated, and mine only (M31); a blocked lane is waited for first (M33)."""
         owned, traffic = self.owned, self.mirror.traffic
-        if owned is None or (self.body.is_moving or self.body.is_handling):
+        if owned is None or not self._is_settled(owned):
             return []
         if now_us < self._stands_until_us:
             self._again_at_us, self._looked_at = self._stands_until_us, traffic.changes
@@ -290,7 +389,9 @@ class Planner:
         why = next((one.why for one in traffic.violations(now_us) if one.owner == self.fleet.node_id), "")
         blocked = self.mirror.long_blocked(now_us) & {step.entity for step in owned.plan.steps[owned.current + 1 :]}
         if blocked:
-            why = f"lane {self.site.entities[min(blocked)].name} is blocked"
+            why = f"{self.site.entities[min(blocked)].name} is blocked"
+        elif not why and traffic.out and traffic.waits_for_good(self.fleet.node_id, now_us):
+            why = "who comes before does not go on"
         return self._anew(owned, why, now_us, must=bool(blocked) or "wait for" in why) if why else []
 
     def _anew(self, owned: Owned, why: str, now_us: int, *, must: bool) -> list[Effect]:
@@ -300,15 +401,18 @@ class Planner:
         same_way = plan is not None and [one.entity for one in plan.steps] == [
             one.entity for one in owned.plan.steps[owned.current :]
         ]
-        if plan is None or (plan.end >= end_us and not must) or (same_way and "blocked" in why):
+        if plan is None or is_for_good(plan.end, now_us):
+            return []
+        if (plan.end >= end_us and not must) or (same_way and "blocked" in why):
             return []
         self.touched += 1
         self._stands_until_us = now_us + AGAIN_US
         return [Report(f"plan made anew: {why}"), *self._adopt(plan, now_us)]
 
     def _patience_end(self, now_us: int) -> int | None:
-        """When the next blocked lane on my way has been waited for long enough."""
-        ends = [since + self.site.patience_us for since in self.mirror.traffic.blocked.values()]
+        """When the next blocked lane, or vehicle that does not go on, has been waited for long enough."""
+        traffic = self.mirror.traffic
+        ends = [since + self.site.patience_us for since in (*traffic.blocked.values(), *traffic.out.values())]
         coming = min((end for end in ends if end > now_us), default=None)
         if self._patience_at_us is not None and self._patience_at_us <= now_us:
             self._looked_at = -1

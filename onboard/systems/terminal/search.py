@@ -308,10 +308,10 @@ class PlanSearch:
     ) -> ActionPlan | None:
         """Where others are delayed: before those only who follow on the lane in hand, behind all, or before all.
 
-        None where each of these makes a circle.
+        Who does not go on is passed by all. None where each of these makes a circle.
         """
-        followers = self._followers(stays[0].entity)
-        for ahead_of in (followers, frozenset[int](), frozenset(self.traffic.plans)):
+        followers, stuck = self._followers(stays[0].entity), self.traffic.stuck(self.now)
+        for ahead_of in (followers | stuck, stuck, frozenset(self.traffic.plans)):
             dated: list[ActionStep] = []
             at = began
             for stay in stays:

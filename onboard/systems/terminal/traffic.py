@@ -10,8 +10,16 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple
 
+from onboard.contract.messages import Reference
 from onboard.systems.terminal.plan import ActionPlan, EntityStay, Load
 from onboard.systems.terminal.site import EntityKind, StationKind, Terminal
+
+#: Who does not go on, and was waited for, is planned to be where it is for so long, us. Ours: longer than any plan (31
+#: steps of minutes at most), and told in 24 bits of ms (PlanStep, dbc/terminal.dbc).
+AWAY_US = 7_200_000_000
+#: What is not begun by who does not go on, or is behind such a one, for so long goes to others, us. Ours: twice what
+#: one waits before one looks for another way (``patience_s``, 30), so that whoever finds one keeps it.
+GIVE_BACK_US = 60_000_000
 
 
 class EntityVisit(NamedTuple):
@@ -88,6 +96,8 @@ class Traffic:
     lists: dict[int, list[EntityVisit]] = field(default_factory=dict)
     #: Lanes that are blocked, and since when.
     blocked: dict[int, int] = field(default_factory=dict)
+    #: Vehicles that do not go on by themselves, and since when: held, stopped or silent.
+    out: dict[int, int] = field(default_factory=dict)
     #: Dates by which tasks are to be put down.
     before: dict[tuple[int, int], int] = field(default_factory=dict)
     #: Boxes under each box of a stack, from the machine's picture of the stations.
@@ -259,6 +269,8 @@ class Traffic:
                 for step in range(owned.current, count)
             ]
             self._add_blocked(owned, floors, now)
+            if self.out:
+                self._add_out(owned, floors, now)
         for entity, row in self.lists.items():
             edges += self._list_edges(entity, row)
         edges += self._stack_edges()
@@ -271,6 +283,13 @@ class Traffic:
             if since is not None:
                 node = StepDate(owned.plan.owner, step + 1)
                 floors[node] = max(floors[node], since + self.site.patience_us, now)
+
+    def _add_out(self, owned: Owned, floors: dict[StepDate, int], now: int) -> None:
+        """Nobody knows when a person comes: for so long as one waits for a lane it may be soon, and then not at all."""
+        since = self.out.get(owned.plan.owner)
+        if since is not None and not owned.is_over:
+            node, patience = StepDate(owned.plan.owner, owned.current + 1), self.site.patience_us
+            floors[node] = max(floors[node], since + patience if now < since + patience else now + AWAY_US)
 
     def _begin(self, visit: EntityVisit) -> StepDate:
         return StepDate(visit.owner, max(visit.first, self.plans[visit.owner].current))
@@ -333,6 +352,33 @@ class Traffic:
         owned = self.plans.get(owner)
         return now if owned is None else self.dates(now).at[StepDate(owner, len(owned.plan.steps))]
 
+    def waits_for_good(self, owner: int, now: int) -> bool:
+        """Whether a machine's plan comes to its end only if somebody helps one that does not go on."""
+        return bool(self.out) and is_for_good(self.end_of(owner, now), now)
+
+    def is_waited_for(self, now: int) -> bool:
+        """Whether anybody does not go on for longer than one waits for a lane."""
+        return any(now >= since + self.site.patience_us for since in self.out.values())
+
+    def stuck(self, now: int) -> frozenset[int]:
+        """Machines that do not leave where they are before somebody has helped: who is out, and who is behind it."""
+        if not self.is_waited_for(now):
+            return frozenset()
+        dates = self.dates(now).at
+        ends = {owner: dates[StepDate(owner, owned.current + 1)] for owner, owned in self.plans.items()}
+        return frozenset(owner for owner, end in ends.items() if is_for_good(end, now))
+
+    def is_nobody_left(self, now: int) -> bool:
+        """Whether no vehicle goes on, out for longer than one waits for a lane or behind such a one."""
+        if not self.is_waited_for(now):
+            return False
+        until, stuck = now - self.site.patience_us, self.stuck(now)
+        return all(node in stuck or self.out.get(node, now) <= until for node in self.site.vehicles)
+
+    def carrying(self, task: Reference) -> Owned | None:
+        """The plan that carries out a task."""
+        return next((one for one in self.plans.values() if any(load.task == task for load in one.plan.loads)), None)
+
     def date_of(self, load: Load) -> int:
         """By when a load is to be put down, 0 for no date."""
         return load.before or self.before.get(load.task, 0)
@@ -379,9 +425,15 @@ def copy_of(traffic: Traffic) -> Traffic:
         {owner: replace(owned) for owner, owned in traffic.plans.items()},
         {entity: list(row) for entity, row in traffic.lists.items()},
         dict(traffic.blocked),
+        dict(traffic.out),
         dict(traffic.before),
         dict(traffic.below),
     )
+
+
+def is_for_good(end: int, now: int) -> bool:
+    """Whether a date is one that only comes if somebody helps a machine that does not go on."""
+    return end - now >= AWAY_US
 
 
 def earliest(floors: dict[StepDate, int], edges: list[DateConstraint]) -> Dates:

@@ -8,7 +8,16 @@ from dataclasses import dataclass, field
 
 from onboard.contract.codes import KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.contract.constants import ANY_STATION
-from onboard.contract.messages import CallForProposals, CarAt, Heartbeat, ManualOrder, Message, Reference, TaskReport
+from onboard.contract.messages import (
+    Award,
+    CallForProposals,
+    CarAt,
+    Heartbeat,
+    ManualOrder,
+    Message,
+    Reference,
+    TaskReport,
+)
 from onboard.contract.terminal import Action, Assignment, HandlerMode, MoveMode, StepResult
 from onboard.contract.terminal_device import HandlerState, MoveState
 from onboard.core.authority import TokenKey, segment_token
@@ -136,13 +145,16 @@ class Vehicle:
         if isinstance(message, ManualOrder) and message.machine == self.fleet.node_id:
             effects = self.manual.step_by_hand(message, self.owned)
             self.generation.is_held = not self.manual.is_automatic
+            self.planner.ordered_by_hand()
             return effects
         if isinstance(message, Assignment) and message.vehicle == self.fleet.node_id:
             return self.planner.assigned(message, now_us)
         if isinstance(message, CallForProposals):
             self.planner.called(message)
+        if isinstance(message, Award) and message.winner != self.fleet.node_id:
+            return self.planner.lost(message, now_us)
         if isinstance(message, Heartbeat):
-            return self.mirror.ask(message)
+            return self.mirror.on_beat(message, now_us)
         return []
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
@@ -335,7 +347,18 @@ class Vehicle:
             tokens.forget(key)
         for key in [one for one in tokens.mine() if one.kind is TokenKind.SEGMENT and one not in keep]:
             effects += tokens.give(key, self.site.stewards[key.number >> 8], now_us)
+        for box in sorted(self.planner.dropped):
+            effects += self._give_back_box(box, now_us)
         return effects
+
+    def _give_back_box(self, box: int, now_us: int) -> list[Effect]:
+        """The right to a box that I was to fetch, and that came after I had given the task back."""
+        key, handler, tokens = self._box_token(box), self.body.handler, self.fleet.tokens
+        if self.mirror.in_plans(box) == self.fleet.node_id:
+            self.planner.dropped.discard(box)
+            return []
+        is_aboard = self.body.is_handling or handler is None or handler.box == box
+        return [] if is_aboard or not tokens.holds(key) else tokens.give(key, self.site.desk, now_us)
 
     def _wanted_slots(self) -> list[TokenKey]:
         """The slot that comes next by the plan."""
