@@ -99,7 +99,7 @@ def test_what_is_aboard_stays_there_and_the_desk_says_who_has_it() -> None:
     assert served == 3
     assert set(told) == {
         "box B14 waits: R3, which is to bring it, does not go on",
-        "box B13 waits: nobody can fetch it before R3 goes on",
+        "mission 4 waits: nobody can do it before R3 goes on",
     }
     assert len(told) == 2
 

@@ -54,17 +54,23 @@ class WaitingOrders:
                 yield f"box {box}", f"{vehicle}, which is to bring it, cannot pass {self._who_is_out(' or ')}"
 
     def _not_called(self, now_us: int) -> Iterator[tuple[str, str]]:
-        """Boxes that nobody can fetch as it is, and missions for which nobody is left."""
-        traffic, boxes = self.mirror.traffic, self.orders.site.boxes
+        """Missions that nobody can do as it is, or for which nobody is left."""
+        traffic = self.mirror.traffic
+        if not traffic.is_waited_for(now_us - TOLD_AFTER_US):
+            return
         if traffic.is_nobody_left(now_us):
-            for number, one in self.orders.missions.items():
-                name = f"mission {number}" if one.task is None else f"task {one.task.number} of node {one.task.origin}"
-                yield name, f"no vehicle goes on ({self._who_is_out()})"
+            for number in self.orders.missions:
+                yield _name(number), f"no vehicle goes on ({self._who_is_out()})"
         elif traffic.stuck(now_us):
-            for called in self.orders.open.values():
-                if called.state is OrderState.CALLED and called.mission in self.refused:
-                    why = f"nobody can fetch it before {self._who_is_out(' or ')} goes on"
-                    yield f"box {boxes[called.box - 1].name}", why
+            called = {one.mission for one in self.orders.open.values() if one.state is OrderState.CALLED}
+            for number in self.refused & (called | self.orders.missions.keys()):
+                yield _name(number), f"nobody can do it before {self._who_is_out(' or ')} goes on"
 
     def _who_is_out(self, between: str = ", ") -> str:
         return between.join(self.orders.site.machines[node].name for node in self.mirror.traffic.out)
+
+
+def _name(mission: int) -> str:
+    """A mission as its operator knows it: by its number at the keyboard, or by the task of whoever ordered a box."""
+    origin, number = mission >> 16, mission & 0xFFFF
+    return f"task {number} of node {origin}" if origin else f"mission {number}"
