@@ -18,7 +18,7 @@ TOLD_AFTER_US = 75_000_000
 class WaitingOrders:
     """One desk's orders that wait.
 
-    Who is held, stopped or silent keeps the boxes that its plan has: they may be aboard.
+    Who is held, stopped or silent keeps what it has begun, which may be aboard, until a person comes.
     """
 
     orders: MissionBook
