@@ -14,6 +14,11 @@ from onboard.core.effects import Effect, Record, Send
 from onboard.core.journal_records import Entry, records_in
 from onboard.core.records import ManualRecord
 
+#: What a machine that does not go on has not begun, and others could do, it gives back after so long, us. Ours: a
+#: person who only lets somebody pass takes less, and it is twice what a vehicle waits before it looks for another way
+#: around such a one (``patience_s``, 30), so that whoever finds one keeps its work.
+GIVE_BACK_US = 60_000_000
+
 
 def says_held(message: Message) -> bool:
     """Whether a machine says that it is held, by a person or by a stop."""

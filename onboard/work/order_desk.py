@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Generic, TypeVar
 
 from onboard.contract.codes import CallResult, KindCode, MachineState, Reason, TaskPhase
-from onboard.contract.messages import ManualState, Message, Reference, SyncRequest, TaskReport
+from onboard.contract.messages import Heartbeat, ManualState, Message, Reference, SyncRequest, TaskReport
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect, Record, Send, Tell
@@ -26,6 +26,8 @@ from onboard.work.told_once import ToldOnce
 LISTEN_US = 3_000_000
 #: A desk that hears nobody at all calls again after this, us: somebody who mends a cable takes longer.
 CUT_OFF_US = 10_000_000
+#: While a person holds a machine, what nobody else can do is called for again after this, us: it may be let go.
+HELD_US = 10_000_000
 #: The counter is told how an order stands this often, us (dbc/cell.dbc, dbc/graph.dbc, dbc/turning.dbc).
 ANSWER_US = 2_000_000
 
@@ -49,7 +51,7 @@ class OrderDesk(ABC, Generic[AnOrder]):
     kind: KindCode = KindCode.DESK
     orders: dict[Reference, AnOrder] = field(default_factory=dict)
     _listen_until_us: int | None = None
-    #: Machines in which a person has a hand, and orders for which nobody bid when they were last called for.
+    #: Machines that stand in a person's hand, and orders for which nobody bid when they were last called for.
     _held: set[int] = field(default_factory=set)
     _refused: set[Reference] = field(default_factory=set)
     _told: ToldOnce = field(default_factory=ToldOnce)
@@ -90,9 +92,13 @@ class OrderDesk(ABC, Generic[AnOrder]):
         """Whether a machine told last that it works on an order: then nobody else can do it."""
         return False
 
-    def may_be_given_back(self, order: AnOrder) -> bool:
-        """Whether its winner may give it back by its word alone."""
+    def may_be_given_back(self, order: AnOrder, why: Reason) -> bool:
+        """Whether its winner may give it back by its word alone; ``why`` as that says."""
         return True
+
+    def is_too_late(self, order: AnOrder, now_us: int) -> bool:
+        """Whether nobody could carry it out in time any more, whoever is let go."""
+        return False
 
     def stands_us(self, order: AnOrder) -> int:
         """How long its winner may tell no change."""
@@ -128,8 +134,11 @@ class OrderDesk(ABC, Generic[AnOrder]):
         if says_held(message):
             self.fleet.negotiation.trust.excuse(message.sender)
         if isinstance(message, ManualState):
-            (self._held.add if says_held(message) else self._held.discard)(message.sender)
+            self._is_held(message.sender, now_us, stands=says_held(message) and message.at_rest)
             return self._told.news(self._waiting())
+        if self._held and isinstance(message, Heartbeat) and message.state is not MachineState.OBSTACLE:
+            # Whoever missed that it was let go hears it go on.
+            self._is_held(message.sender, now_us, stands=False)
         if not isinstance(message, TaskReport) or message.task not in self.orders:
             return []
         order = self.orders[message.task]
@@ -153,15 +162,26 @@ class OrderDesk(ABC, Generic[AnOrder]):
         if event.winner:
             return self._goes_to(order, OrderEvent.WON, event.winner, now_us, event.call.call)
         refused = event.result is CallResult.REFUSED
-        if refused and not self.fleet.mirror.alive(now_us):
+        (self._refused.add if refused else self._refused.discard)(order.task)
+        again_us = self._again_us(order, now_us) if refused else 0
+        if again_us is None:
+            return self.put(order, OrderEvent.HOPELESS, now_us)
+        return self.put(order, OrderEvent.NOT_WON, now_us, again_us) + self._told.news(self._waiting())
+
+    def _again_us(self, order: AnOrder, now_us: int) -> int | None:
+        """How long until an order that nobody could do is called for again, us; None: it is given up."""
+        alive = self.fleet.mirror.alive(now_us)
+        if not alive:
             # Cut off from everybody: nobody has refused it.
             order.calls = 0
-            return self.put(order, OrderEvent.NOT_WON, now_us, CUT_OFF_US)
-        if refused and self.max_calls is not None and order.calls >= self.max_calls:
-            return self.put(order, OrderEvent.HOPELESS, now_us)
-        (self._refused.add if refused else self._refused.discard)(order.task)
-        again = self.put(order, OrderEvent.NOT_WON, now_us, self.call_again_us if refused else 0)
-        return again + self._told.news(self._waiting())
+            return CUT_OFF_US
+        if self.is_too_late(order, now_us):
+            return None
+        if self._held & alive:
+            order.calls = 0
+            return max(self.call_again_us, HELD_US)
+        is_hopeless = self.max_calls is not None and order.calls >= self.max_calls
+        return None if is_hopeless else self.call_again_us
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """A desk keeps no rights."""
@@ -194,6 +214,14 @@ class OrderDesk(ABC, Generic[AnOrder]):
     def statements(self, now_us: int) -> list[Effect]:
         """Nothing: a desk of this kind has neither an itinerary nor cars in its custody."""
         return []
+
+    def _is_held(self, node: int, now_us: int, *, stands: bool) -> None:
+        if stands:
+            self._held.add(node)
+        elif node in self._held:
+            self._held.discard(node)
+            # What others did not do meanwhile they may do now.
+            self.fleet.winners.begin_anew(now_us)
 
     def _waiting(self) -> Iterator[tuple[str, str]]:
         """Orders that wait for a person to let a machine go: it has them, or nobody else can do them."""
@@ -247,7 +275,9 @@ class OrderDesk(ABC, Generic[AnOrder]):
         if reason is Reason.NONE:
             return []
         if not self.may_take_back(order):
-            self.fleet.winners.keeps(order.task)
+            if reason is not Reason.FALSE_STATEMENT or not self._held:
+                # Else it may wait for who is held: for its part of a chain, or as that stands in the way.
+                self.fleet.winners.keeps(order.task)
             return []
         # That somebody failed in it says nothing of the others.
         order.calls = 0
@@ -278,7 +308,8 @@ class OrderDesk(ABC, Generic[AnOrder]):
             case TaskPhase.REFUSED if order.named:
                 return self.put(order, OrderEvent.HOPELESS, now_us)
             case TaskPhase.FORFEITED | TaskPhase.REFUSED:
-                if order.named or order.state is not OrderState.IN_HAND or not self.may_be_given_back(order):
+                is_won = order.state is OrderState.IN_HAND and not order.named
+                if not is_won or not self.may_be_given_back(order, report.reason):
                     return []
                 self.fleet.winners.over(order.task)
                 return self.put(order, OrderEvent.GIVEN_BACK, now_us)

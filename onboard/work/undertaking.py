@@ -99,6 +99,8 @@ class Undertakings(Generic[AWork]):
     over: dict[Reference, None] = field(default_factory=dict)
     #: Of these, what was taken back by who gave it.
     cancelled: set[Reference] = field(default_factory=set)
+    #: Of ``in_hand``, what another may do, as a person holds this machine: said until it is called for.
+    left: set[Reference] = field(default_factory=set)
 
     def standing(self, task: Reference) -> TaskStanding:
         """How a task stands here: unknown, won, begun or over."""
@@ -118,6 +120,7 @@ class Undertakings(Generic[AWork]):
         following, answer = TABLE.get((was, event), (was, UndertakingAnswer.NOTHING))
         if following is was:
             return answer
+        self.left.discard(task)
         if following is _WON:
             assert work is not None, "what is won has work in it"
             self.in_hand[task] = work
@@ -141,10 +144,20 @@ class Undertakings(Generic[AWork]):
                     return []
                 self.meet(message.task, TaskEvent.TO_ANOTHER)
                 return self.lose(one) if message.task not in self.in_hand else []
+            case CallForProposals() if message.task in self.left:
+                return self._is_called(message.task, message.sender)
             case CallForProposals():
                 answer = self.meet(message.task, TaskEvent.CALLED)
                 return [self.report(message.task)] if answer is UndertakingAnswer.REPORT else []
         return []
+
+    def _is_called(self, task: Reference, caller: int) -> list[Effect]:
+        """What I have left is called for by who gave it: it is nobody's now, and may be mine again."""
+        one = self.in_hand[task]
+        if not self.may_give(one, caller):
+            return []
+        self.meet(task, TaskEvent.GIVE_UP)
+        return self.lose(one)
 
     def remember(self, task: Reference) -> None:
         """It is over, as the journal says."""
@@ -162,6 +175,8 @@ class Undertakings(Generic[AWork]):
         phase, reason = TaskPhase.AWARDED if task in self.in_hand else TaskPhase.DONE, Reason.NONE
         if task in self.cancelled:
             phase, reason = TaskPhase.REFUSED, Reason.CANCELLED
+        if task in self.left:
+            phase, reason = TaskPhase.FORFEITED, Reason.OPERATOR
         return Send(TaskReport(self.fleet.node_id, task, phase, 0, reason))
 
     def reports(self) -> list[Effect]:

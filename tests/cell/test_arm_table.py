@@ -8,10 +8,10 @@ import pytest
 
 from onboard.contract.cell import ArmMode, ArmPhase, ArmProgress, GripAction, GripMode, PartAt
 from onboard.contract.cell_device import ArmOrder, ArmState, GripOrder, GripState
-from onboard.contract.codes import TokenKind
-from onboard.contract.messages import Reference, TaskReport
+from onboard.contract.codes import ManualMode, TokenKind
+from onboard.contract.messages import ManualOrder, Reference, TaskReport
 from onboard.core.effects import Actuate, Effect, Record, Send
-from onboard.core.motion_authority import acts, authorised
+from onboard.core.motion_authority import acts
 from onboard.core.records import TokenHeldRecord
 from onboard.holon.holon import Holon
 from onboard.systems.cell.contracts import part_token
@@ -62,17 +62,29 @@ def robot(words: Words, stage: ContractStage | None, *, is_custodian: bool) -> A
     behaviour.fleet.tokens.trust()
     behaviour.fleet.motion.why_still = acts
     if words.is_ordered:
-        behaviour.gripper.order((GripAction.TAKE, PART), authorised(behaviour.fleet.motion, [key]), NOW_US)
+        behaviour.gripper.order(GripAction.TAKE, PART, NOW_US)
     return behaviour
 
 
 def say(behaviour: ArmRobot, words: Words) -> None:
     behaviour.sense(ArmState(ARM, 0, *PLACES[words.place], ArmMode.RESTING), NOW_US)
-    behaviour.sense(GripState(ARM, behaviour.gripper.sequence, words.grip, words.part), NOW_US)
+    behaviour.sense(GripState(ARM, behaviour.gripper.link.sequence, words.grip, words.part), NOW_US)
 
 
-def meant(phase: ArmPhase, words: Words) -> ArmFinding:
-    """What the words come to for a part in hand, told once more."""
+def hold(behaviour: ArmRobot, *, is_held: bool) -> None:
+    if is_held:
+        behaviour.hear(ManualOrder(251, ARM, 1, ManualMode.HELD), NOW_US)
+
+
+def meant(phase: ArmPhase, words: Words, *, is_held: bool) -> ArmFinding:
+    """What the words come to for a part in hand, told once more; in a person's hand nothing is begun."""
+    found = unheld(phase, words)
+    begins = found in (ArmFinding.ELSEWHERE, ArmFinding.THERE)
+    is_at_work = words.grip is GripMode.BUSY or (words.is_ordered and words.grip is not GripMode.NOTHING_THERE)
+    return ArmFinding.HELD if is_held and begins and not is_at_work else found
+
+
+def unheld(phase: ArmPhase, words: Words) -> ArmFinding:
     match phase:
         case ArmPhase.TO_PART:
             return ArmFinding.THERE if words.place == "start" else ArmFinding.ELSEWHERE
@@ -99,6 +111,7 @@ SAID: dict[ArmDeed, list[object]] = {
     ArmDeed.TAKE: [GripAction.TAKE],
     ArmDeed.LIFTED: ["aboard"],
     ArmDeed.REST: [],
+    ArmDeed.LEAVE: [],
     ArmDeed.PUT: [GripAction.PUT],
     ArmDeed.PUT_DOWN: [ContractStage.PUT, "lies", ContractStage.OVER, "DONE"],
 }
@@ -127,32 +140,37 @@ def line(phase: ArmPhase, finding: ArmFinding) -> tuple[ArmPhase, list[object]]:
 
 
 @pytest.mark.parametrize("phase", WORKING)
-def test_every_phase_meets_every_word_of_drive_and_gripper(phase: ArmPhase) -> None:
+@pytest.mark.parametrize("is_held", [False, True])
+def test_every_phase_meets_every_word_of_drive_and_gripper(phase: ArmPhase, is_held: bool) -> None:
     stage = ContractStage.WON if phase is ArmPhase.TO_PART else ContractStage.TAKEN
     for words in WORDS:
         one = robot(words, stage, is_custodian=True)
         one.phase, one.active = phase, TASK
         say(one, words)
-        following, said = line(phase, meant(phase, words))
+        hold(one, is_held=is_held)
+        finding = meant(phase, words, is_held=is_held)
+        following, said = line(phase, finding)
         assert (list(told(one.advance(LATER_US))), one.phase) == (said, following), words
-        assert (one.active is None) is ("lies" in said)
+        assert (one.active is None) is ("lies" in said or TABLE[phase, finding][1] is ArmDeed.LEAVE)
 
 
 @pytest.mark.parametrize("phase", CHOOSING)
 @pytest.mark.parametrize("stage", [None, ContractStage.WON, ContractStage.TAKEN])
 @pytest.mark.parametrize("is_custodian", [True, False])
+@pytest.mark.parametrize("is_held", [False, True])
 def test_without_a_part_in_hand_the_next_is_chosen(
-    phase: ArmPhase, stage: ContractStage | None, is_custodian: bool
+    phase: ArmPhase, stage: ContractStage | None, is_custodian: bool, is_held: bool
 ) -> None:
     for words in [one for one in WORDS if not one.is_ordered]:
         one = robot(words, stage, is_custodian=is_custodian)
         one.phase = phase
         say(one, words)
-        finding = choice(stage, is_custodian=is_custodian)
+        hold(one, is_held=is_held)
+        finding = choice(stage, is_custodian=is_custodian and not is_held)
         following, said = line(phase, finding)
         if TABLE[phase, finding][1] is ArmDeed.CHOOSE:
             # What was chosen is begun at once.
-            following, then = line(following, meant(following, words))
+            following, then = line(following, meant(following, words, is_held=False))
             said += then
         assert (list(told(one.advance(LATER_US))), one.phase) == (said, following), words
 
@@ -166,7 +184,8 @@ def choice(stage: ContractStage | None, *, is_custodian: bool) -> ArmFinding:
 
 
 def test_a_line_of_the_table_is_for_what_can_be() -> None:
-    met = {(phase, meant(phase, words)) for phase, words in product(WORKING, WORDS)}
+    every = product(WORKING, WORDS, (False, True))
+    met = {(phase, meant(phase, words, is_held=is_held)) for phase, words, is_held in every}
     stands = product((None, ContractStage.WON, ContractStage.TAKEN), (True, False))
     chosen = {choice(stage, is_custodian=custodian) for stage, custodian in stands}
     assert met | set(product(CHOOSING, chosen)) == set(TABLE)

@@ -49,7 +49,7 @@ def robot() -> ArmRobot:
     behaviour.fleet.motion.why_still = acts
     here = Point(10_000, 10_000)
     behaviour.sense(ArmState(ARM, 0, *here, ArmMode.RESTING), NOW_US)
-    behaviour.sense(GripState(ARM, behaviour.gripper.sequence, GripMode.OPEN, Reference(0, 0)), NOW_US)
+    behaviour.sense(GripState(ARM, behaviour.gripper.link.sequence, GripMode.OPEN, Reference(0, 0)), NOW_US)
     return behaviour
 
 

@@ -1,11 +1,13 @@
 """A short run of each system by the ordinary command, played once for all tests that look at its log."""
 
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 from bus_sim.cli import main
 from bus_sim.sites import find_site
 from onboard.core.site import Site
+from onboard.operate.names import OperateError, movable_of
 from tests.conformance.cases import CASES
 from tests.once import once
 
@@ -23,6 +25,15 @@ def site_file(system: str) -> str:
 def site_of(system: str) -> Site:
     """The same, read."""
     return find_site(site_file(system))
+
+
+def can_be_held(system: str) -> list[str]:
+    """Names of the machines that a person may hold; desks, lathes and robots in step are none of them."""
+    names = []
+    for one in site_of(system).machines.values():
+        with suppress(OperateError):
+            names.append(movable_of(site_of(system), one.name).name)
+    return names
 
 
 def one_of_each_kind(system: str) -> list[str]:

@@ -5,7 +5,6 @@ import os
 import re
 import signal
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,13 +24,12 @@ from bus_sim.run import FLEET, BusRun
 from bus_sim.sites import site_text
 from bus_sim.systems.registry import simulated_names
 from onboard.contract.messages import Heartbeat, Message
-from onboard.operate.names import OperateError, movable_of
 from onboard.systems.contract import codecs_for
 from onboard.systems.registry import system_names
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.decoder import Decoder
 from tests.conformance.cases import CASES
-from tests.conformance.runs import site_file, site_of
+from tests.conformance.runs import can_be_held, site_file, site_of
 from tests.tools import DEADLINE_S
 
 PLUGIN = Path(__file__).parents[1] / "plugin"
@@ -165,15 +163,6 @@ def faults_on(system: str) -> list[str]:
         given = [f"{key}={settings[key]}" for key in settings if key in known and known[key].default is None]
         found.append(f"{kind}:" + ",".join([*given, "at_s=6"]))
     return found
-
-
-def can_be_held(system: str) -> list[str]:
-    """Names of the machines that a person may hold; desks, lathes and robots in step are none of them."""
-    names = []
-    for one in site_of(system).machines.values():
-        with suppress(OperateError):
-            names.append(movable_of(site_of(system), one.name).name)
-    return names
 
 
 @every_system

@@ -2,7 +2,6 @@
 
 from bus_sim.systems.orders import OrderArrivals
 from onboard.contract.graph import EdgeNotice, EdgeState, NodeAnswer, NodeVerdict, RobotAt, RobotMode, TurnSignal
-from onboard.trace.check.holds import LetGoAgain
 from tests.conformance.case import Case
 from tests.graph.sites import busy_orders, hall, made
 
@@ -29,7 +28,6 @@ CASE = Case(
             [TurnSignal(21, 0, 255, 1), NodeAnswer(1, 21, 0, NodeVerdict.GO, 1, 1), *(_at(22, 4, 5),) * 4],
         ],
     },
-    idle=frozenset({LetGoAgain}),
     words=(
         ["transport order 4", "N1 to N7"],
         ["drives from N"],

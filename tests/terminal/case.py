@@ -8,7 +8,6 @@ from onboard.contract.messages import CarAt, Reference, TokenHeld
 from onboard.contract.terminal import Action, HandlerMode, MoveMode, PlanHead, PlanStep, StepReport, StepResult
 from onboard.contract.terminal_device import HandlerState, MoveOrder, MoveState
 from onboard.systems.terminal.vehicle import terminal
-from onboard.trace.check.holds import LetGoAgain
 from tests.conformance.case import Case
 from tests.terminal.seeds import short
 
@@ -53,7 +52,6 @@ CASE = Case(
         ],
         "plans-in-order": [_plan(11, (A1, 2_000), (L3, 1_000)), _plan(11, (A1, 1_000), (A4, 2_000))],
     },
-    idle=frozenset({LetGoAgain}),
     words=(
         ["transport box B4", "S2 to S10"],
         ["drives through L"],

@@ -9,6 +9,7 @@ from onboard.systems.cell.fields import IN_PATH, from_halves, path_of
 from onboard.systems.cell.site import Area, Cell, Point
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.holds import HoldAnswered, LetGoAgain
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Handlers, Rule
@@ -145,4 +146,6 @@ RULES: tuple[type[Rule], ...] = (
     InsideArea,
     PassedOn,
     PredecessorsSilent,
+    LetGoAgain,
+    HoldAnswered,
 )

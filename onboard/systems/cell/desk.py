@@ -18,7 +18,7 @@ from onboard.core.effects import Effect, Send
 from onboard.core.journal_records import records_in
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, RequestedTerms
-from onboard.core.serial import to_bus_ms
+from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine, Site
 from onboard.systems.cell.contracts import Goal, part_token
 from onboard.systems.cell.fields import MAX_PATH
@@ -39,6 +39,8 @@ class GoalOrder(WorkOrder):
     cost: float = field(default=0.0, kw_only=True)
     #: Whether a robot has said that the chain of robots would be too long.
     is_too_deep: bool = field(default=False, kw_only=True)
+    #: The version of the part's token with which it came back from who never took the part up; 0: it did not.
+    untouched: int = field(default=0, kw_only=True)
     #: When it was last called for, bus us.
     called_us: int = field(default=0, kw_only=True)
 
@@ -158,13 +160,24 @@ class GoalManager(OrderDesk[GoalOrder]):
         return call_terms(order.goal)
 
     def may_take_back(self, order: GoalOrder) -> bool:
-        """While the part has never left my custody; one that has come back lies where it was wanted."""
-        key = part_token(order.goal.part)
-        return self.fleet.tokens.holds(key) and key not in self.fleet.tokens.given
+        """While the part has never left my custody, or came back untouched; else it lies where it was wanted."""
+        key, tokens = part_token(order.goal.part), self.fleet.tokens
+        return tokens.holds(key) and (key not in tokens.given or tokens.own_version(key) == order.untouched)
 
-    def may_be_given_back(self, order: GoalOrder) -> bool:
-        """As it may be taken back: what is between the main contractor and its sub-contractors is theirs (C18)."""
+    def may_be_given_back(self, order: GoalOrder, why: Reason) -> bool:
+        """As it may be taken back: what is between the main contractor and its sub-contractors is theirs (C18).
+
+        A contractor that a person holds gives back the part that it has not begun to take, and says so.
+        """
+        key, tokens = part_token(order.goal.part), self.fleet.tokens
+        if why is Reason.OPERATOR and tokens.holds(key):
+            order.untouched = tokens.own_version(key)
         return self.may_take_back(order)
+
+    def is_too_late(self, order: GoalOrder, now_us: int) -> bool:
+        """After its time limit (row C14)."""
+        limit_ms = order.goal.time_limit_ms
+        return limit_ms != 0 and now_us > from_bus_ms(limit_ms, now_us)
 
     def in_turn(self) -> Iterable[GoalOrder]:
         """In the order of their deadlines (row C15)."""

@@ -32,6 +32,8 @@ class ArmGeneration:
     machine: Machine
     position: Point
     number: int = 0
+    #: Whether a person has a hand in: then it bids for nothing.
+    is_held: bool = False
     goals_heard: GoalsHeard = field(default_factory=GoalsHeard)
     engaged: dict[Reference, Contract] = field(default_factory=dict)
     promised: dict[CallKey, Contract] = field(default_factory=dict)
@@ -172,8 +174,8 @@ class ArmGeneration:
         return int(1000 * self.site.least_unit_cost * distance_m(start, end))
 
     def _goal(self, call: CallForProposals) -> Goal | None:
-        """The goal of a call that this robot may answer: not one that it has in hand."""
-        if call.operation is not Operation.REACH or call.criterion is not Criterion.LENGTH:
+        """The goal of a call that this robot may answer: not one that it has in hand, and none while it is held."""
+        if self.is_held or call.operation is not Operation.REACH or call.criterion is not Criterion.LENGTH:
             return None
         if call.task in self.known:
             return None

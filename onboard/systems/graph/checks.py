@@ -9,7 +9,7 @@ from onboard.systems.graph.rights import edge_token
 from onboard.systems.graph.site import FactoryGraph
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Finding, LogEvent
-from onboard.trace.check.holds import LetGoAgain
+from onboard.trace.check.holds import HoldAnswered, LetGoAgain
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Handlers, Rule
@@ -160,4 +160,5 @@ RULES: tuple[type[Rule], ...] = (
     AgentsOfNodes,
     GrantsAreTold,
     LetGoAgain,
+    HoldAnswered,
 )

@@ -11,7 +11,7 @@ from onboard.contract.terminal_device import HandlerState, MoveOrder, MoveState
 from onboard.systems.terminal.site import Entity, EntityKind, Terminal
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Finding, LogEvent
-from onboard.trace.check.holds import LetGoAgain
+from onboard.trace.check.holds import HoldAnswered, LetGoAgain
 from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Handlers, Rule
@@ -215,4 +215,5 @@ RULES: tuple[type[Rule], ...] = (
     NobodyOvertakes,
     PlansInOrder,
     LetGoAgain,
+    HoldAnswered,
 )

@@ -45,12 +45,11 @@ from onboard.systems.terminal.missions import MissionBook, Transport
 from onboard.systems.terminal.rights import verdict
 from onboard.systems.terminal.routes import least_end_ms
 from onboard.systems.terminal.site import EntityKind, Terminal
-from onboard.systems.terminal.traffic import GIVE_BACK_US
 from onboard.systems.terminal.vehicle import terminal
 from onboard.systems.terminal.waiting import WaitingOrders
 from onboard.ways.cars import CarFleet, car_fleet, car_mirror
 from onboard.ways.tokens import car_token
-from onboard.work.manual import says_held
+from onboard.work.manual import GIVE_BACK_US, says_held
 from onboard.work.order_life import OrderEvent
 from onboard.work.plain import NoEstimator
 

@@ -18,8 +18,9 @@ from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.plan import NO_STEP, ActionPlan, Load, PlanReader, to_frames
 from onboard.systems.terminal.search import BoxTransport, remaining
 from onboard.systems.terminal.site import Terminal
-from onboard.systems.terminal.traffic import GIVE_BACK_US, Owned, is_for_good
+from onboard.systems.terminal.traffic import Owned, is_for_good
 from onboard.ways.tokens import car_token
+from onboard.work.manual import GIVE_BACK_US
 
 #: A violated plan that cannot be bettered is looked at again after this, us: others' plans change within seconds.
 AGAIN_US = 10_000_000

@@ -17,9 +17,6 @@ from onboard.systems.terminal.site import EntityKind, StationKind, Terminal
 #: Who does not go on, and was waited for, is planned to be where it is for so long, us. Ours: longer than any plan (31
 #: steps of minutes at most), and told in 24 bits of ms (PlanStep, dbc/terminal.dbc).
 AWAY_US = 7_200_000_000
-#: What is not begun by who does not go on, or is behind such a one, for so long goes to others, us. Ours: twice what
-#: one waits before one looks for another way (``patience_s``, 30), so that whoever finds one keeps it.
-GIVE_BACK_US = 60_000_000
 
 
 class EntityVisit(NamedTuple):

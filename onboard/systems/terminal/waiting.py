@@ -10,7 +10,7 @@ from onboard.work.order_life import OrderState
 from onboard.work.told_once import ToldOnce
 
 #: A person is told of what a vehicle that does not go on has, or one behind it, so long after the others have begun to
-#: look for another way, us: by then what is not begun has been given back (``traffic.GIVE_BACK_US``).
+#: look for another way, us: by then what is not begun has been given back (``manual.GIVE_BACK_US``).
 TOLD_AFTER_US = 75_000_000
 
 

@@ -9,7 +9,7 @@ from onboard.systems.car_park.checks.liveness import NobodyStarves, NoRounds, So
 from onboard.systems.car_park.checks.motion import InsideAuthority, OneBody
 from onboard.systems.car_park.checks.shuttles import TornCar
 from onboard.trace.check.calls import BidsInTime, CallsClosed
-from onboard.trace.check.holds import LetGoAgain
+from onboard.trace.check.holds import HoldAnswered, LetGoAgain
 from onboard.trace.check.owners import OneOwner
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Rule
@@ -37,4 +37,5 @@ RULES: tuple[type[Rule], ...] = (
     NobodyStarves,
     NoRounds,
     LetGoAgain,
+    HoldAnswered,
 )
