@@ -18,7 +18,7 @@ from onboard.systems.terminal.missions import MissionBook, types_of
 from onboard.systems.terminal.plan import NOBODY_BEFORE, ActionPlan, ActionStep, PlanReader, to_frames
 from onboard.systems.terminal.search import BoxTransport, PlanSearch
 from onboard.systems.terminal.site import StationKind
-from onboard.systems.terminal.traffic import Traffic
+from onboard.systems.terminal.traffic import AnewFor, Traffic
 from onboard.systems.terminal.vehicle import terminal
 from onboard.ways.cars import CarMirror
 from onboard.work.order_life import OrderEvent
@@ -168,7 +168,7 @@ def test_who_stands_at_a_stack_for_a_box_under_one_that_another_fetches_leaves_i
     steps = tuple(step._replace(after=NOBODY_BEFORE) for step in upper.steps)
     load = upper.loads[0]._replace(box=box("B4"), task=Reference(1, 4))
     traffic.take_up(replace(upper, owner=12, begin=begun, steps=steps, loads=(load,)), now)
-    assert [(one.owner, one.why) for one in traffic.violations(now)] == [(11, "plans wait for each other")]
+    assert [(one.owner, one.why) for one in traffic.violations(now)] == [(11, AnewFor.CIRCLE)]
     found = VehicleGeneration(SITE, SITE.machines[11], picture).again(now, version=2)
     assert found is not None
     assert [step.action.name for step in found.steps][:5] == ["UNDOCK", "GOTO", "DOCK", "PICK_UP", "UNDOCK"]

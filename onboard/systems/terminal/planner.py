@@ -3,10 +3,9 @@
 from collections import deque
 from dataclasses import dataclass, field, replace
 
-from onboard.contract.codes import Grade, KindCode, Reason, TaskPhase, TokenKind
+from onboard.contract.codes import Grade, Reason, TaskPhase, TokenKind
 from onboard.contract.messages import Award, CallForProposals, Itinerary, Stamp, TaskReport
 from onboard.contract.terminal import Assignment, StepReport, StepResult
-from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.negotiation import Awarded, NegotiationEvent, PreAssigned, Released
@@ -15,12 +14,11 @@ from onboard.systems.terminal.body import VehicleParts
 from onboard.systems.terminal.generation import VehicleGeneration, job_of
 from onboard.systems.terminal.memory import plan_record, read_plan
 from onboard.systems.terminal.mirror import TerminalMirror
-from onboard.systems.terminal.plan import NO_STEP, ActionPlan, Load, PlanReader, to_frames
+from onboard.systems.terminal.plan import ActionPlan, Load, PlanReader, to_frames
 from onboard.systems.terminal.search import BoxTransport, remaining
 from onboard.systems.terminal.site import Terminal
-from onboard.systems.terminal.traffic import Owned, is_for_good
-from onboard.ways.tokens import car_token
-from onboard.work.manual import GIVE_BACK_US
+from onboard.systems.terminal.traffic import AnewFor, Owned, PlanViolation, is_for_good
+from onboard.systems.terminal.unbegun import UnbegunLoads
 
 #: A violated plan that cannot be bettered is looked at again after this, us: others' plans change within seconds.
 AGAIN_US = 10_000_000
@@ -57,12 +55,10 @@ class Planner:
     _turn_at_us: int | None = None
     #: The step in hand, and since when the right to go on from it is refused.
     _refused: tuple[int, int] | None = None
-    #: Since when I do not go on, and could give something back, us.
-    _out_since_us: int | None = None
-    #: Boxes that were given back: the right to one may have been on its way, and goes back too.
-    dropped: set[int] = field(default_factory=set)
-    #: ``TerminalMirror.given_up`` when boxes under others were last looked at.
-    _given_up: int = 0
+    unbegun: UnbegunLoads = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.unbegun = UnbegunLoads(self.fleet, self.generation)
 
     @property
     def site(self) -> Terminal:
@@ -83,7 +79,7 @@ class Planner:
         """After a restart the journal knows the plan and how far it has come."""
         plan, over = read_plan(self.fleet.node_id, self.fleet.entries)
         rights = {key.number & 0xFFFF for key in self.fleet.tokens.held if key.kind is TokenKind.CAR}
-        self.dropped = rights - {load.box for load in (plan.loads if plan is not None else ())}
+        self.unbegun.given_back = rights - {load.box for load in (plan.loads if plan is not None else ())}
         if plan is None:
             return
         self.version = plan.version
@@ -131,7 +127,7 @@ class Planner:
         waiting = [(job.task, job.target) for job in self.queue]
         if owned is not None and self.fleet.tokens.refused:
             # To whose box I am refused the right may have been given to another meanwhile.
-            refused = [one for one in owned.plan.loads if self._box_token(one) in self.fleet.tokens.refused]
+            refused = [one for one in owned.plan.loads if self.unbegun.right_to(one) in self.fleet.tokens.refused]
             waiting += [(one.task, owned.plan.steps[one.put].entity) for one in refused]
         reports = [TaskReport(node, task, TaskPhase.AWARDED, target, Reason.NONE) for task, target in waiting]
         return effects + [Send(report) for report in reports]
@@ -193,15 +189,12 @@ class Planner:
         """What is only done in my turn; I wake for the turn in which something is due."""
         turn_us = self._turn_us(now_us)
         effects: list[Effect] = []
-        if self.generation.is_held or self.generation.mirror.traffic.out or self._out_since_us is not None:
-            self._note_out(now_us)
+        self.unbegun.note(now_us)
         if turn_us == now_us:
             effects = self._plan_next(now_us) + self._mend(now_us)
-            effects = effects or self._tell_anew(now_us)
-            if not effects and self._out_since_us is not None:
-                effects = self._give_back(now_us)
-            if not effects and self.generation.mirror.given_up != self._given_up:
-                effects = self._leave_buried(now_us)
+            effects = effects or self._tell_anew(now_us) or self._give_back(self.unbegun.due(now_us), now_us)
+            if not effects and self.unbegun.is_to_look and (self.owned is None or self._is_settled(self.owned)):
+                effects = self._give_back(self.unbegun.buried(), now_us)
             turn_us = self._turn_us(now_us + TURN_US)
         due_us = self._planning_due(now_us)
         self._turn_at_us = max(turn_us, self._turn_us(due_us)) if due_us is not None else None
@@ -229,57 +222,17 @@ class Planner:
         left = remaining(self.mirror.traffic, self.fleet.node_id, now_us)
         return [] if left is None else self._adopt(replace(left, version=successor(self.version, 8)), now_us)
 
-    def _note_out(self, now_us: int) -> None:
-        """Since when I am held, or behind somebody who does not go on, with something that I have not begun."""
-        traffic, node = self.mirror.traffic, self.fleet.node_id
-        is_out = self.generation.is_held or traffic.waits_for_good(node, now_us)
-        if not is_out or not self._unbegun():
-            self._out_since_us = None
-        elif self._out_since_us is None:
-            self._out_since_us = now_us
-
-    def ordered_by_hand(self) -> None:
-        """A person is at work with this vehicle, perhaps step by step: the minute begins anew."""
-        self._out_since_us = None
-
-    def _unbegun(self) -> list[Load]:
-        """Loads of the plan that are not picked up, and to whose boxes I have no right yet."""
-        owned, tokens = self.owned, self.fleet.tokens
-        if owned is None:
-            return []
-        coming = [one for one in owned.plan.loads if owned.current <= one.pick < NO_STEP]
-        return [one for one in coming if not tokens.holds(self._box_token(one))]
-
-    def _box_token(self, load: Load) -> TokenKey:
-        return car_token(*self.site.box(load.box))
-
-    def _give_back(self, now_us: int) -> list[Effect]:
-        """Others may do what I have not begun, while I do not go on; what is aboard, or being picked up, stays mine."""
-        since_us, owned = self._out_since_us or now_us, self.owned
-        if owned is None or now_us < since_us + GIVE_BACK_US or not self._is_settled(owned):
-            return []
-        self._out_since_us = None
-        return self._drop(self._unbegun(), now_us)
-
-    def _leave_buried(self, now_us: int) -> list[Effect]:
-        """A box under one that its fetcher has given back goes back too: nobody else could come to that stack."""
-        owned = self.owned
-        if owned is not None and not self._is_settled(owned):
-            return []
-        self._given_up = self.mirror.given_up
-        loads = self._unbegun()
-        first = min((one.pick for one in loads if not self.mirror.is_free(one.box)), default=None)
-        return [] if first is None else self._drop([one for one in loads if one.pick >= first], now_us)
-
     def lost(self, award: Award, now_us: int) -> list[Effect]:
         """A task of my plan is another's, or nobody's: its desk took it back while I was silent."""
-        owned, desk = self.owned, self.site.machines.get(award.sender)
-        if owned is None or all(load.task != award.task for load in owned.plan.loads) or not self._is_settled(owned):
+        return self._give_back(self.unbegun.after(award), now_us)
+
+    def _give_back(self, loads: list[Load], now_us: int) -> list[Effect]:
+        """Others may do these; the plan goes on without them, once the body is where it can."""
+        if not loads or self.owned is None or not self._is_settled(self.owned):
             return []
-        loads = self._unbegun() if desk is not None and desk.kind is KindCode.DESK else []
-        first = min((one.pick for one in loads if one.task == award.task), default=None)
-        # What comes after it was planned from where that would have been put down.
-        return [] if first is None else self._drop([one for one in loads if one.pick >= first], now_us)
+        self.unbegun.begin_anew()
+        plan = self.generation.without({one.box for one in loads}, now_us, version=successor(self.version, 8))
+        return [] if plan is None else [*self._adopt(plan, now_us), *self.unbegun.give(loads)]
 
     def _is_settled(self, owned: Owned) -> bool:
         """Whether nothing is ordered, and the body is where the step in hand is.
@@ -290,17 +243,6 @@ class Planner:
         move = self.body.move
         is_there = move is not None and move.entity == owned.plan.steps[owned.current].entity
         return is_there and not (self.body.is_moving or self.body.is_handling)
-
-    def _drop(self, loads: list[Load], now_us: int) -> list[Effect]:
-        boxes, node = {one.box for one in loads}, self.fleet.node_id
-        plan = self.generation.without(boxes, now_us, version=successor(self.version, 8))
-        if plan is None:
-            return []
-        for one in loads:
-            self.fleet.tokens.forget(self._box_token(one))
-            self.dropped.add(one.box)
-        words = [TaskReport(node, one.task, TaskPhase.FORFEITED, 0, Reason.NONE) for one in loads]
-        return [*self._adopt(plan, now_us), *(Send(word) for word in words)]
 
     def _is_first(self, entity: int) -> bool:
         """Whether nobody is before me in an entity's list but those inside, and there is room beside them."""
@@ -313,9 +255,7 @@ class Planner:
 
     def _planning_due(self, now_us: int) -> int | None:
         """When there is something to plan, or to look at."""
-        times = [self._again_at_us, self._patience_at_us]
-        if self._out_since_us is not None:
-            times.append(self._out_since_us + GIVE_BACK_US)
+        times = [self._again_at_us, self._patience_at_us, self.unbegun.due_us]
         if self.owned is not None and self.fleet.tokens.refused:
             times.append(now_us + TELL_US)
         if self.queue:
@@ -387,28 +327,29 @@ class Planner:
             return []
         self._looked_at = traffic.changes
         self._again_at_us = None
-        why = next((one.why for one in traffic.violations(now_us) if one.owner == self.fleet.node_id), "")
+        found = next((one for one in traffic.violations(now_us) if one.owner == self.fleet.node_id), None)
         blocked = self.mirror.long_blocked(now_us) & {step.entity for step in owned.plan.steps[owned.current + 1 :]}
         if blocked:
-            why = f"{self.site.entities[min(blocked)].name} is blocked"
-        elif not why and traffic.out and traffic.waits_for_good(self.fleet.node_id, now_us):
-            why = "who comes before does not go on"
-        return self._anew(owned, why, now_us, must=bool(blocked) or "wait for" in why) if why else []
+            text = f"{self.site.entities[min(blocked)].name} is blocked"
+            found = PlanViolation(self.fleet.node_id, AnewFor.BLOCKED, text)
+        elif found is None and traffic.out and traffic.waits_for_good(self.fleet.node_id, now_us):
+            found = PlanViolation(self.fleet.node_id, AnewFor.OUT, "who comes before does not go on")
+        return self._anew(owned, found, now_us) if found is not None else []
 
-    def _anew(self, owned: Owned, why: str, now_us: int, *, must: bool) -> list[Effect]:
+    def _anew(self, owned: Owned, found: PlanViolation, now_us: int) -> list[Effect]:
         self._again_at_us = now_us + AGAIN_US
         plan = self.generation.again(now_us, version=successor(self.version, 8))
-        end_us = self.mirror.traffic.end_of(self.fleet.node_id, now_us)
-        same_way = plan is not None and [one.entity for one in plan.steps] == [
-            one.entity for one in owned.plan.steps[owned.current :]
-        ]
         if plan is None or is_for_good(plan.end, now_us):
             return []
-        if (plan.end >= end_us and not must) or (same_way and "blocked" in why):
+        is_better = plan.end < self.mirror.traffic.end_of(self.fleet.node_id, now_us)
+        entities = [[one.entity for one in steps] for steps in (plan.steps, owned.plan.steps[owned.current :])]
+        # A circle ends with any other plan, and a blocked lane with another way only.
+        is_enough = is_better or found.why in (AnewFor.CIRCLE, AnewFor.BLOCKED)
+        if not is_enough or (found.why is AnewFor.BLOCKED and entities[0] == entities[1]):
             return []
         self.touched += 1
         self._stands_until_us = now_us + AGAIN_US
-        return [Report(f"plan made anew: {why}"), *self._adopt(plan, now_us)]
+        return [Report(f"plan made anew: {found.text}"), *self._adopt(plan, now_us)]
 
     def _patience_end(self, now_us: int) -> int | None:
         """When the next blocked lane, or vehicle that does not go on, has been waited for long enough."""

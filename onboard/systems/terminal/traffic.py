@@ -7,6 +7,7 @@ on an entity in the order of its list; a new plan says after whom it comes, so a
 
 from collections import deque
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -76,11 +77,21 @@ class Dates(NamedTuple):
     circle: frozenset[int]
 
 
+class AnewFor(Enum):
+    """Why a plan is made anew."""
+
+    LATE = "a box would be put down after its date (M31)"
+    CIRCLE = "plans wait for each other: all dates are lost until one is another (M16)"
+    BLOCKED = "a lane of it is blocked, and was waited for (M33)"
+    OUT = "who comes before in a list does not go on, and was waited for"
+
+
 class PlanViolation(NamedTuple):
-    """Why a plan must be made anew."""
+    """A plan that cannot be kept; ``text`` is for people."""
 
     owner: int
-    why: str
+    why: AnewFor
+    text: str
 
 
 @dataclass
@@ -385,12 +396,12 @@ class Traffic:
         dates = self.dates(now)
         found = []
         if dates.circle:
-            return [PlanViolation(self._breaker(dates.circle, now), "plans wait for each other")]
+            return [PlanViolation(self._breaker(dates.circle, now), AnewFor.CIRCLE, "plans wait for each other")]
         for owner, owned in self.plans.items():
             for load in owned.plan.loads:
                 date = self.date_of(load)
                 if date and load.put >= owned.current and dates.at[StepDate(owner, load.put + 1)] >= date:
-                    found.append(PlanViolation(owner, f"box {load.box} would be put down too late"))
+                    found.append(PlanViolation(owner, AnewFor.LATE, f"box {load.box} would be put down too late"))
                     break
         return found
 

@@ -145,7 +145,7 @@ class Vehicle:
         if isinstance(message, ManualOrder) and message.machine == self.fleet.node_id:
             effects = self.manual.step_by_hand(message, self.owned)
             self.generation.is_held = not self.manual.is_automatic
-            self.planner.ordered_by_hand()
+            self.planner.unbegun.begin_anew()
             return effects
         if isinstance(message, Assignment) and message.vehicle == self.fleet.node_id:
             return self.planner.assigned(message, now_us)
@@ -347,7 +347,7 @@ class Vehicle:
             tokens.forget(key)
         for key in [one for one in tokens.mine() if one.kind is TokenKind.SEGMENT and one not in keep]:
             effects += tokens.give(key, self.site.stewards[key.number >> 8], now_us)
-        for box in sorted(self.planner.dropped):
+        for box in sorted(self.planner.unbegun.given_back):
             effects += self._give_back_box(box, now_us)
         return effects
 
@@ -355,7 +355,7 @@ class Vehicle:
         """The right to a box that I was to fetch, and that came after I had given the task back."""
         key, handler, tokens = self._box_token(box), self.body.handler, self.fleet.tokens
         if self.mirror.in_plans(box) == self.fleet.node_id:
-            self.planner.dropped.discard(box)
+            self.planner.unbegun.given_back.discard(box)
             return []
         is_aboard = self.body.is_handling or handler is None or handler.box == box
         return [] if is_aboard or not tokens.holds(key) else tokens.give(key, self.site.desk, now_us)
