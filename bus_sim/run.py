@@ -114,6 +114,8 @@ class BusRun(Generic[PlantT]):
     after_repair: list[Callable[[], None]] = field(default_factory=list)
     #: Numbers for people with a tool: several may come to the bus at one moment, each under a name of its own.
     visitors: Iterator[int] = field(default_factory=lambda: count(1))
+    #: The one computer that has the keys of a station, where a site has seals: whoever comes meanwhile waits.
+    station: asyncio.Lock = field(default_factory=asyncio.Lock)
 
     def __post_init__(self) -> None:
         #: By node-ID the site file that a machine has; who is not among them has no controller yet.

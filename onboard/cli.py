@@ -158,7 +158,7 @@ def _keeps_secrets(config: MachineConfig) -> bool:
 def _unfit(config: MachineConfig, fleet_settings: BusSettings) -> str:
     """Why the machine cannot be run as its file says, with the remedy; empty where it can."""
     if config.machine.kind not in system_of(config.site).factories:
-        what = f"a {config.machine.kind.name} of a {config.site.system} has no controller yet"
+        what = f"a {config.machine.kind.name} of a {config.site.called} has no controller yet"
         return f"{what}; name a machine of another site"
     if _keeps_secrets(config) and BusSettings.of(config.device_bus) == fleet_settings:
         return "its tickets would be read on the fleet bus; give its devices a bus of their own, [device_bus]"

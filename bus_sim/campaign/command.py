@@ -180,7 +180,7 @@ def _strangers(args: argparse.Namespace, plan: CampaignSettings, site: Site) -> 
     system, seeds = simulated_of(site), read_seeds(args.seeds)
     if system.worker is None:
         raise DemandError(
-            f"--stranger {args.stranger}: {site.name} is a {site.system}, where no machine bids by the calls of all"
+            f"--stranger {args.stranger}: {site.name} is a {site.called}, where no machine bids by the calls of all"
         )
     if sum(machine.kind is system.worker for machine in site.machines.values()) < 2:
         raise DemandError(
@@ -274,7 +274,7 @@ def _plan(args: argparse.Namespace, site: Site) -> CampaignSettings:
             args.site, args.exhaustive, limit_s, demand, out=args.out, scene=scene, person_s=person_s
         )
     if args.faults != "none" and not kinds_for(args.faults, site):
-        raise DemandError(f"--faults {args.faults}: {site.name} is a {site.system}, which has none of these")
+        raise DemandError(f"--faults {args.faults}: {site.name} is a {site.called}, which has none of these")
     demand = system.usual(site, {"cars": args.cars, "orders": args.orders, "apart": args.apart})
     system.check(site, demand, read_seeds(args.seeds)[0])
     return CampaignSettings(

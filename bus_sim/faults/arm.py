@@ -76,7 +76,7 @@ def check_faults(faults: Iterable[AnyFault], site: Site) -> None:
     known = (*FRAME_FAULTS, *actions_for(site))
     for fault in faults:
         if isinstance(fault, Injection) and fault.kind not in known:
-            what = f"a {site.system} has nothing that this strikes ({KINDS[fault.kind].summary})"
+            what = f"a {site.called} has nothing that this strikes ({KINDS[fault.kind].summary})"
             raise DemandError(f"--fault {fault}: {site.name}: {what}; use {', '.join(sorted(known))}")
     try:
         check_targets(faults, site)

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -17,6 +18,10 @@ from onboard.operate.station import OperatorStation
 
 #: The station's node-ID: 251 to 255 are kept for gateways and tools (dbc/fleet.dbc).
 STATION = 251
+#: The node-ID of whoever says one word only: presses the button for an emergency stop, marks a segment.
+BUTTON = 252
+#: So long after its word its seal is through, s: a gate waits for the answers of all machines first.
+GOES_AFTER_S = 2.0
 #: Whoever could not let a machine go, as it was off or held by more than that, tries again after this, us.
 AGAIN_US = 30_000_000
 
@@ -76,10 +81,16 @@ def give(simulation: BusRun[Any], asked: CommandRequest, ended: Callable[[int | 
 
 
 async def _operate(simulation: BusRun[Any], asked: CommandRequest) -> int | None:
+    if not simulation.seals.are_used:
+        return await _speak(simulation, asked, None)
+    async with simulation.station:
+        return await _speak(simulation, asked, STATION)
+
+
+async def _speak(simulation: BusRun[Any], asked: CommandRequest, node: int | None) -> int | None:
     loop, site = simulation.loop, simulation.site
     who = f"operator {asked.command} {next(simulation.visitors)}"
-    seals = simulation.seals.are_used
-    bus = simulation.tool_bus(who, STATION) if seals else simulation.fleet.attach(who, None)
+    bus = simulation.fleet.attach(who, None) if node is None else simulation.tool_bus(who, node)
 
     def tell(line: str) -> None:
         simulation.log.event(loop.now_us(), "operator", line)
@@ -87,7 +98,7 @@ async def _operate(simulation: BusRun[Any], asked: CommandRequest) -> int | None
     station = OperatorStation(site, simulation.codecs.fleet, bus, tell)
     try:
         make = maker_of(site, asked, seed=loop.now_us() // 1_000_000)
-        return await station.operate(make, STATION if seals else None, _agrees)
+        return await station.operate(make, node, _agrees)
     except OperateError as error:
         tell(str(error))
         return None
@@ -116,6 +127,14 @@ def wish_of(injection: Injection) -> CommandRequest:
 
 
 def _say(simulation: BusRun[Any], message: Message) -> None:
-    bus = simulation.tool_bus(f"operator {next(simulation.visitors)}", STATION)
-    for frame in simulation.codecs.fleet.encode(message):
+    """One word, and who said it goes away again.
+
+    Where a site has seals that is not the station: two that speak under one node-ID at a time take each other's answers
+    for false seals.
+    """
+    node = BUTTON if simulation.seals.are_used else STATION
+    bus = simulation.tool_bus(f"operator {next(simulation.visitors)}", node)
+    for frame in simulation.codecs.fleet.encode(replace(message, sender=node)):
         bus.send(frame)
+    if simulation.seals.are_used:
+        simulation.loop.call_later(GOES_AFTER_S, lambda: simulation.loop.create_task(bus.close()))

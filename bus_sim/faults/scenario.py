@@ -129,7 +129,7 @@ class _ScenarioReader:
         section = system.section
         for key in given:
             if key != section:
-                what, remedy = f"is nothing for a {site.system}", f"write [{section}], or leave it out"
+                what, remedy = f"is nothing for a {site.called}", f"write [{section}], or leave it out"
                 self._problems.add(self._line(f"[{key}"), key, None, what, remedy)
         if section not in given:
             return None

@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
     site = find_site(args.site)
     building = part(site.system, "building")
     if building is None:
-        raise OptionError(f"--draw: no drawing of a {site.system} by itself; bus-sim run {args.site} --web shows it")
+        raise OptionError(f"--draw: no drawing of a {site.called} by itself; bus-sim run {args.site} --web shows it")
     if args.draw == "-":
         sys.stdout.write(str(building.draw(site)))
         return 0

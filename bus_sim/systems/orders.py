@@ -101,7 +101,7 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
         for name in given:
             option = f"--{name.removesuffix('_s').replace('_', '-')}"
             raise DemandError(
-                f"{option}: is about cars that come and go by the clock of a day; {site.name} is a {site.system}, and "
+                f"{option}: is about cars that come and go by the clock of a day; {site.name} is a {site.called}, and "
                 "its orders are those of its site file; leave it out"
             )
         return None
@@ -122,7 +122,7 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
         """Of what is not asked for, what is usual on the system."""
         if args.get("cars") is not None:
             raise DemandError(
-                f"--cars {args['cars']}: {site.name} is a {site.system}, to which no cars come; write --orders"
+                f"--cars {args['cars']}: {site.name} is a {site.called}, to which no cars come; write --orders"
             )
         usual, count, apart_s = self.most(site), args.get("orders"), args.get("apart")
         return OrderArrivals(

@@ -216,7 +216,7 @@ class SystemStage(ABC, Generic[PlantT]):
 
         Raises ``DemandError`` where nobody can be brought so.
         """
-        raise DemandError(f"{site.name}: a {site.system} has no order that one machine carries out at any time")
+        raise DemandError(f"{site.name}: a {site.called} has no order that one machine carries out at any time")
 
     # --- a person who watches ----------------------------------------------------------------------------------
 

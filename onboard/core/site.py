@@ -107,6 +107,8 @@ class Site:
 
     #: Which system this is, as the site file says it; it chooses the kinds' behaviours.
     system: ClassVar[str] = ""
+    #: What people call such a site.
+    called: ClassVar[str] = "site"
     #: Whether rights can be made anew one by one: only where it is known whose each right is, and what stands where.
     has_regeneration: ClassVar[bool] = False
     #: Why a person cannot hold one machine by itself; empty where that can be.

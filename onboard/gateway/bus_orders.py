@@ -71,14 +71,14 @@ class NoBusOrders:
 
     def transport(self, body: dict[str, Any]) -> OrderRequest:
         """Raises ``RefusedError``: this system takes no transports from outside."""
-        raise RefusedError("UNSUPPORTED", f"a {self._site.system} takes no transports from outside its desks")
+        raise RefusedError("UNSUPPORTED", f"a {self._site.called} takes no transports from outside its desks")
 
     def check_role(self, request: OrderRequest, role: Role | None) -> None:
         """Nothing here is anybody's own: whoever the broker lets write may order."""
 
     def visit(self, node: int, body: dict[str, Any], since: tuple[str, int] | None = None) -> OrderRequest:
         """Raises ``RefusedError``: machines of this system take no orders by name."""
-        raise RefusedError("UNSUPPORTED", f"machines of a {self._site.system} take no orders by name")
+        raise RefusedError("UNSUPPORTED", f"machines of a {self._site.called} take no orders by name")
 
     def say(self, order: GatewayOrder, sender: int, wall_us: int) -> OrderMessages:
         """Raises ``RefusedError``: no order can have been taken before."""

@@ -26,7 +26,7 @@ def factsheet(dialect: Dialect, site: Site, machine: Machine, settings: GatewayS
     content: Json = {
         "typeSpecification": {
             "seriesName": f"{site.system}-{machine.kind.name.lower()}",
-            "seriesDescription": f"{machine.kind.name.lower()} of a {site.system}, controlled by its own holon",
+            "seriesDescription": f"{machine.kind.name.lower()} of a {site.called}, controlled by its own holon",
             "agvKinematic": kinematic,
             "agvClass": "CARRIER",
             "maxLoadMass": body.load,

@@ -87,7 +87,7 @@ def _lost_of(site: Site, asked: CommandRequest) -> Lost:
     lost = machine_of(site, asked.machine)
     if not site.has_regeneration:
         raise OperateError(
-            f"{asked.machine}: {site.name} is a {site.system}; only a car park's rights can be made anew; {START_ANEW}"
+            f"{asked.machine}: {site.name} is a {site.called}; only a car park's rights can be made anew; {START_ANEW}"
         )
     if asked.absent == asked.machine:
         return Lost(lost.node_id, lost.node_id, blocked=_body_of(site, lost, asked.body, "--body"))

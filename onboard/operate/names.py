@@ -31,14 +31,15 @@ def movable_of(site: Site, name: str) -> Machine:
     if site.no_hold:
         raise OperateError(f"{name}: cannot be held: {site.no_hold}; use stop")
     if machine.kind not in MOBILE_KINDS:
-        raise OperateError(f"{name}: a {machine.kind.name.lower()} does not move about; use block, or stop")
+        remedy = "block, or stop" if way_site(site).tracks else "stop"
+        raise OperateError(f"{name}: a {machine.kind.name.lower()} does not move about; use {remedy}")
     return machine
 
 
 def segment_of(site: Site, text: str) -> Segment:
     """A segment of an alley or a spur, written ``p(1,3)``. Raises ``OperateError``."""
     if not way_site(site).tracks:
-        raise OperateError(f"{text}: a {site.system} has no segments that can be blocked")
+        raise OperateError(f"{text}: a {site.called} has no segments that can be blocked")
     match = re.fullmatch(r"p\((\d{1,3}),(\d{1,3})\)", text.replace(" ", ""))
     segment = Segment(int(match[1]), int(match[2])) if match is not None else None
     track = way_site(site).tracks.get(segment.track) if segment is not None else None

@@ -104,8 +104,8 @@ def test_a_failure_is_shrunk_kept_and_played_again(
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (("graph", "--cars", "3"), "--cars 3: graph is a graph, to which no cars come; write --orders"),
-        (("graph", "--faults", "people"), "--faults people: graph is a graph"),
+        (("graph", "--cars", "3"), "--cars 3: graph is a factory graph, to which no cars come; write --orders"),
+        (("graph", "--faults", "people"), "--faults people: graph is a factory graph"),
         (("graph", "--orders", "-1"), "--orders -1: must be from 0"),
         (("terminal", "--orders", "40"), "--orders 40: terminal has boxes for 11 missions at most"),
         (("small", "--orders", "3"), "--orders 3: small is a car park; write --cars"),
@@ -120,8 +120,8 @@ def test_a_mistake_is_one_line(arguments: tuple[str, ...], told: str, capsys: py
 @pytest.mark.parametrize(
     ("site", "text", "told"),
     [
-        ("graph", "[demand]\ncars = 3\n", ":5: demand: is nothing for a graph; write [orders], or leave it out"),
-        ("small", "[orders]\ncount = 3\n", ":5: orders: is nothing for a car-park; write [demand], or leave it out"),
+        ("graph", "[demand]\ncars = 3\n", ":5: demand: is nothing for a factory graph; write [orders], or leave it out"),
+        ("small", "[orders]\ncount = 3\n", ":5: orders: is nothing for a car park; write [demand], or leave it out"),
         ("graph", "[orders]\napart_s = 3\n", ":5: orders.count: is missing; write count = 12, or 0"),
         (
             "graph",
@@ -131,7 +131,7 @@ def test_a_mistake_is_one_line(arguments: tuple[str, ...], told: str, capsys: py
         (
             "graph",
             '[[fault]]\nkind = "lost_ticket"\ncar = 1\n',
-            "a graph has nothing that this strikes (a customer comes back",
+            "a factory graph has nothing that this strikes (a customer comes back",
         ),
     ],
 )

@@ -250,9 +250,9 @@ def test_a_mistake_in_a_site_file_gets_a_line(
     [
         (
             ["run", "SITE", "--fault", "linger:car=1,for_s=3"],
-            "s: a mapd has nothing that this strikes (a car does not leave for long)",
+            "s: a floor of pick-up and delivery has nothing that this strikes (a car does not leave for long)",
         ),
-        (["compare", "SITE"], "a mapd, and only car parks are compared; name a car park"),
+        (["compare", "SITE"], "a floor of pick-up and delivery, and only car parks are compared; name a car park"),
     ],
 )
 def test_what_such_a_site_cannot_do_is_said_in_one_line(
@@ -274,7 +274,7 @@ def test_a_machine_without_a_behaviour_says_so(
     machine = tmp_path / "machine.toml"
     machine.write_text(MACHINE)
     assert onboard_main(["--machine", str(machine)]) == 2
-    assert "R1: a VEHICLE of a mapd has no controller yet" in capsys.readouterr().err
+    assert "R1: a VEHICLE of a floor of pick-up and delivery has no controller yet" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("word", ["x", "0", "1.5", "-3", "999999"])

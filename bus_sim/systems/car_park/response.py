@@ -73,7 +73,7 @@ async def _play(site: Site, minutes: float, seed: int, loop: VirtualTimeLoop) ->
 def judge(site: Site, meter: Meter, load: float, worst_second: float) -> Measured:
     """Bounds of a site's traffic, and where a run was above them."""
     traffic = part(site.system, "traffic")
-    assert traffic is not None, f"what machines of a {site.system} may send at most is not written down"
+    assert traffic is not None, f"what machines of a {site.called} may send at most is not written down"
     running, starting = traffic.operation(site), traffic.power_up(site)
     bounds = worst_by_message(running, site.bitrate)
     start = [bound.response_us for bound in fifo_bounds(starting, site.bitrate)]

@@ -150,6 +150,7 @@ class CarPark(WaySite):
     """A robotized car park (rows P30 to P33)."""
 
     system: ClassVar[str] = "car-park"
+    called: ClassVar[str] = "car park"
     has_regeneration: ClassVar[bool] = True
     #: When a compartment calls is its own affair: nobody is a stranger to one that calls at another moment.
     demand: ClassVar[frozenset[str]] = frozenset({"call_at"})

@@ -32,6 +32,7 @@ class Cell(Site):
     """A cell: its robots' areas and the known obstacles (row C01). ``goals`` are what a run of it asks for."""
 
     system: ClassVar[str] = "cell"
+    called: ClassVar[str] = "manufacturing cell"
     demand: ClassVar[frozenset[str]] = frozenset({"goals"})
     #: What more machines add to while the cell works: a right of a cell is to a part, and begins with who named it.
     GROWS: ClassVar[frozenset[str]] = frozenset({"machines", "arms"})

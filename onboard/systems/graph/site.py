@@ -38,6 +38,7 @@ class FactoryGraph(Site):
     """
 
     system: ClassVar[str] = "graph"
+    called: ClassVar[str] = "factory graph"
     demand: ClassVar[frozenset[str]] = frozenset({"orders"})
     moved_by: ClassVar[Mapping[str, MotionNeeds]] = {"RouteOrder": MotionNeeds.RIGHT}
 

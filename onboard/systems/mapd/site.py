@@ -34,6 +34,7 @@ class Mapd(Site):
     """
 
     system: ClassVar[str] = "mapd"
+    called: ClassVar[str] = "floor of pick-up and delivery"
     demand: ClassVar[frozenset[str]] = frozenset({"tasks"})
     moved_by: ClassVar[Mapping[str, MotionNeeds]] = {"CartOrder": MotionNeeds.RIGHT}
     no_hold: ClassVar[str] = "these robots move in step, and one that is held would hold all"

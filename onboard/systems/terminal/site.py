@@ -109,6 +109,7 @@ class Terminal(Site):
     """
 
     system: ClassVar[str] = "terminal"
+    called: ClassVar[str] = "container terminal"
     demand: ClassVar[frozenset[str]] = frozenset({"missions", "blockages", "presses"})
     moved_by: ClassVar[Mapping[str, MotionNeeds]] = {"MoveOrder": MotionNeeds.PLACE, "HandlerOrder": MotionNeeds.RIGHT}
 

@@ -39,6 +39,7 @@ class Turning(Site):
     """A turning cell: its lathes, and the drawings and materials that orders name. A run asks for ``orders``."""
 
     system: ClassVar[str] = "turning"
+    called: ClassVar[str] = "turning cell"
     demand: ClassVar[frozenset[str]] = frozenset({"orders"})
     moved_by: ClassVar[Mapping[str, MotionNeeds]] = {"LatheOrder": MotionNeeds.ALONE}
 

@@ -12,6 +12,7 @@ class Shop(Site):
     """How long each polisher takes for a part, us by node-ID; a run of the site brings parts, ms after its begin."""
 
     system: ClassVar[str] = "polishing"
+    called: ClassVar[str] = "polishing shop"
     #: What a run asks of the site: no machine knows it, and the digest does not depend on it.
     demand: ClassVar[frozenset[str]] = frozenset({"parts_ms"})
     #: The order by which something moves, and what it needs: a polisher moves within itself only.

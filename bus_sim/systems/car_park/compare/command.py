@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     places = _places(args.place)
     site = find_site(args.site)
     if not isinstance(site, CarPark):
-        raise DemandError(f"{args.site}: a {site.system}, and only car parks are compared; name a car park")
+        raise DemandError(f"{args.site}: a {site.called}, and only car parks are compared; name a car park")
     small = find_site(SMALL_SITE)
     found: dict[str, ComparisonTable | SmallTable | GapTable] = {}
     for part in parts:

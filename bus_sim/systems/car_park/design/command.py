@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
 def _search(args: argparse.Namespace) -> Search:
     site = find_site(args.site)
     if not isinstance(site, CarPark):
-        raise DemandError(f"{args.site}: a {site.system}, and only car parks are designed; name a car park")
+        raise DemandError(f"{args.site}: a {site.called}, and only car parks are designed; name a car park")
     target = _target(args)
     _check_counts(args)
     own = size_of(site)

@@ -125,7 +125,7 @@ def _graph(text: str) -> tuple[Graph, FactoryGraph | None]:
         raise SiteNotFoundError(f"{text}: too small; a ring or complete graph has 3 nodes or more, a grid 2x2 or more")
     site = find_site(text)
     if not isinstance(site, FactoryGraph):
-        raise SiteNotFoundError(f"{text}: a {site.system}, no graph; name a graph site, or such as ring:6")
+        raise SiteNotFoundError(f"{text}: a {site.called}, no graph; name a graph site, or such as ring:6")
     return site.graph, site
 
 
