@@ -25,12 +25,13 @@ class LatheAction(IntEnum):
 
 
 class NcMode(IntEnum):
-    """What a numerical control does; ALARM needs a person."""
+    """What a numerical control does; HELD, it heard no order for too long and stands; ALARM needs a person."""
 
     READY = 0
     SETTING = 1
     RUNNING = 2
     ALARM = 3
+    HELD = 4
 
 
 @message(frozen=True, slots=True)

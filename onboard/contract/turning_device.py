@@ -39,7 +39,8 @@ class ProgramEnd(Message):
 class LatheOrder(Message):
     """One action.
 
-    A new sequence starts it, a repeated one does nothing.
+    A new sequence starts it. Repeated every second while the control works; a control that hears none for
+    DriveTimeOutMs stands in the middle of its work, and goes on when its order is said again.
     """
 
     #: Grows by one with every new action. 0 to 255.

@@ -21,7 +21,7 @@ TASK = Reference(9, 4)
 JOB = JobRecord(TASK, 1, 1, 16, BATCH, 1000)
 NOW_US, LATER_US = 10_000_000, 20_000_000
 #: What the control says; the number of the order that it obeyed last is that of the machine's last.
-MODES = {"ready": NcMode.READY, "works": NcMode.RUNNING}
+MODES = {"ready": NcMode.READY, "works": NcMode.RUNNING, "held": NcMode.HELD}
 PROGRAMS = {"its program": (9 * 31 + 4) % 255 + 1, "another program": 7}
 PARTS = {"none made": 0, "all made": BATCH}
 
@@ -39,7 +39,7 @@ def machine_in(stage: BatchStage) -> LatheMachine:
 
 def expected(stage: BatchStage, mode: str, program: str, parts: str, *, obeyed: bool) -> Control:
     """What the words of the control mean, told once more."""
-    if mode == "works":
+    if mode != "ready":
         return Control.BUSY
     if not obeyed:
         return Control.UNMOVED
@@ -65,7 +65,7 @@ def kind_of(effects: list[Effect]) -> list[object]:
 
 
 SAID: dict[Deed, list[object]] = {
-    Deed.WAIT: [],
+    Deed.GO_ON: [LatheAction.SET_UP],
     Deed.SAY_AGAIN: [LatheAction.MAKE],
     Deed.LOAD: ["program"],
     Deed.SET_UP: ["JobStageRecord", LatheAction.SET_UP],
@@ -87,7 +87,11 @@ def test_every_stage_meets_every_word_of_the_control(
     machine.sense(NcState(LATHE, 40, MODES[mode], PROGRAMS[program], PARTS[parts]), NOW_US)
     following, deed = TABLE[stage, expected(stage, mode, program, parts, obeyed=obeyed)]
     effects = machine.advance(LATER_US)
-    assert kind_of(effects) == SAID[deed]
+    said = [LatheAction.MAKE] if (stage, deed) == (BatchStage.MAKING, Deed.GO_ON) else SAID[deed]
+    assert kind_of(effects) == said
+    orders = [one.message for one in effects if isinstance(one, Actuate)]
+    if deed is Deed.GO_ON:
+        assert [one.sequence for one in orders if isinstance(one, LatheOrder)] == [40], "nothing is begun by it"
     standing = machine.tasks.in_hand.get(TASK)
     assert (standing.stage if standing is not None else None) is (None if deed is Deed.FINISH else following)
 

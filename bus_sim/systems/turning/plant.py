@@ -16,6 +16,8 @@ from onboard.systems.turning.fields import CHUNK, crc16
 from onboard.systems.turning.site import BatchDemand, ContourElement, Drawing, Lathe, Turning
 
 STATE_REPEAT_US = 2_000_000
+#: A control that works and hears no order for so long stands, us (dbc/turning.dbc).
+TIME_OUT_US = 2_500_000
 TOOL_REPEAT_US = 10_000_000
 ENTRY_REPEAT_US = 1_000_000
 #: Orders begin so long after power-up, us.
@@ -74,6 +76,11 @@ class NcDevice:
         self._run: ProgramRun | None = None
         self._set_up_for: tuple[str, int] | None = None
         self._timer: Timer | None = None
+        #: What follows when the work in hand is over, and how much of it is left, us, where it stands.
+        self._done: Callable[[], None] | None = None
+        self._left_us = 0
+        self._stands_in: NcMode = NcMode.READY
+        self._fresh_until_us = 0
         link.subscribe(self._on_message)
         link.answer(self._say_all)
 
@@ -93,6 +100,10 @@ class NcDevice:
             case LatheOrder() if message.sequence != self._sequence and self.mode is NcMode.READY:
                 self._sequence = message.sequence
                 self._begin(message)
+            case LatheOrder() if message.sequence == self._sequence and self._done is not None:
+                self._fresh_until_us = self._timers.now_us() + TIME_OUT_US
+                if self.mode is NcMode.HELD:
+                    self._go_on(self._stands_in)
 
     def _on_end(self, end: ProgramEnd) -> None:
         """A program that came whole is loaded; one that did not is asked for again by silence."""
@@ -135,11 +146,31 @@ class NcDevice:
         return self.lathe.edge_change_min * len(changed)
 
     def _work(self, mode: NcMode, minutes: float, done: Callable[[], None]) -> None:
+        self._done, self._left_us = done, round(minutes * _MINUTE_US)
+        self.busy_us += self._left_us
+        self._fresh_until_us = self._timers.now_us() + TIME_OUT_US
+        self._go_on(mode)
+
+    def _go_on(self, mode: NcMode) -> None:
         self.mode = mode
-        duration_us = round(minutes * _MINUTE_US)
-        self.busy_us += duration_us
         self._say()
-        self._timers.call_at(self._timers.now_us() + duration_us, done)
+        self._work_on()
+
+    def _work_on(self) -> None:
+        """Until the work is over, or no order was heard for too long: then it stands, and the rest is left."""
+        now_us = self._timers.now_us()
+        if self._left_us > 0 and now_us >= self._fresh_until_us:
+            self._stands_in, self.mode = self.mode, NcMode.HELD
+            self._say()
+            return
+        if self._left_us <= 0:
+            done, self._done = self._done, None
+            assert done is not None
+            done()
+            return
+        share_us = min(self._left_us, self._fresh_until_us - now_us)
+        self._left_us -= share_us
+        self._timers.call_at(now_us + share_us, self._work_on)
 
     def _set(self) -> None:
         self.mode, self.parts = NcMode.READY, 0

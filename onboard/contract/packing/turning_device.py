@@ -124,7 +124,7 @@ def pack_nc_state(message: NcState) -> bytes:
 def unpack_nc_state(sender: int, data: bytes) -> NcState | None:
     sequence, word_1 = _UNPACK_BIXXX(data)
     nc_mode = word_1 & 0x7
-    if nc_mode > 3:
+    if nc_mode > 4:
         return None
     program = word_1 >> 3 & 0xFF
     parts = word_1 >> 11 & 0xFFFF

@@ -26,6 +26,8 @@ from onboard.work.undertaking import TaskEvent, Undertakings
 
 #: What the control does not confirm is said again after this, us: one frame and its answer on a device bus.
 AGAIN_US = 3_000_000
+#: A control that works hears its order so often, us (dbc/turning.dbc): else it stands, as after an emergency stop.
+GO_ON_US = 1_000_000
 #: LatheProgress is repeated this often, us (dbc/turning.dbc).
 PROGRESS_US = 10_000_000
 
@@ -43,7 +45,7 @@ class Control(Enum):
 class Deed(Enum):
     """What the lathe does next."""
 
-    WAIT = "nothing"
+    GO_ON = "let the control go on: the order that it is at, again"
     SAY_AGAIN = "the last order again"
     LOAD = "the program to the control"
     SET_UP = "order to set up"
@@ -55,14 +57,14 @@ class Deed(Enum):
 #: (stage, control) -> (stage that follows, deed). The control counts parts anew when it is set up:
 #: until then the count is of the order before.
 TABLE: dict[tuple[BatchStage, Control], tuple[BatchStage, Deed]] = {
-    (BatchStage.WON, Control.BUSY): (BatchStage.WON, Deed.WAIT),
+    (BatchStage.WON, Control.BUSY): (BatchStage.WON, Deed.GO_ON),
     (BatchStage.WON, Control.UNMOVED): (BatchStage.WON, Deed.SAY_AGAIN),
     (BatchStage.WON, Control.OTHER_PROGRAM): (BatchStage.WON, Deed.LOAD),
     (BatchStage.WON, Control.FREE): (BatchStage.SETTING, Deed.SET_UP),
-    (BatchStage.SETTING, Control.BUSY): (BatchStage.SETTING, Deed.WAIT),
+    (BatchStage.SETTING, Control.BUSY): (BatchStage.SETTING, Deed.GO_ON),
     (BatchStage.SETTING, Control.UNMOVED): (BatchStage.SETTING, Deed.SAY_AGAIN),
     (BatchStage.SETTING, Control.FREE): (BatchStage.MAKING, Deed.BEGIN),
-    (BatchStage.MAKING, Control.BUSY): (BatchStage.MAKING, Deed.WAIT),
+    (BatchStage.MAKING, Control.BUSY): (BatchStage.MAKING, Deed.GO_ON),
     (BatchStage.MAKING, Control.UNMOVED): (BatchStage.MAKING, Deed.SAY_AGAIN),
     (BatchStage.MAKING, Control.FREE): (BatchStage.MAKING, Deed.MAKE),
     (BatchStage.MAKING, Control.ALL_MADE): (BatchStage.MAKING, Deed.FINISH),
@@ -108,6 +110,8 @@ class LatheMachine:
     link: DeviceLink[tuple[LatheAction, int, int]] = field(init=False)
     #: When the program is said again while the control does not name it, us.
     _program_again_us: int | None = None
+    #: When the order that the control is at is said again, us.
+    _go_on_us: int | None = None
     _progress_us: int | None = None
     _told: tuple[Reference, int, LathePhase] | None = None
 
@@ -151,6 +155,8 @@ class LatheMachine:
                 if self.nc is None:
                     self.link.go_on_from(message.sequence)
                 self.nc = message
+                if message.nc_mode is NcMode.READY:
+                    self._go_on_us = None
             case ToolState():
                 self.generation.state.used_min[message.tool] = message.used_ms / 60_000
         return []
@@ -193,7 +199,7 @@ class LatheMachine:
         """When something is to be said again."""
         if self.nc is None:
             return None
-        times = (self.link.due_us, self._program_again_us, self._progress_us)
+        times = (self.link.due_us, self._program_again_us, self._go_on_us, self._progress_us)
         return min((time for time in times if time is not None), default=None)
 
     def statements(self, now_us: int) -> list[Effect]:
@@ -231,10 +237,10 @@ class LatheMachine:
             one.stage = following
             written = [_stage_record(one)]
         match deed:
-            case Deed.WAIT:
+            case Deed.GO_ON:
                 self.link.pause()
                 self._program_again_us = None
-                return written
+                return written + self._go_on(one, self.nc, now_us)
             case Deed.SAY_AGAIN:
                 return written + self.link.again(now_us)
             case Deed.LOAD:
@@ -250,6 +256,14 @@ class LatheMachine:
                 return written + self._make(process, now_us)
             case Deed.FINISH:
                 return written + self._finish(one)
+
+    def _go_on(self, one: Batch, nc: NcState, now_us: int) -> list[Effect]:
+        """What the control is at, also by the order of an earlier life: a number that it knows starts nothing."""
+        if self._go_on_us is not None and now_us < self._go_on_us:
+            return []
+        self._go_on_us = now_us + GO_ON_US
+        action = LatheAction.MAKE if one.stage is BatchStage.MAKING else LatheAction.SET_UP
+        return self._permit().order(LatheOrder(self.fleet.node_id, nc.sequence, action, 0, 0))
 
     def _control(self, nc: NcState, one: Batch) -> Control:
         """What the control's last word comes to."""
