@@ -27,7 +27,10 @@ class StepResult(IntEnum):
 
 
 class MoveMode(IntEnum):
-    """What the drive does: stands at the end of its slot, moves, stands before an obstacle, or is out of order."""
+    """What the drive does.
+
+    Stands (in the middle of its slot where at_end is 0), moves, stands before an obstacle, or is out of order.
+    """
 
     STANDING = 0
     MOVING = 1

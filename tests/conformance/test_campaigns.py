@@ -120,7 +120,11 @@ def test_a_mistake_is_one_line(arguments: tuple[str, ...], told: str, capsys: py
 @pytest.mark.parametrize(
     ("site", "text", "told"),
     [
-        ("graph", "[demand]\ncars = 3\n", ":5: demand: is nothing for a factory graph; write [orders], or leave it out"),
+        (
+            "graph",
+            "[demand]\ncars = 3\n",
+            ":5: demand: is nothing for a factory graph; write [orders], or leave it out",
+        ),
         ("small", "[orders]\ncount = 3\n", ":5: orders: is nothing for a car park; write [demand], or leave it out"),
         ("graph", "[orders]\napart_s = 3\n", ":5: orders.count: is missing; write count = 12, or 0"),
         (

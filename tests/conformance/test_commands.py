@@ -201,13 +201,17 @@ def test_what_is_about_cars_is_refused_where_no_cars_come(
 ) -> None:
     said = run(system, *option, statuses=(2,))
     assert said.count("\n") == 1
-    assert re.match(rf"bus-sim: {option[0]}: is about cars .* is a {site_of(system).called}, and its orders are those of its", said)
+    assert re.match(
+        rf"bus-sim: {option[0]}: is about cars .* is a {site_of(system).called}, and its orders are those of its", said
+    )
 
 
 @without_cars
 def test_a_fault_that_strikes_nothing_there_is_refused_with_the_reason(system: str, run: Callable[..., str]) -> None:
     said = run(system, "--fault", "lost_ticket:car=1", "--speed", "max", seconds=1.0, statuses=(2,))
-    assert f"a {site_of(system).called} has nothing that this strikes (a customer comes back without the ticket)" in said
+    assert (
+        f"a {site_of(system).called} has nothing that this strikes (a customer comes back without the ticket)" in said
+    )
 
 
 @every_system

@@ -41,7 +41,10 @@ def test_a_run_leaves_a_trace_that_is_judged(
     ("fault", "says"),
     [
         ("crash:target=R9,at_s=20", "target=R9: no such machine on site cell; known here: GM, R1"),
-        ("lost_ticket:car=1", "cell: a manufacturing cell has nothing that this strikes (a customer comes back without the ticket)"),
+        (
+            "lost_ticket:car=1",
+            "cell: a manufacturing cell has nothing that this strikes (a customer comes back without the ticket)",
+        ),
     ],
 )
 def test_a_fault_that_a_cell_cannot_have_is_one_line(fault: str, says: str, capsys: pytest.CaptureFixture[str]) -> None:

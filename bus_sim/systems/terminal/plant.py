@@ -6,6 +6,7 @@ from functools import partial
 
 from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import Timers
+from bus_sim.devices.watched import WatchedWork
 from bus_sim.systems.terminal.deliveries import deliveries, ordered
 from bus_sim.systems.terminal.world import TerminalWorld, VehicleBody
 from onboard.contract.codes import KindCode, ManualMode
@@ -28,6 +29,8 @@ from onboard.systems.terminal.site import Blockage, EntityKind, Mission, Press, 
 PRESSES = {"hold": ManualMode.HELD, "step": ManualMode.STEP, "release": ManualMode.AUTOMATIC}
 #: A body passes from one slot into the next in so long, us: a walking pace over a slot of the shipped site.
 HOP_US = 300_000
+#: A drive that crosses a slot and hears no order for so long stands there, us (dbc/terminal.dbc).
+TIME_OUT_US = 1_250_000
 #: Devices and cameras say again how things stand, us (dbc/terminal.dbc).
 SLOW_US = 10_000_000
 #: An operator types a mission again after this while the desk has not answered, us (dbc/terminal.dbc).
@@ -47,7 +50,7 @@ class VehicleDevices:
         self.at_end = True
         self.handler_mode = HandlerMode.FREE
         self._pending: MoveOrder | None = None
-        self._run = 0
+        self._crossing = WatchedWork(plant.timers, TIME_OUT_US, self._stand)
         link.subscribe(self._on_message)
         link.answer(self._tell)
 
@@ -71,7 +74,7 @@ class VehicleDevices:
 
     def _ordered(self, order: MoveOrder) -> None:
         if order.sequence == self.sequence:
-            self._tell_move()
+            self._again()
             return
         if self._pending is not None or self.body.target is not None:
             return
@@ -115,23 +118,35 @@ class VehicleDevices:
     def _cross(self, towards: int) -> None:
         """Through the slot in hand: a lane's share of its length, a crossing or an area whole; a station at once."""
         entity = self.plant.site.entities[self.body.entity]
-        self._run += 1
+        self._crossing.end()
         if entity.kind is EntityKind.STATION or (entity.kind is EntityKind.AREA and not towards):
             duration_us = 0
         else:
             slots = entity.capacity if entity.kind is EntityKind.LANE else 1
             duration_us = entity.crossing_us(self.body.came_from, towards) // slots - HOP_US
         if duration_us <= 0:
-            self._crossed(self._run)
+            self._crossed()
             return
         self.mode, self.at_end = MoveMode.MOVING, False
         self._tell_move()
-        self.plant.after(self._really(duration_us), partial(self._crossed, self._run))
+        self._crossing.begin(self._really(duration_us), self._crossed)
 
-    def _crossed(self, run: int) -> None:
-        if run == self._run:
-            self.mode, self.at_end = MoveMode.STANDING, True
-            self._tell_move()
+    def _crossed(self) -> None:
+        self.mode, self.at_end = MoveMode.STANDING, True
+        self._tell_move()
+
+    def _stand(self) -> None:
+        """In the middle of a slot."""
+        self.mode = MoveMode.STANDING
+        self._tell_move()
+
+    def _again(self) -> None:
+        """The order in hand, said again: a drive that moves goes on, and any other says how it stands."""
+        if self._crossing.hear():
+            self.mode = MoveMode.MOVING
+        elif self._crossing.is_in_hand:
+            return
+        self._tell_move()
 
     def _tell_move(self) -> None:
         body = self.body

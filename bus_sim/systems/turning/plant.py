@@ -7,6 +7,7 @@ from math import hypot
 
 from bus_sim.devices.link import BusDeviceLink, DeviceBusLink
 from bus_sim.devices.timers import Timer, Timers
+from bus_sim.devices.watched import WatchedWork
 from bus_sim.systems.turning.nc import ProgramError, ProgramRun, contour_error_mm, run_program
 from onboard.contract.codes import OrderResult
 from onboard.contract.messages import Message
@@ -76,11 +77,9 @@ class NcDevice:
         self._run: ProgramRun | None = None
         self._set_up_for: tuple[str, int] | None = None
         self._timer: Timer | None = None
-        #: What follows when the work in hand is over, and how much of it is left, us, where it stands.
-        self._done: Callable[[], None] | None = None
-        self._left_us = 0
-        self._stands_in: NcMode = NcMode.READY
-        self._fresh_until_us = 0
+        self._work = WatchedWork(plant.timers, TIME_OUT_US, self._stand)
+        #: What it was at when it came to stand.
+        self._stands_in = NcMode.READY
         link.subscribe(self._on_message)
         link.answer(self._say_all)
 
@@ -100,10 +99,9 @@ class NcDevice:
             case LatheOrder() if message.sequence != self._sequence and self.mode is NcMode.READY:
                 self._sequence = message.sequence
                 self._begin(message)
-            case LatheOrder() if message.sequence == self._sequence and self._done is not None:
-                self._fresh_until_us = self._timers.now_us() + TIME_OUT_US
-                if self.mode is NcMode.HELD:
-                    self._go_on(self._stands_in)
+            case LatheOrder() if message.sequence == self._sequence and self._work.hear():
+                self.mode = self._stands_in
+                self._say()
 
     def _on_end(self, end: ProgramEnd) -> None:
         """A program that came whole is loaded; one that did not is asked for again by silence."""
@@ -131,12 +129,12 @@ class NcDevice:
             mounted = (self.lathe.chucks[order.chuck].name, drawing)
             minutes = 0.0 if mounted == self._set_up_for else self.lathe.setup_min
             self._set_up_for = mounted
-            self._work(NcMode.SETTING, minutes + change_min, self._set)
+            self._begin_work(NcMode.SETTING, minutes + change_min, self._set)
         else:
             run = self._run
             minutes = sum(run.cut_min.values()) + run.rapid_mm / self.lathe.rapid_mm_min
             minutes += run.tool_changes * self.lathe.tool_change_min + self.lathe.load_min + self.lathe.unload_min
-            self._work(NcMode.RUNNING, minutes + change_min, partial(self._made, run))
+            self._begin_work(NcMode.RUNNING, minutes + change_min, partial(self._made, run))
 
     def _change_edges(self, edges: int) -> float:
         changed = [tool for tool in self.used_min if edges >> tool - 1 & 1]
@@ -145,32 +143,16 @@ class NcDevice:
             self.edges_changed += 1
         return self.lathe.edge_change_min * len(changed)
 
-    def _work(self, mode: NcMode, minutes: float, done: Callable[[], None]) -> None:
-        self._done, self._left_us = done, round(minutes * _MINUTE_US)
-        self.busy_us += self._left_us
-        self._fresh_until_us = self._timers.now_us() + TIME_OUT_US
-        self._go_on(mode)
-
-    def _go_on(self, mode: NcMode) -> None:
+    def _begin_work(self, mode: NcMode, minutes: float, done: Callable[[], None]) -> None:
+        duration_us = round(minutes * _MINUTE_US)
         self.mode = mode
+        self.busy_us += duration_us
         self._say()
-        self._work_on()
+        self._work.begin(duration_us, done)
 
-    def _work_on(self) -> None:
-        """Until the work is over, or no order was heard for too long: then it stands, and the rest is left."""
-        now_us = self._timers.now_us()
-        if self._left_us > 0 and now_us >= self._fresh_until_us:
-            self._stands_in, self.mode = self.mode, NcMode.HELD
-            self._say()
-            return
-        if self._left_us <= 0:
-            done, self._done = self._done, None
-            assert done is not None
-            done()
-            return
-        share_us = min(self._left_us, self._fresh_until_us - now_us)
-        self._left_us -= share_us
-        self._timers.call_at(now_us + share_us, self._work_on)
+    def _stand(self) -> None:
+        self._stands_in, self.mode = self.mode, NcMode.HELD
+        self._say()
 
     def _set(self) -> None:
         self.mode, self.parts = NcMode.READY, 0

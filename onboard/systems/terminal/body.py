@@ -27,6 +27,8 @@ class VehicleParts:
     #: The action that was ordered, and its box.
     gear: DeviceLink[tuple[Action, int]] = field(init=False)
     crossing: tuple[int, int] = (0, 0)
+    #: When the order of the slot that is being crossed is said again, us.
+    _go_on_us: int | None = None
 
     def __post_init__(self) -> None:
         me = self.node_id
@@ -36,7 +38,8 @@ class VehicleParts:
     @property
     def due_us(self) -> int | None:
         """When an order is to be said again, bus time in us; None for never."""
-        return min((one.due_us for one in (self.drive, self.gear) if one.due_us is not None), default=None)
+        times = (self.drive.due_us, self.gear.due_us, self._go_on_us)
+        return min((time for time in times if time is not None), default=None)
 
     @property
     def is_known(self) -> bool:
@@ -94,6 +97,20 @@ class VehicleParts:
         """Order one action at a station, as far as that is permitted."""
         assert self.handler is not None
         return self.gear.order((action, box), permit, now_us)
+
+    def go_on(self, permit: Permit, now_us: int) -> list[Effect]:
+        """A drive that crosses a slot hears its order again, under the number that it knows: else it stands there.
+
+        ``permit`` is to be in that slot.
+        """
+        move = self.move
+        if move is None or move.at_end or self.is_moving:
+            self._go_on_us = None
+            return []
+        if self._go_on_us is not None and now_us < self._go_on_us:
+            return []
+        self._go_on_us = now_us + REPEAT_US
+        return permit.order(MoveOrder(self.node_id, move.sequence, move.entity, move.slot, self.towards()))
 
     def repeat(self, now_us: int) -> list[Effect]:
         """Say pending orders again where they are due."""

@@ -171,7 +171,7 @@ class Vehicle:
             return []
         if self._retry_at_us is not None and self._retry_at_us <= now_us:
             self._retry_at_us, self._may_retry = None, True
-        effects = self.body.repeat(now_us) + self._give_back(now_us) + self.manual.rests(self.body.is_at_rest)
+        effects = self._repeat(now_us) + self._give_back(now_us) + self.manual.rests(self.body.is_at_rest)
         effects += self.planner.in_turn(now_us)
         owned = self.owned
         if effects:
@@ -194,6 +194,11 @@ class Vehicle:
         if handler is not None and handler.box and self.fleet.tokens.holds(self._box_token(handler.box)):
             effects.append(Send(self._box_at(handler.box, ANY_STATION)))
         return effects + self.manual.statement() + self.fleet.tokens.statements()
+
+    def _repeat(self, now_us: int) -> list[Effect]:
+        move = self.body.move
+        assert move is not None
+        return self.body.repeat(now_us) + self.body.go_on(self._permit(move.entity, move.slot), now_us)
 
     # --- motion -----------------------------------------------------------------------------------------------
 
