@@ -12,8 +12,8 @@ from onboard.contract.terminal import Action, HandlerMode, MoveMode, Verb
 class MoveOrder(Message):
     """Go on into the next slot.
 
-    Repeated until MoveState tells that the slot is crossed; a drive never goes beyond the slot ordered, and one
-    that crosses it and hears no order for DriveTimeOutMs stands, until it is said again.
+    Repeated until MoveState names it, and each second until the slot is crossed; a drive never goes beyond the slot
+    ordered, and one that crosses it and hears no order for DriveTimeOutMs stands, until it is said again.
     """
 
     #: A new number starts the order; a repeated one does nothing. 0 to 255.

@@ -21,7 +21,7 @@ RUNS = {
     "standard --random 30 15 --cars 3": "e0746ae6829a14d5",
     "large --random 30 15 --cars 2": "9c5069046670a2a9",
     "graph --for 150": "c9c60c76829b0e35",
-    "terminal --for 150": "0914d27e319b57ce",
+    "terminal --for 150": "add1c5eb42421429",
 }
 
 

@@ -30,7 +30,7 @@ PRESSES = {"hold": ManualMode.HELD, "step": ManualMode.STEP, "release": ManualMo
 #: A body passes from one slot into the next in so long, us: a walking pace over a slot of the shipped site.
 HOP_US = 300_000
 #: A drive that crosses a slot and hears no order for so long stands there, us (dbc/terminal.dbc).
-TIME_OUT_US = 1_250_000
+TIME_OUT_US = 2_500_000
 #: Devices and cameras say again how things stand, us (dbc/terminal.dbc).
 SLOW_US = 10_000_000
 #: An operator types a mission again after this while the desk has not answered, us (dbc/terminal.dbc).

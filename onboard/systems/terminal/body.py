@@ -10,6 +10,8 @@ from onboard.work.device_link import DeviceLink
 
 #: Orders are repeated so often, us (dbc/terminal.dbc).
 REPEAT_US = 500_000
+#: So often while a slot is crossed, us (dbc/terminal.dbc).
+GO_ON_US = 1_000_000
 
 
 @dataclass
@@ -27,8 +29,8 @@ class VehicleParts:
     #: The action that was ordered, and its box.
     gear: DeviceLink[tuple[Action, int]] = field(init=False)
     crossing: tuple[int, int] = (0, 0)
-    #: When the order of the slot that is being crossed is said again, us.
-    _go_on_us: int | None = None
+    #: When the order of the slot that is being crossed is said again, us: a drive that hears none stands there.
+    go_on_us: int | None = None
 
     def __post_init__(self) -> None:
         me = self.node_id
@@ -38,7 +40,7 @@ class VehicleParts:
     @property
     def due_us(self) -> int | None:
         """When an order is to be said again, bus time in us; None for never."""
-        times = (self.drive.due_us, self.gear.due_us, self._go_on_us)
+        times = (self.drive.due_us, self.gear.due_us, None if self.is_moving else self.go_on_us)
         return min((time for time in times if time is not None), default=None)
 
     @property
@@ -67,7 +69,7 @@ class VehicleParts:
         """Whether the slot is crossed and nothing is ordered: the next may be entered."""
         return self.move is not None and not self.is_moving and self.move.at_end and self.move.mode is MoveMode.STANDING
 
-    def sense(self, message: MoveState | HandlerState) -> None:
+    def sense(self, message: MoveState | HandlerState, now_us: int) -> None:
         """What a device says; the order that it carried out need not be repeated."""
         if isinstance(message, MoveState):
             self.move = message
@@ -76,6 +78,10 @@ class VehicleParts:
                 self.drive.go_on_from(message.sequence)
             elif self.drive.is_obeyed(message.sequence) and (message.entity, message.slot) == order[:2]:
                 self.drive.rest()
+            if message.at_end or self.is_moving:
+                self.go_on_us = None
+            elif self.go_on_us is None:
+                self.go_on_us = now_us + GO_ON_US
         else:
             self.handler = message
             if self.gear.wanted is None:
@@ -86,7 +92,8 @@ class VehicleParts:
     def go(self, permit: Permit, entity: int, slot: int, towards: int, now_us: int) -> list[Effect]:
         """Order one slot, as far as that is permitted."""
         assert self.move is not None
-        self.crossing = (entity, towards) if permit else self.crossing
+        if permit:
+            self.crossing, self.go_on_us = (entity, towards), None
         return self.drive.order((entity, slot, towards), permit, now_us)
 
     def towards(self) -> int:
@@ -99,18 +106,11 @@ class VehicleParts:
         return self.gear.order((action, box), permit, now_us)
 
     def go_on(self, permit: Permit, now_us: int) -> list[Effect]:
-        """A drive that crosses a slot hears its order again, under the number that it knows: else it stands there.
-
-        ``permit`` is to be in that slot.
-        """
-        move = self.move
-        if move is None or move.at_end or self.is_moving:
-            self._go_on_us = None
-            return []
-        if self._go_on_us is not None and now_us < self._go_on_us:
-            return []
-        self._go_on_us = now_us + REPEAT_US
-        return permit.order(MoveOrder(self.node_id, move.sequence, move.entity, move.slot, self.towards()))
+        """Say it under the number that the drive knows; ``permit`` is to be in that slot."""
+        assert self.move is not None
+        self.go_on_us = now_us + GO_ON_US
+        known = self.move.sequence, self.move.entity, self.move.slot
+        return permit.order(MoveOrder(self.node_id, *known, self.towards()))
 
     def repeat(self, now_us: int) -> list[Effect]:
         """Say pending orders again where they are due."""

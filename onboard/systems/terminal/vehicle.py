@@ -134,7 +134,7 @@ class Vehicle:
         """States of drive and handler; with the first of both the vehicle takes its place."""
         if isinstance(message, MoveState | HandlerState):
             was_known = self.body.is_known
-            self.body.sense(message)
+            self.body.sense(message, now_us)
             if self.body.is_known and not was_known:
                 return [*self._settle_in(now_us), *self.statements(now_us)]
         return []
@@ -196,9 +196,11 @@ class Vehicle:
         return effects + self.manual.statement() + self.fleet.tokens.statements()
 
     def _repeat(self, now_us: int) -> list[Effect]:
-        move = self.body.move
-        assert move is not None
-        return self.body.repeat(now_us) + self.body.go_on(self._permit(move.entity, move.slot), now_us)
+        effects, move = self.body.repeat(now_us), self.body.move
+        due_us = self.body.go_on_us
+        if move is not None and due_us is not None and due_us <= now_us and not self.body.is_moving:
+            effects += self.body.go_on(self._permit(move.entity, move.slot), now_us)
+        return effects
 
     # --- motion -----------------------------------------------------------------------------------------------
 
