@@ -82,4 +82,6 @@ class HoldAnswered(Rule):
         return beat.state not in STILL and node not in picture.announcing and picture.is_alive(node, beat.boot)
 
     def _on_state(self, event: LogEvent[ManualState]) -> None:
-        self._open.pop(event.message.sender, None)
+        order, _, _ = self._open.get(event.message.sender, (None, 0, 0))
+        if order is not None and order.number == event.message.number:
+            del self._open[event.message.sender]

@@ -62,6 +62,11 @@ def _deaf_to_the_end_of_a_hold(simulation: Simulation) -> None:
         replace(robot.holding, "ordered", make)
 
     in_behaviour(simulation, KindCode.ROBOT, plant)
+    _person_says(simulation, (20.0, 1, ManualMode.HELD), (30.0, 2, ManualMode.AUTOMATIC))
+
+
+def _person_says(simulation: Simulation, *orders: tuple[float, int, ManualMode]) -> None:
+    """To the first robot, each at its time in s of loop time, under its number."""
     robots = [node for node, one in simulation.site.machines.items() if one.kind is KindCode.ROBOT]
     bus, codec = simulation.fleet.attach("person", _PERSON), fleet_codec()
 
@@ -69,8 +74,21 @@ def _deaf_to_the_end_of_a_hold(simulation: Simulation) -> None:
         for frame in codec.encode(ManualOrder(_PERSON, robots[0], number, mode)):
             bus.send(frame)
 
-    simulation.loop.call_at(20.0, say, 1, ManualMode.HELD)
-    simulation.loop.call_at(30.0, say, 2, ManualMode.AUTOMATIC)
+    for at_s, number, mode in orders:
+        simulation.loop.call_at(at_s, say, number, mode)
+
+
+def _takes_no_order(*, answers: bool) -> Callable[[Simulation], None]:
+    """A person tries ten times to hold a robot, which answers nothing, or what it was told last."""
+
+    def plant_in(simulation: Simulation) -> None:
+        def plant(robot: Any) -> None:
+            replace(robot.holding, "ordered", lambda _: lambda _: [robot.holding.manual.report()] if answers else [])
+
+        in_behaviour(simulation, KindCode.ROBOT, plant)
+        _person_says(simulation, *((20.0 + second, 1, ManualMode.HELD) for second in range(10)))
+
+    return plant_in
 
 
 def _nobody_is_left_out(simulation: Simulation) -> None:
@@ -125,6 +143,13 @@ BUGS = (
     PlantedBug("held-by-nobody", "let-go-again", "robots take themselves for held", _takes_itself_for_held),
     PlantedBug(
         "deaf-to-going-on", "let-go-again", "a held robot does not hear that it may go on", _deaf_to_the_end_of_a_hold
+    ),
+    PlantedBug("deaf-to-a-hand", "hold-answered", "robots hear no order by hand", _takes_no_order(answers=False)),
+    PlantedBug(
+        "answers-another-hand",
+        "hold-answered",
+        "robots answer an order by hand as if it were the one before",
+        _takes_no_order(answers=True),
     ),
     PlantedBug(
         "gives-all-back", "no-rounds", "robots give back what they win, and nobody remembers it", _gives_all_back
