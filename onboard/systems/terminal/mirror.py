@@ -110,8 +110,12 @@ class TerminalMirror:
         # Who gives up what it had planned is where it has come to.
         steps = plan.steps or (known.plan.steps[: known.current + 1] if known is not None else ())
         if steps:
-            last = self.site.entities[steps[-1].entity]
-            self.where[plan.owner] = last.area or last.number
+            self.stands(plan.owner, steps[-1].entity)
+
+    def stands(self, node: int, entity: int) -> None:
+        """Where a machine is free, or will be: in an area also where it comes out of a station."""
+        place = self.site.entities[entity]
+        self.where[node] = place.area or place.number
 
     def _on_report(self, report: StepReport, now_us: int) -> None:
         self.traffic.report(report.sender, report.version, report.step, from_bus_ms(report.at_ms, now_us))

@@ -135,6 +135,9 @@ class Vehicle:
         if isinstance(message, MoveState | HandlerState):
             was_known = self.body.is_known
             self.body.sense(message, now_us)
+            if self.owned is None and self.body.move is not None and self.body.move.entity in self.site.entities:
+                # Also after a start: what was carried out before is in no journal.
+                self.mirror.stands(self.fleet.node_id, self.body.move.entity)
             if self.body.is_known and not was_known:
                 return [*self._settle_in(now_us), *self.statements(now_us)]
         return []
