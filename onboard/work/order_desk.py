@@ -26,6 +26,8 @@ from onboard.work.told_once import ToldOnce
 LISTEN_US = 3_000_000
 #: A desk that hears nobody at all calls again after this, us: somebody who mends a cable takes longer.
 CUT_OFF_US = 10_000_000
+#: A desk that is alone on its bus looks again after this whether somebody lives, us: a heartbeat period.
+ALONE_US = 2_000_000
 #: While a person holds a machine, what nobody else can do is called for again after this, us: it may be let go.
 HELD_US = 10_000_000
 #: The counter is told how an order stands this often, us (dbc/cell.dbc, dbc/graph.dbc, dbc/turning.dbc).
@@ -286,6 +288,10 @@ class OrderDesk(ABC, Generic[AnOrder]):
 
     def go_on(self, order: AnOrder, now_us: int) -> list[Effect]:
         """What is due for an order: to be called for, or to be asked after."""
+        if order.state is OrderState.HEARD and not self.fleet.mirror.alive(now_us):
+            # Nobody acknowledges a frame: calls would wait in the interface, and reach whoever comes minutes too late.
+            order.due_us = now_us + ALONE_US
+            return []
         if order.state is OrderState.HEARD:
             order.calls += 1
             effects = self.put(order, OrderEvent.CALL, now_us)

@@ -112,3 +112,22 @@ def test_who_hears_nobody_at_all_refuses_nobody(system: str, is_heard: bool) -> 
     desk.negotiated(Closed(call, 0, CallResult.REFUSED, Reason.NO_BID, 5), NOW_US)
     assert order.state is (OrderState.REFUSED if is_heard else OrderState.HEARD)
     assert is_heard or order.due_us == NOW_US + CUT_OFF_US
+
+
+@pytest.mark.parametrize("system", ORDERS)
+@pytest.mark.parametrize("is_heard", [True, False])
+def test_who_is_alone_on_the_bus_calls_for_nothing(system: str, is_heard: bool) -> None:
+    """Its calls waited in the interface for ten minutes, some of their awards found no room, and all came at once."""
+    desk, order = desk_of(system), type(ORDERS[system])(**vars(ORDERS[system]))
+    desk.come_in(order, NOW_US)
+    machine = next(one for one in desk.fleet.site.machines.values() if one.kind is desk.takers)
+    beat = Heartbeat(machine.node_id, CONTRACT_VERSION, 0, 0, 1, machine.kind, MachineState.IDLE)
+    if is_heard:
+        desk.fleet.mirror.on_heartbeat(beat, NOW_US)
+    desk.advance(NOW_US)
+    assert order.state is (OrderState.CALLED if is_heard else OrderState.HEARD)
+    if not is_heard:
+        assert order.due_us is not None and NOW_US < order.due_us <= NOW_US + 3_000_000
+        desk.fleet.mirror.on_heartbeat(beat, order.due_us)
+        desk.advance(order.due_us)
+        assert order.state is OrderState.CALLED, "and for what waits as soon as somebody has come"
