@@ -5,7 +5,8 @@ from itertools import product
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.contract.messages import Reference, TaskReport
+from onboard.contract.codes import CallResult, Reason
+from onboard.contract.messages import Award, Reference, TaskReport
 from onboard.contract.turning import LatheAction, NcMode
 from onboard.contract.turning_device import LatheOrder, NcState
 from onboard.core.effects import Actuate, Effect, Record, Send, Tell
@@ -115,3 +116,16 @@ def test_a_lathe_that_is_set_up_goes_on_after_a_restart_and_one_that_was_not_beg
 
     assert stage_after(JobStageRecord(TASK, BatchStage.SETTING)) is BatchStage.WON, "whether it was obeyed is not known"
     assert stage_after(JobStageRecord(TASK, BatchStage.MAKING)) is BatchStage.MAKING
+
+
+def test_who_has_nothing_in_hand_any_more_is_not_woken_for_what_its_control_is_at() -> None:
+    """Its desk gave the order to another while it was off, and its control was still at it: a wake without end."""
+    machine = machine_in(BatchStage.WON)
+    machine.sense(NcState(LATHE, 40, NcMode.SETTING, PROGRAMS["its program"], 0), NOW_US)
+    machine.advance(NOW_US)
+    due_us = machine.next_wake()
+    assert due_us is not None and due_us > NOW_US, "while it has it, the control hears its order again"
+    machine.hear(Award(TASK.origin, 7, 1, TASK, 1, CallResult.AWARDED, Reason.NONE), NOW_US)
+    assert not machine.tasks.in_hand
+    machine.advance(LATER_US)
+    assert machine.next_wake() is None

@@ -196,8 +196,8 @@ class LatheMachine:
         return self._step(one, one.process, now_us) + self._progress(one, now_us)
 
     def next_wake(self) -> int | None:
-        """When something is to be said again."""
-        if self.nc is None:
+        """When something is to be said again: nothing is without an order in hand."""
+        if self.nc is None or not self.tasks.in_hand:
             return None
         times = (self.link.due_us, self._program_again_us, self._go_on_us, self._progress_us)
         return min((time for time in times if time is not None), default=None)
