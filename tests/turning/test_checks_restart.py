@@ -11,19 +11,28 @@ DESK, FIRST, SECOND = 9, 1, 2
 TASK = Reference(DESK, 1)
 
 
+TAKEN_BACK = Award(DESK, 1, 0, TASK, 1, CallResult.REJECTED, Reason.NODE_SILENT)
+
+
+def beat(boot: int) -> Heartbeat:
+    digest = find_site("turning").digest
+    return Heartbeat(FIRST, 1, digest, 0xFFFF, boot, KindCode.LATHE, MachineState.WORKING, 0)
+
+
+def has(node: int, phase: TaskPhase = TaskPhase.AWARDED) -> TaskReport:
+    return TaskReport(node, TASK, phase, 0, Reason.NONE)
+
+
 def log(boot: int, phase: TaskPhase) -> list[tuple[int, Message]]:
     """The first has an order, it is taken back and goes to the second; the first speaks of it in life ``boot``."""
-    digest = find_site("turning").digest
-
-    def beat(of: int) -> Heartbeat:
-        return Heartbeat(FIRST, 1, digest, 0xFFFF, of, KindCode.LATHE, MachineState.WORKING, 0)
-
-    def has(node: int, phase: TaskPhase = TaskPhase.AWARDED) -> TaskReport:
-        return TaskReport(node, TASK, phase, 0, Reason.NONE)
-
-    taken_back = Award(DESK, 1, 0, TASK, 1, CallResult.REJECTED, Reason.NODE_SILENT)
-    said = [beat(1), has(FIRST), taken_back, has(SECOND), beat(boot), has(FIRST, phase)]
+    said = [beat(1), has(FIRST), TAKEN_BACK, has(SECOND), beat(boot), has(FIRST, phase)]
     return [(1_000_000 * number, one) for number, one in enumerate(said, start=1)]
+
+
+def cut_off(back_s: int, *claims: tuple[int, TaskPhase]) -> list[tuple[int, Message]]:
+    """The first is not heard from the second second on, its order is taken back at 10 s; it speaks at those seconds."""
+    said = [(1, beat(1)), (2, has(FIRST)), (10, TAKEN_BACK), (11, has(SECOND)), (back_s, beat(1))]
+    return [(1_000_000 * at_s, one) for at_s, one in [*said, *[(at_s, has(FIRST, phase)) for at_s, phase in claims]]]
 
 
 @pytest.mark.parametrize(
@@ -33,4 +42,21 @@ def log(boot: int, phase: TaskPhase) -> list[tuple[int, Message]]:
 )
 def test_only_who_was_off_may_tell_that_it_has_an_order_of_another(boot: int, phase: TaskPhase, is_found: bool) -> None:
     found = {one.rule for one in judged(find_site("turning"), log(boot, phase)).findings}
+    assert ("one-lathe" in found) is is_found
+
+
+@pytest.mark.parametrize(
+    ("claims", "is_found"),
+    [
+        ([(31, TaskPhase.AWARDED)], False),
+        ([(31, TaskPhase.AWARDED), (33, TaskPhase.AWARDED)], False),
+        ([(31, TaskPhase.AWARDED), (40, TaskPhase.AWARDED)], True),
+        ([(31, TaskPhase.DONE)], True),
+    ],
+    ids=["once", "a word was lost", "has been told for long", "did it all the same"],
+)
+def test_who_was_cut_off_as_it_was_taken_back_has_patience_for_one_answer(
+    claims: list[tuple[int, TaskPhase]], is_found: bool
+) -> None:
+    found = {one.rule for one in judged(find_site("turning"), cut_off(30, *claims)).findings}
     assert ("one-lathe" in found) is is_found

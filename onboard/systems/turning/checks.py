@@ -12,6 +12,9 @@ from onboard.trace.check.rule import Handlers, Rule
 
 #: Five terms and their sum are rounded to cents one by one, ct.
 ROUNDING_CT = 3
+#: Who may not have heard that its order was taken back says for so long that it has it, us: its desk says the award of
+#: today again at once, and a word that is lost on its way is said again within a second.
+PATIENCE_US = 5_000_000
 
 
 class BillsAddUp(Rule):
@@ -90,8 +93,8 @@ class BillsGoDown(BidsGoDown):
 class OneLathe(Rule):
     """An order that a lathe has told to have is told by no other, until it is given or taken back; its batch grows.
 
-    Who was started again since an order was taken back from it may not have heard so: that it has it is what its
-    journal says, and the desk answers. That it has done it nobody else may say.
+    Who was silent as an order was taken back from it, or was started again since, may not have heard so: that it has it
+    is what its journal says, and the desk answers. That it has done it nobody else may say.
     """
 
     name = "one-lathe"
@@ -101,8 +104,10 @@ class OneLathe(Rule):
     def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._owner: dict[Reference, int] = {}
-        #: From whom an order was taken back, and in which life that was.
+        #: From whom an order was taken back, and in which life it heard so; None where it was silent.
         self._lost: dict[tuple[Reference, int], int | None] = {}
+        #: Since when it says all the same that it has it, us of the log.
+        self._claimed_us: dict[tuple[Reference, int], int] = {}
         self._made: dict[Reference, int] = {}
 
     def handlers(self) -> Handlers:
@@ -113,7 +118,9 @@ class OneLathe(Rule):
         word = event.message
         if word.result is CallResult.REJECTED and word.sender == word.task.origin and word.task in self._owner:
             owner = self._owner.pop(word.task)
-            self._lost[word.task, owner] = self.picture.boots.get(owner)
+            life = self.picture.boots.get(owner)
+            self._lost[word.task, owner] = life if self.picture.is_alive(owner, life) else None
+            self._claimed_us.pop((word.task, owner), None)
 
     def _on_report(self, event: LogEvent[TaskReport]) -> None:
         word = event.message
@@ -121,13 +128,19 @@ class OneLathe(Rule):
             if self._owner.get(word.task) == word.sender:
                 del self._owner[word.task]
             return
-        key, life = (word.task, word.sender), self.picture.boots.get(word.sender)
-        if word.phase is TaskPhase.AWARDED and self._lost.get(key, life) != life and word.task in self._owner:
+        if word.phase is TaskPhase.AWARDED and word.task in self._owner and self._may_not_have_heard(word):
             return
         owner = self._owner.setdefault(word.task, word.sender)
         if owner != word.sender:
             what = f"tells to have order {word.task.origin}.{word.task.number}, which another has"
             self.find(event, (word.sender, owner), what)
+
+    def _may_not_have_heard(self, word: TaskReport) -> bool:
+        """Whether its sender was not there as the order was taken back from it, and has not been told for long."""
+        key, life = (word.task, word.sender), self.picture.boots.get(word.sender)
+        if self._lost.get(key, life) == life:
+            return False
+        return self.picture.now_us - self._claimed_us.setdefault(key, self.picture.now_us) <= PATIENCE_US
 
     def _on_progress(self, event: LogEvent[LatheProgress]) -> None:
         word = event.message
