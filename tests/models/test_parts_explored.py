@@ -38,7 +38,9 @@ PLANTED = {
     "boarding": planted.BOARDING,
     "riding": planted.RIDING,
 }
-BUGS = [(part, bug) for part, bugs in PLANTED.items() for bug in bugs]
+#: Found in two other parts within seconds; of a car that is aboard it takes 18 s.
+FOUND_ELSEWHERE = ("leaving", "a grant is said before it is written")
+BUGS = [(part, bug) for part, bugs in PLANTED.items() for bug in bugs if is_long() or (part, bug) != FOUND_ELSEWHERE]
 
 
 def _of(count: int) -> int:
