@@ -19,6 +19,7 @@ from onboard.contract.constants import NOBODY
 from onboard.contract.messages import Itinerary, Leg, Progress, Stamp
 from onboard.core.serial import is_newer, ranks_before
 from onboard.core.site import Segment
+from onboard.ways.lifts import MARK_TOLERANCE_MM
 from onboard.ways.occupancy import LegWindows, body_mm, leg_windows, reach_segments, standing_segments
 from onboard.ways.reservations import FOREVER
 from onboard.ways.retreats import is_aged
@@ -118,8 +119,10 @@ class PassingOrder:
         way.body = Segment(progress.track, progress.index)
         if leg.track == progress.track:
             way.left |= self._behind(leg, progress)
-        if progress.leg >= len(way.itinerary.legs) and progress.track in self.site.tracks:
-            # Who has come to its end has left all but where it stands, whoever heard it give that back.
+        is_over = progress.leg >= len(way.itinerary.legs) or _is_at_end(leg, progress)
+        if is_over and progress.track in self.site.tracks:
+            # Who has come to its end has left all but where it stands, whoever heard it give that back; beside a mouth
+            # there is what only its clearance was in, which it never held.
             way.left |= way.turns.keys() - standing_segments(self.site, way.body)
 
     def on_return(self, node: int, segment: Segment) -> None:
@@ -446,6 +449,14 @@ class PassingOrder:
             for index in range(leg.from_index - step * self._reach[leg.track], leg.to_index, step)
             if (rear_mm - index * pitch_mm) * step >= pitch_mm // 2
         }
+
+
+def _is_at_end(leg: Leg, progress: Progress) -> bool:
+    """Whether a machine stands where a leg by which it drives leads."""
+    is_there = (progress.track, progress.index) == (leg.track, leg.to_index) and abs(
+        progress.offset_mm
+    ) <= MARK_TOLERANCE_MM
+    return leg.action is LegAction.TRAVEL and is_there and not progress.speed_mm_s
 
 
 def _step(leg: Leg) -> int:

@@ -28,9 +28,9 @@ from onboard.contract.messages import (
     Stamp,
 )
 from onboard.core.effects import Send
-from onboard.systems.car_park.bay_calls import MOST_PUT_OFF
 from onboard.systems.car_park.bay_task import BayPhase, BayTask
 from onboard.systems.car_park.compartment import Compartment
+from onboard.systems.car_park.in_vain import MOST_PUT_OFF
 from tests.kinds.test_tickets import BAY, ROBOT, SITE, WHEELBASE_MM, Desk, printed, right, shown
 
 COMES = Reference(BAY, 77)

@@ -48,9 +48,6 @@ ASK_AGAIN_US = 10_000_000
 #: A winner whose plan has no work at all, and whose car is another's, has lost the task after this, us: one that finds
 #: no way gives it back sooner (``going_around.KEEP_US``), and one that has not heard of it has been told meanwhile.
 NOTHING_SHOWN_US = 13_000_000
-#: So often nobody can take a car to be parked while robots are at work before its driver is told to take it back: after
-#: some two minutes (``bay_task.RETRY_US``), in which a robot is through with a task.
-MOST_PUT_OFF = 2
 
 
 @dataclass
@@ -85,6 +82,11 @@ class BayCalls:
     def has_any(self) -> bool:
         """Whether there is a task, in hand or to be called for once more."""
         return bool(self.in_hand()) or self.in_vain.is_any
+
+    @property
+    def _is_next_here(self) -> bool:
+        """Whether the car of the next task is in the bay: by a right that was given for another one."""
+        return self.ahead is not None and self.ahead.is_brought(self.fleet.mirror, self.fleet.node_id, self.station)
 
     def named(self, reference: Reference) -> BayTask | None:
         """The task of this name, where it is in hand."""
@@ -171,7 +173,9 @@ class BayCalls:
     def _fetch_anew(self, task: BayTask, now_us: int) -> list[Effect]:
         """The winner could not wait before the bay, and left the car at a place: that task is done, here is another."""
         name, number = self.memory.next_reference(self.fleet)
-        anew = BayTask(name, Operation.RETRIEVE, task.car, task.wheelbase_mm, ready_us=self.taken_at_us(now_us) or 0)
+        anew = BayTask(
+            name, Operation.RETRIEVE, task.car, task.wheelbase_mm, ready_us=self.done_at_us(self.job, now_us) or 0
+        )
         over: list[Effect] = [number]
         if task is self.job:
             self.job = anew
@@ -297,12 +301,6 @@ class BayCalls:
             )
         return effects
 
-    def is_put_off(self, task: BayTask) -> bool:
-        """Whether nobody could take a task though robots are at work: their plans may be full, and have room soon."""
-        mirror = self.fleet.mirror
-        plans = (plan for node, plan in mirror.itineraries.items() if node not in mirror.obstacles.machines)
-        return task.refusals <= MOST_PUT_OFF and any(has_work(plan) for plan in plans)
-
     @property
     def _is_full(self) -> bool:
         """Whether nobody has won the car that stands in the bay, or comes: the next would stand before a full bay."""
@@ -324,10 +322,7 @@ class BayCalls:
         if task is None or not self._is_still_to_come(task, phase):
             return [], False
         over = job_over_record() if is_job else ahead_over_record(task.task)
-        if is_job:
-            self.job = None
-        else:
-            self.ahead = None
+        self.job, self.ahead = (None, self.ahead) if is_job else (self.job, None)
         return [over, *self.call_off(task, now_us)], is_job
 
     def _is_still_to_come(self, task: BayTask, phase: BayPhase) -> bool:
@@ -361,6 +356,8 @@ class BayCalls:
 
         One that did nothing there had lost the task before it had the right: whoever has it now is waited for.
         """
+        if self._is_next_here and (swapped := self.swap()):
+            return BayPhase.CLOSING, swapped
         job = self.job
         assert job is not None
         is_mine = custody.is_mine(self.fleet, job.car)
@@ -396,17 +393,19 @@ class BayCalls:
         """The car of the next task comes before that of the job, for which nothing is in the bay: it goes out first.
 
         One record says both, so that no crash comes between. No effect where the robot that has asked for the bay has
-        no right to the slot in front of it, which one has at a time, or has another car aboard, or none.
+        no right to the slot in front of it, which one has at a time, or has another car aboard, or none: but where that
+        car is here already.
         """
         robot, self.asks_too = self.asks_too, NOBODY
         job, ahead, slot = self.job, self.ahead, Segment(self.station.track, self.station.index)
-        if job is None or ahead is None or job.operation is Operation.PARK or ahead.winner != robot:
+        if job is None or ahead is None or job.operation is Operation.PARK:
             return []
-        record = self.fleet.mirror.cars.get(ahead.car)
-        is_there = self.fleet.tokens.holder_of(segment_token(slot)) == robot
-        if not is_there or record is None or (record.custodian, record.station) != (robot, ANY_STATION):
+        record, is_here = self.fleet.mirror.cars.get(ahead.car), self._is_next_here
+        is_there = ahead.winner == robot and self.fleet.tokens.holder_of(segment_token(slot)) == robot
+        is_aboard = record is not None and (record.custodian, record.station) == (robot, ANY_STATION)
+        if not (is_here or (is_there and is_aboard)):
             return []
-        self.job, self.ahead = ahead, job
+        self.job, self.ahead, ahead.was_granted = ahead, job, ahead.was_granted or is_here
         return [job_record(ahead.task, Operation.RETRIEVE, ahead.car, ahead.wheelbase_mm)]
 
     def settle(self, task: BayTask, now_us: int) -> list[Effect]:
@@ -466,12 +465,11 @@ class BayCalls:
         times += [self.stewardship.next_wake(), self.unsaid.next_wake()]
         return min([one for one in times if one is not None], default=None)
 
-    def taken_at_us(self, now_us: int) -> int | None:
-        """When the winner of the job will have been at the bay, by its plan, bus us; None where it has told of none."""
-        return self.done_at_us(self.job, now_us)
-
     def done_at_us(self, task: BayTask | None, now_us: int) -> int | None:
-        """The same for any task in hand; a robot that has both does what is ahead last."""
+        """When the winner of a task in hand will have been at the bay, by its plan, bus us; None where it told of none.
+
+        A robot that has both does what is ahead last.
+        """
         works = [] if task is None else self._works_here(task.winner)
         has_both = self.job is not None and self.ahead is not None and self.job.winner == self.ahead.winner
         if not works or (task is self.ahead and has_both and len(works) == 1):

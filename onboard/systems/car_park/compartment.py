@@ -45,7 +45,7 @@ from onboard.core.behaviour import NEVER_US, OverheardWord
 from onboard.core.effects import Effect, Report
 from onboard.core.negotiation import Awarded, AwardedAgain, Closed, NegotiationEvent
 from onboard.core.site import Station
-from onboard.systems.car_park import bay_task, custody
+from onboard.systems.car_park import bay_task, custody, in_vain
 from onboard.systems.car_park.bay_calls import BayCalls
 from onboard.systems.car_park.bay_generation import BayGeneration
 from onboard.systems.car_park.bay_memory import BayMemory, job_over_record, job_record
@@ -477,7 +477,7 @@ class Compartment:
             self._go(BayPhase.FREE)
             return self.calls.not_come(now_us)
         said = self.calls.refused(job, reason, now_us)
-        if self.calls.is_put_off(job):
+        if in_vain.is_put_off(job, self.fleet.mirror):
             return said
         if job.operation is Operation.PARK:
             return said + self._give_back(job)

@@ -9,6 +9,18 @@ from dataclasses import dataclass, field
 
 from onboard.contract.messages import Reference
 from onboard.systems.car_park.bay_task import BayTask
+from onboard.ways.mirror import WayMirror
+from onboard.ways.told_way import has_work
+
+#: So often nobody can take a car to be parked while robots are at work before its driver is told to take it back: after
+#: some two minutes (``bay_task.RETRY_US``), in which a robot is through with a task.
+MOST_PUT_OFF = 2
+
+
+def is_put_off(task: BayTask, mirror: WayMirror) -> bool:
+    """Whether nobody could take a task though robots are at work: their plans may be full, and have room soon."""
+    plans = (plan for node, plan in mirror.itineraries.items() if node not in mirror.obstacles.machines)
+    return task.refusals <= MOST_PUT_OFF and any(has_work(plan) for plan in plans)
 
 
 @dataclass

@@ -206,7 +206,7 @@ class Pipeline:
         if phase is BayPhase.HANDOVER and not is_parked:
             return self.call(now_us + DRIVER_US + door_us, now_us)
         # Another robot fetches the next one while that of the job is on its way.
-        taken_us = self.calls.taken_at_us(now_us) if job.winner and not job.is_given_back else None
+        taken_us = self.calls.done_at_us(job, now_us) if job.winner and not job.is_given_back else None
         driver_us = 0 if is_parked else DRIVER_US + door_us
         return [] if taken_us is None else self.call(max(taken_us, now_us) + driver_us + door_us, now_us)
 

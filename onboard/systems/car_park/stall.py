@@ -33,6 +33,7 @@ class Stall:
     _ordered_us: int = 0
     _since_us: int | None = None
     _position_mm: int | None = None
+    _pause_us: int = 0
 
     def ordered(self, now_us: int) -> None:
         """The drive has an order to go on."""
@@ -47,20 +48,20 @@ class Stall:
         """Nothing is asked of the drive."""
         self._since_us = None
 
-    def sensed(self, position_mm: int, now_us: int) -> None:
-        """Where the drive is; any motion shows that it works."""
-        if position_mm != self._position_mm and self._since_us is not None:
+    def sensed(self, position_mm: int, now_us: int, pause_us: int = 0) -> None:
+        """Where the drive is, and how long what it does takes on the spot: a turn. Any motion shows that it works."""
+        if self._since_us is not None and (position_mm, pause_us) != (self._position_mm, self._pause_us):
             self._since_us = now_us
-        self._position_mm = position_mm
+        self._position_mm, self._pause_us = position_mm, pause_us
 
     @property
     def stuck_from_us(self) -> int:
         """From when on the drive has not moved for too long though it was told to."""
-        return NEVER_US if self._since_us is None else self._since_us + STALL_US
+        return NEVER_US if self._since_us is None else self._since_us + STALL_US + self._pause_us
 
     def is_stuck(self, now_us: int) -> bool:
         """Whether it has not by now."""
-        return self._since_us is not None and now_us - self._since_us >= STALL_US and self._is_fresh(now_us)
+        return now_us >= self.stuck_from_us and self._is_fresh(now_us)
 
 
 @dataclass

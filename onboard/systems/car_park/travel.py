@@ -162,7 +162,8 @@ class Carriage:
         if self.placing.is_far_off(state, self.track):
             self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
-        self.stall.sensed(state.position_mm, now_us)
+        turn_us = self.fleet.site.carrier_turn_us if state.mode is DriveMode.TURNING else 0
+        self.stall.sensed(state.position_mm, now_us, turn_us)
         if self.sensed is None:
             self.sequence = state.sequence
         self.track, placed = self.placing.placed(state, self.track, self.goal)
@@ -209,8 +210,7 @@ class Carriage:
         if goal != self.goal:
             self.goal = goal
             self._turned = True
-            self.target = None
-            self.blocked = None
+            self.target = self.blocked = None
             self._face()
 
     def _face(self) -> None:
