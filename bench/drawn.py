@@ -1,10 +1,12 @@
 """Sites drawn by chance, each played under a campaign's faults: a building, a hall, a yard that nobody thought of.
 
     python -m bench.drawn [1-8] [--system car-park] [--faults all] [--out DIR]
+    python -m bench.drawn 1-8 --constants
     python -m bench.drawn 7 --print
 
 The number of a site is its seed: its file is drawn from that alone, as are its customers or orders, and its faults.
 What the loader refuses is drawn anew. The site file of one that failed is kept beside its scenario and its trace.
+With ``--constants`` a site's times, speeds and lengths are drawn as well, which else are those of a shipped one.
 Virtual time: the same on every machine. Exit status 1 where one failed.
 """
 
@@ -16,6 +18,7 @@ from pathlib import Path
 
 from bench import _drawn_lines, _drawn_plants
 from bench._drawn_car_park import DrawnCarPark
+from bench._drawn_constants import with_constants
 from bench._drawn_tables import Tables, site_text
 from bus_sim.campaign.command import read_seeds
 from bus_sim.campaign.profiles import PROFILES
@@ -39,15 +42,20 @@ DRAWN: dict[str, Callable[[str, random.Random], Tables]] = {
     "turning": _drawn_plants.turning,
     "mapd": _drawn_plants.mapd,
 }
+#: Those of them that are car parks.
+PARKS = ("car-park", "lines")
 
 
-def drawn_site(system: str, number: int) -> str:
+def drawn_site(system: str, number: int, *, constants: bool = False) -> str:
     """The site file ``number`` of a system, the first of its drawings that the loader takes.
 
+    With ``constants`` of its own where that is asked for.
     Raises ``RuntimeError`` where it takes none of ``MOST_DRAWINGS``.
     """
     for drawing in range(MOST_DRAWINGS):
-        text = site_text(DRAWN[system](f"d{number}", random.Random(f"{system} {number}, drawing {drawing}")))
+        draw = random.Random(f"{system} {number}, drawing {drawing}")
+        tables = DRAWN[system](f"d{number}", draw)
+        text = site_text(with_constants(tables, draw, is_park=system in PARKS) if constants else tables)
         try:
             parse_site(text, f"d{number}.toml")
         except ConfigError:
@@ -61,7 +69,7 @@ def played(numbers: range, options: argparse.Namespace) -> Iterator[TrialResult]
     options.out.mkdir(parents=True, exist_ok=True)
     for number in numbers:
         file = options.out / f"d{number}.toml"
-        file.write_text(drawn_site(options.system, number), encoding="utf-8")
+        file.write_text(drawn_site(options.system, number, constants=options.constants), encoding="utf-8")
         site = find_site(str(file))
         is_park = site.system == "car-park"
         comes = {"cars": options.cars if is_park else None, "apart": options.apart, "orders": options.orders}
@@ -87,6 +95,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("sites", nargs="?", default="1-8", help="a number, or the first and the last of several")
     parser.add_argument("--system", default="car-park", choices=DRAWN, help="lines: a car park with lifts in line")
     parser.add_argument("--faults", default="all", choices=PROFILES)
+    parser.add_argument("--constants", action="store_true", help="times, speeds and lengths are drawn as well")
     parser.add_argument("--cars", type=int, default=12, help="in a car park")
     parser.add_argument("--orders", type=int, help="on any other site")
     parser.add_argument("--apart", type=float, metavar="SECONDS", help="mean time between two that come")
@@ -99,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except DemandError as error:
         parser.error(str(error).removeprefix("--seeds "))
     if options.prints:
-        print("\n".join(drawn_site(options.system, number) for number in numbers), end="")
+        print("\n".join(drawn_site(options.system, number, constants=options.constants) for number in numbers), end="")
         return 0
     failed = 0
     for result in played(numbers, options):

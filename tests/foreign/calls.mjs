@@ -96,7 +96,9 @@ export class Calls extends Fleet {
     peer.plan.leg = Math.max(leg, peer.plan.leg);
     const now = peer.plan.steps[peer.plan.leg] ?? {};
     const isHere = (one) => now.track === track && one >> 8 === track;
-    const isLeft = (one) => isHere(one) && ((one & 0xff) - index) * (now.to - now.from) < 0;
+    const isOver = isStill && now.action === "TRAVEL" && isHere(key) && now.to === index;
+    const isBehind = (one) => isHere(one) && ((one & 0xff) - index) * (now.to - now.from) < 0;
+    const isLeft = (one) => (isOver ? one !== key : isBehind(one));
     peer.plan.windows = peer.plan.windows.filter((one) => one.leg > leg || (one.leg === leg && !isLeft(one.key)));
   }
 

@@ -100,13 +100,27 @@ def test_who_has_come_to_its_end_has_left_the_mouth_whoever_heard_it_give_that_b
     order = PassingOrder(site)
     for told in (Itinerary(ALICE, 1, Grade.FIRM, Stamp(0, ALICE, 0), legs), plan(BOB, [(12, 12, 60), (12, 6, 80)])):
         order.on_plan(told, leg_windows(site, told, 0), 0)
-    order.on_progress(Progress(ALICE, 1, 1, 192, 1, 0, 0))
+    order.on_progress(Progress(ALICE, 1, 1, 192, 1, -1_200, 300))
     assert order.predecessor(BOB, mouth) == ALICE, "its body may be in both"
     order.on_progress(Progress(ALICE, 1, 2, 999, 1, 0, 0))
     assert order.predecessor(BOB, mouth) == ALICE, "there is no such track"
     order.on_progress(Progress(ALICE, 1, 2, 192, 1, 0, 0))
     assert order.predecessor(BOB, mouth) == NOBODY
     assert order.predecessor(ALICE, spur) == NOBODY, "there it stays"
+
+
+def test_who_stands_in_a_spur_has_left_what_only_its_clearance_was_in_beside_the_mouth() -> None:
+    """It never held that, so that it gives none back: whoever was to come by waited for ever (constants, 7002)."""
+    site = one_floor(2, extra='[[spurs]]\nat = "p(1,7)"\n[carrier]\nclearance_mm = 300\n')
+    legs = (Leg(LegAction.TRAVEL, 1, 2, 7, Side.NEAR, 20_000), Leg(LegAction.TRAVEL, 192, 1, 1, Side.NEAR, 30_000))
+    order = PassingOrder(site)
+    for told in (Itinerary(ALICE, 1, Grade.FIRM, Stamp(0, ALICE, 0), legs), plan(BOB, [(12, 12, 60), (12, 3, 80)])):
+        order.on_plan(told, leg_windows(site, told, 0), 0)
+    order.on_progress(Progress(ALICE, 1, 1, 1, 7, 0, 0))
+    beside = [Segment(1, 8), Segment(1, 6)]
+    assert [order.predecessor(BOB, one) for one in beside] == [ALICE, ALICE], "it turns"
+    order.on_progress(Progress(ALICE, 1, 1, 192, 1, 0, 0))
+    assert [order.predecessor(BOB, one) for one in beside] == [NOBODY, NOBODY]
 
 
 def test_a_plan_told_anew_drops_what_is_over() -> None:
