@@ -345,7 +345,7 @@ export class Robot extends Calls {
     const isFetch = (step) => step.action === WORK && step.place === place;
     const isFetched = this.robots.some(({ plan }) => plan?.steps.slice(plan.leg).some(isFetch));
     this.fullUs ??= this.now;
-    const waitUs = !this.site.bays.has(place) ? 0 : isFetched ? 10 * S : 60 * S;
+    const waitUs = !this.site.bays.has(place) ? 0 : isFetched ? 10 * S : 48 * S + 4 * this.site.us.door;
     if (!this.isDue(this.fullUs + waitUs) || !this.every("leave elsewhere", S)) return;
     call.to = ANY;
     if (this.remake()) [this.hand, this.fullUs] = [undefined, undefined];

@@ -5,28 +5,46 @@ from dataclasses import replace
 import pytest
 
 from bus_sim.sites import find_site
+from onboard.contract.codes import Operation
+from onboard.contract.messages import CallForProposals
+from onboard.systems.car_park import kept_out
 from onboard.systems.car_park.site import CarPark, car_park
 from tests.sites import one_floor
-from tests.system.scene import play, stays
+from tests.system.scene import Scene, play, stays
 
-#: Longer than a drive with orders may stand, and than a robot waits before a bay.
+#: Longer than a drive with orders may stand, and than a robot waited before a bay.
 TURN_US, DOOR_US = 20_000_000, 12_000_000
+THREE_CARS = stays((0, 200), (20, 220), (40, 240))
 
 
-def turning_long() -> CarPark:
-    """Robots that turn for 20 s: as any that did not move for 8 s they were stuck, by their own word, in each turn."""
-    return replace(one_floor(2, extra='[[spurs]]\nat = "p(1,7)"\n[[spurs]]\nat = "p(1,9)"\n'), carrier_turn_us=TURN_US)
+def assert_all_served(scene: Scene) -> None:
+    scene.assert_sound()
+    street = scene.simulation.plant.street.summary()
+    assert (street.parked, street.served) == (3, 3)
 
 
-def opening_slowly() -> CarPark:
-    """Doors that take 12 s: a robot put its car back, and the next came before it by the right that came late."""
+def test_who_turns_for_long_is_not_stuck() -> None:
+    """By the word of any drive that had not moved for 8 s it was, in each turn, and gave back all that it had won."""
+    site = one_floor(2, extra='[[spurs]]\nat = "p(1,7)"\n[[spurs]]\nat = "p(1,9)"\n')
+    assert_all_served(play(replace(site, carrier_turn_us=TURN_US), THREE_CARS, limit_s=1_500, extra_s=0))
+
+
+def with_slow_doors() -> CarPark:
     site = car_park(find_site("level1"))
     return replace(site, timing=replace(site.timing, door_us=DOOR_US))
 
 
-@pytest.mark.parametrize("site", [turning_long(), opening_slowly()], ids=["turns", "doors"])
-def test_who_has_slow_machines_serves_all_the_same(site: CarPark) -> None:
-    scene = play(site, stays((0, 200), (20, 220), (40, 240)), limit_s=1_500, extra_s=0)
-    scene.assert_sound()
-    street = scene.simulation.plant.street.summary()
-    assert (street.parked, street.served) == (3, 3)
+def test_before_slow_doors_a_robot_waits_so_much_longer() -> None:
+    """It put its car back before they could be open, and that was fetched once more."""
+    scene = play(with_slow_doors(), THREE_CARS, limit_s=1_500, extra_s=0)
+    assert_all_served(scene)
+    assert sum(one.operation is Operation.RETRIEVE for _, one in scene.all(CallForProposals)) == len(THREE_CARS.stays)
+
+
+def test_who_brings_the_next_car_by_a_right_that_was_given_for_another_one_is_believed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It had put that one back before the right came: the bay waited for it, and knew nobody for the one it had."""
+    monkeypatch.setattr(kept_out, "EMPTY_DOORS", 0)
+    monkeypatch.setattr(kept_out, "REFUSED_PATIENCE_US", 45_000_000)
+    assert_all_served(play(with_slow_doors(), THREE_CARS, limit_s=1_500, extra_s=0))

@@ -17,11 +17,12 @@ from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.program import CarHandling, HandlingPhase, Program, StationWork
 from onboard.ways.mirror import WayFleet, WayMirror
 
-#: So long it stands where another robot is to take the car away, us, and so long where a driver is to go with it.
+#: So long it stands where another robot is to take the car away, us.
 ROBOT_PATIENCE_US = 10_000_000
-DRIVER_PATIENCE_US = 60_000_000
-#: And so long before an empty bay whose right it does not get, us: its doors take 10 s, and a driver who walks out 8 s.
-REFUSED_PATIENCE_US = 45_000_000
+#: So long where a driver is to go with it, us, beside the doors: both open for him, and close behind him.
+DRIVER_PATIENCE_US, DRIVERS_DOORS = 48_000_000, 4
+#: And so long before an empty bay whose right it does not get, us, beside its doors: a driver walks out for 8 s.
+REFUSED_PATIENCE_US, EMPTY_DOORS = 36_000_000, 3
 
 
 @dataclass
@@ -55,14 +56,18 @@ class KeptOut:
             self._since_us = self._due_us = None
             return None
         self._since_us = now_us if self._since_us is None else self._since_us
-        patience_us = REFUSED_PATIENCE_US
-        if self._has_another(work):
-            patience_us = ROBOT_PATIENCE_US if self._is_wanted(work.station) else DRIVER_PATIENCE_US
+        patience_us = self._patience_us(work)
         self._due_us = self._since_us + patience_us
         if now_us < self._due_us:
             return None
         self._since_us, self._due_us = now_us, now_us + patience_us
         return work
+
+    def _patience_us(self, work: StationWork) -> int:
+        door_us = self.fleet.site.timing.door_us
+        if not self._has_another(work):
+            return REFUSED_PATIENCE_US + EMPTY_DOORS * door_us
+        return ROBOT_PATIENCE_US if self._is_wanted(work.station) else DRIVER_PATIENCE_US + DRIVERS_DOORS * door_us
 
     def _is_wanted(self, bay: Station) -> bool:
         """Whether another robot plans to take the car out of the bay; whoever brought it there has done so already."""

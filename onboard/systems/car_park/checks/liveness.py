@@ -28,10 +28,11 @@ def run_us(length_mm: float, axis: Axis) -> int:
 
 
 def longest_motion_us(site: Site) -> int:
-    """The longest single motion of a site: a whole alley, a whole shaft, or one stroke of a shuttle or door."""
+    """The longest single motion of a site: a whole alley, a whole shaft, a turn, or one stroke of a shuttle or door."""
     park = car_park(site)
     times = [
         run_us(park.shuttle_reach_mm, park.shuttle),
+        park.carrier_turn_us,
         park.timing.door_us,
         park.timing.grip_us,
     ]

@@ -150,7 +150,7 @@ def _is_firm(one: Itinerary) -> bool:
 
 _ELSEWHERE = (
     "A robot that stands with a car before a bay in which another car is leaves its own at a free place after 10 s "
-    "(60 s where no robot plans to fetch that) and says DONE with that station"
+    "(where no robot plans to fetch that, 48 s and four times `door_ms`) and says DONE with that station"
 )
 OCCUPIED = (
     Check("waits-before-an-occupied-bay", "C7", _ELSEWHERE),
