@@ -231,6 +231,12 @@ ONE_MISTAKE = {
         's.toml:21: lifts[1].doors = ["p(1,2)N", "p(2,3)N"]: not one above the other: that of floor 2 is off by '
         "2400 mm along and 0 mm across; change doors, the lengths of alleys, or lobby_mm, or leave the floor out",
     ),
+    "lobby shorter than a carrier": (
+        'doors = ["p(*,2)N"]',
+        'doors = ["p(*,2)N"]\nlobby_mm = 1_500',
+        "s.toml:22: lifts[1].lobby_mm = 1500: shorter than a carrier (2300 mm); make it larger, or carrier.length_mm "
+        "smaller",
+    ),
     "lobby of no length, at a lift whose floors are mistaken": (
         'doors = ["p(*,2)N"]',
         'doors = ["p(*,2)N"]\nlobby_mm = 2_500\nfloors = [2, 1]',

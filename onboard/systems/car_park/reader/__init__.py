@@ -9,7 +9,7 @@ from onboard.systems.car_park.reader.alleys import read_layout
 from onboard.systems.car_park.reader.battery import check_chargers, read_battery
 from onboard.systems.car_park.reader.built import only_tracks
 from onboard.systems.car_park.reader.classes import check_heights, read_classes
-from onboard.systems.car_park.reader.constants import read_constants
+from onboard.systems.car_park.reader.constants import check_lobbies, read_constants
 from onboard.systems.car_park.reader.machines import Bay, read_fleet, read_stewards
 from onboard.systems.car_park.reader.positions import BASE
 from onboard.systems.car_park.reader.whole import check_whole, sound_tracks
@@ -28,6 +28,7 @@ def read(root: TomlTable, common: Common) -> CarPark:
     fleet, bays = read_fleet(root, layout)
     stewards = read_stewards(root.table("stewards"), layout, fleet)
     constants = read_constants(root, lift, min(track.pitch_mm for track in layout.alleys()))
+    check_lobbies(lifts, constants.carrier_length_mm)
     classes, place_class = read_classes(root, layout, constants)
     check_heights(layout, constants.cars, classes, place_class)
     robots = sum(1 for machine in fleet.by_node.values() if machine.kind is KindCode.ROBOT)

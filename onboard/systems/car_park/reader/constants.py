@@ -5,6 +5,7 @@ lift 65 m/min, places of 2.4 m by 5.4 m, 2.5 m a level). Accelerations, clearanc
 are plausible, and measured nowhere.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from onboard.config.reader import TomlTable
@@ -57,6 +58,15 @@ def check_width(table: TomlTable, carrier_length_mm: int) -> None:
     if "max_width_mm" not in table.wrong and most_mm > carrier_length_mm:
         what = f"wider than a carrier is long along the alley ({carrier_length_mm} mm)"
         table.bad("max_width_mm", most_mm, what, "make it smaller, or carrier.length_mm and the pitches larger")
+
+
+def check_lobbies(lifts: Iterable[TomlTable], carrier_length_mm: int) -> None:
+    """Note lobbies in which a carrier would stand in the door of the shaft, and in the alley."""
+    for table in lifts:
+        lobby_mm = table.values.get("lobby_mm", carrier_length_mm)
+        if "lobby_mm" not in table.wrong and lobby_mm < carrier_length_mm:
+            what = f"shorter than a carrier ({carrier_length_mm} mm)"
+            table.bad("lobby_mm", lobby_mm, what, "make it larger, or carrier.length_mm smaller")
 
 
 def _read_cars(table: TomlTable, carrier_length_mm: int) -> CarLimits:
