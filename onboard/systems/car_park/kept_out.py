@@ -15,6 +15,7 @@ from onboard.core.site import Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.program import CarHandling, HandlingPhase, Program, StationWork
+from onboard.systems.car_park.site import car_park
 from onboard.ways.mirror import WayFleet, WayMirror
 
 #: So long it stands where another robot is to take the car away, us.
@@ -64,7 +65,7 @@ class KeptOut:
         return work
 
     def _patience_us(self, work: StationWork) -> int:
-        door_us = self.fleet.site.timing.door_us
+        door_us = car_park(self.fleet.site).timing.door_us
         if not self._has_another(work):
             return REFUSED_PATIENCE_US + EMPTY_DOORS * door_us
         return ROBOT_PATIENCE_US if self._is_wanted(work.station) else DRIVER_PATIENCE_US + DRIVERS_DOORS * door_us
