@@ -28,14 +28,13 @@ def run_us(length_mm: float, axis: Axis) -> int:
 
 
 def longest_motion_us(site: Site) -> int:
-    """The longest single motion of a site: a whole alley, a whole shaft, a turn, or one stroke of a shuttle or door."""
+    """The longest that nobody has anything to tell: a whole alley or shaft, a turn, or a bay between two cars.
+
+    There one door closes and the other opens, and a shuttle reaches in and grips.
+    """
     park = car_park(site)
-    times = [
-        run_us(park.shuttle_reach_mm, park.shuttle),
-        park.carrier_turn_us,
-        park.timing.door_us,
-        park.timing.grip_us,
-    ]
+    bay_us = 2 * park.timing.door_us + run_us(park.shuttle_reach_mm, park.shuttle) + park.timing.grip_us
+    times = [bay_us, park.carrier_turn_us]
     for track in park.tracks.values():
         axis = park.lift if track.number in park.lifts else park.carrier
         times.append(run_us((track.length + 1) * track.pitch_mm, axis))
