@@ -15,9 +15,9 @@ from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.conform.checks import Verdict
 from onboard.conform.player import Player
-from onboard.conform.report import NodeUnderTest, frame_words, junit, lines_of, protocol, status, totals
+from onboard.conform.report import NodeUnderTest, doubts, frame_words, junit, lines_of, protocol, status, totals
 from onboard.conform.stage import Means, PlatformRun
-from onboard.conform.suite import scenes_of, watchers_of
+from onboard.conform.suite import scenes_of, unlike, watchers_of
 from onboard.contract.codes import CONTRACT_VERSION, KindCode
 from onboard.core.frame import Frame
 from onboard.core.site import Site
@@ -91,6 +91,8 @@ def main(argv: Sequence[str]) -> int:
                 print(f"{one.check.duty:4} {one.check.name:40} {one.scene}")
             return 0
         _look_before(args)
+        if other := unlike(site):
+            print(f"onboard conform: site {site.name}: {doubts(other)}", file=sys.stderr)
         settings = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
         asyncio.run(_run(player, settings, args.power, args.lift))
         return _tell(args, site, player, f"{settings.interface} {settings.channel}")
@@ -243,7 +245,16 @@ def _tell(args: argparse.Namespace, site: Site, player: Player, bus: str) -> int
     date = datetime.now(UTC).isoformat(timespec="seconds")
     program = f"onboard {__version__}"
     subject = NodeUnderTest(
-        args.node, machine.name, args.kind, site.name, site.digest, CONTRACT_VERSION, program, bus, date
+        args.node,
+        machine.name,
+        args.kind,
+        site.name,
+        site.digest,
+        CONTRACT_VERSION,
+        program,
+        bus,
+        date,
+        tuple(unlike(site)),
     )
     for one in findings.of(Verdict.FAILED):
         print("\n".join(lines_of(one, frame_words)))

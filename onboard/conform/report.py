@@ -1,6 +1,6 @@
 """What came of a play: JUnit for machines, Markdown to be signed for people, a line each for the terminal."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import escape, quoteattr
 
@@ -14,7 +14,10 @@ _UNPRINTABLE = {code: "?" for code in range(32) if code not in (9, 10, 13)}
 
 @dataclass(frozen=True, slots=True)
 class NodeUnderTest:
-    """What was judged, where and by which versions; ``date`` in ISO 8601, all for people."""
+    """What was judged, where and by which versions; ``date`` in ISO 8601, all for people.
+
+    ``unlike`` names the constants of the site for which the play was not written.
+    """
 
     node: int
     name: str
@@ -25,6 +28,7 @@ class NodeUnderTest:
     program: str
     bus: str
     date: str
+    unlike: tuple[str, ...] = ()
 
 
 def status(findings: Findings) -> int:
@@ -36,6 +40,11 @@ def totals(findings: Findings) -> str:
     """One line: how many checks, and how many of each verdict."""
     counts = ", ".join(f"{len(findings.of(one))} {one.value}" for one in Verdict)
     return f"{len(findings.by_name)} checks: {counts}"
+
+
+def doubts(unlike: Sequence[str]) -> str:
+    """What is told of constants for which the play was not written."""
+    return f"{', '.join(unlike)}: what fails may be the play's; bench with a site file without them to be sure"
 
 
 def lines_of(finding: CheckResult, words: Callable[[Shown], str]) -> list[str]:
@@ -92,6 +101,7 @@ def protocol(findings: Findings, subject: NodeUnderTest, words: Callable[[Shown]
             ("contract", f"{subject.contract}"),
             ("program", subject.program),
             ("bus", subject.bus),
+            *((("not played for", doubts(subject.unlike)),) if subject.unlike else ()),
             ("result", totals(findings)),
         )
     ]

@@ -21,3 +21,9 @@ def watchers_of(site: Site) -> tuple[Watching, ...]:
     """What is judged of all that a node of the site says."""
     own = part(site.system, "conform")
     return (*WATCHERS, *(own.WATCHERS if own is not None else ()))
+
+
+def unlike(site: Site) -> list[str]:
+    """The constants of the site for which the play was not written: what fails there may be the play's."""
+    own = part(site.system, "conform")
+    return [] if own is None else own.UNLIKE(site)

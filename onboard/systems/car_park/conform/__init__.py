@@ -18,6 +18,7 @@ from onboard.systems.car_park.conform import (
     work,
     yielding,
 )
+from onboard.systems.car_park.conform.constants import unlike
 
 SCENES = (
     *calls.SCENES,
@@ -38,3 +39,5 @@ SCENES = (
 WATCHERS = ((plans.PLANS, plans.watch), ((), platforms.watch))
 #: Behind all others: rights that are made anew, and a node that has lost its own.
 LAST = anew.LAST
+#: Which constants of a site the play was not written for.
+UNLIKE = unlike
