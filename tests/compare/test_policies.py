@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from importlib.resources import files
 
 import pytest
 
@@ -11,7 +12,8 @@ from bus_sim.systems.car_park.compare.plays import MIP, POLICIES, Play, play
 from bus_sim.systems.car_park.compare.policies import AnyFirst, JointChoice, NearestFirst
 from bus_sim.systems.car_park.compare.table import tabulate
 from bus_sim.systems.car_park.demand import Demand
-from onboard.systems.car_park.site import DeskPolicy
+from onboard.config.site import parse_site
+from onboard.systems.car_park.site import DeskPolicy, car_park
 from tests.sites import at_the_key
 from tests.thinned import is_long
 
@@ -45,6 +47,14 @@ def test_p56_every_policy_serves_everybody_without_a_fault(policy: str) -> None:
         one = played(policy, seed)
         assert (one.left, one.faults) == (0, ())
         assert (len(one.in_us), len(one.out_us), one.tasks) == (CARS, CARS, 2 * CARS)
+
+
+def test_p56_robots_on_batteries_are_sent_as_well() -> None:
+    """What a dispatcher looked ahead with had never seen a gauge, and nobody was served."""
+    text = (files("bus_sim") / "sites" / "small.toml").read_text(encoding="utf-8")
+    site = car_park(parse_site(f"{text}\n[battery]\ncapacity_wh = 800\n", "small.toml"))
+    one = play(site, Demand.by_mean(40.0, 20.0, 1, count=2), JointChoice.name, 1)
+    assert (one.left, one.faults, one.tasks) == (0, (), 4)
 
 
 def test_p56_the_joint_choice_beats_nearest_first_and_random() -> None:

@@ -41,7 +41,7 @@ class Prospect:
     def solve(self, node: int, call: CallForProposals) -> Solution | None:
         """How a robot would do a task behind all that it has, around all plans and prospects."""
         planner = replace(self.planners[node], mirror=self._mirror(node), program=self._program(node), tentative={})
-        planner.costs = self.planners[node].costs
+        planner.costs, planner.charging = self.planners[node].costs, self.planners[node].charging
         if planner.lower_bound(call, self.now_us) is None:
             return None
         solution, _ = planner.solve(call, self.now_us)
