@@ -100,6 +100,21 @@ def test_told_full_after_walking_away_the_customer_comes_back_for_the_car() -> N
     assert bench.world.where["blue"] is None
 
 
+def test_who_was_called_and_is_told_to_wait_all_the_same_goes_to_the_desk_again() -> None:
+    """A robot came for the car after all: its driver went to the next one that came out there (drawn, 8506)."""
+    bench = Bench()
+    valet = Valet(bench)
+    customer = bench.street.add(Stay(0, 600 * SECOND, car("blue")))
+    bench.timers.run_until(599 * SECOND)
+    valet.condition = lambda: False
+    bench.timers.run_until(601 * SECOND)
+    assert customer.ticket is not None
+    for sequence, text in ((200, DeskText.CAR_READY), (201, DeskText.PLEASE_WAIT)):
+        bench.links[COMPARTMENT].order(DeskOrder(COMPARTMENT, sequence, text, customer.ticket.car))
+    bench.timers.run_for(60 * SECOND)
+    assert (customer.state, bench.rules) == (CustomerState.AT_DESK, [])
+
+
 def test_cancelled_in_time_the_car_comes_out_at_once() -> None:
     bench = Bench()
     Valet(bench)

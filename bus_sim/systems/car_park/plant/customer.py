@@ -107,6 +107,7 @@ TABLE: dict[tuple[CustomerState, CustomerEvent], tuple[CustomerState, str]] = {
     (CustomerState.AT_DESK, CustomerEvent.SENT): (CustomerState.AT_DESK, "be_patient"),
     (CustomerState.AT_DESK, CustomerEvent.UNKNOWN): (CustomerState.AT_DESK, "try_later"),
     (CustomerState.AT_DESK, CustomerEvent.READY): (CustomerState.AWAITING_DOOR, "be_patient"),
+    (CustomerState.AWAITING_DOOR, CustomerEvent.WAIT): (CustomerState.AT_DESK, "wait_again"),
     (CustomerState.AWAITING_DOOR, CustomerEvent.DOOR_OPEN): (CustomerState.DRIVING_OUT, "fetch"),
     (CustomerState.DRIVING_OUT, CustomerEvent.TIMER): (CustomerState.GONE, "drive_away"),
 }
@@ -356,6 +357,11 @@ class Customer:
         if self.ticket is not None and not self.has_lost_ticket:
             self._place.insert_ticket(self.ticket)
 
+    def _wait_again(self) -> None:
+        """Called to the door, and then told to wait: a robot comes for the car after all."""
+        if self.visit.asked_us is None:
+            self._insert_ticket()
+
     def _cancel(self) -> None:
         """While the car is still in the bay the cancel key may do; else, or without an answer, the ticket does."""
         if self._place.car != self.stay.car or self.ticket is None:
@@ -408,6 +414,7 @@ class Customer:
         "come_back": _come_back,
         "come_back_unchargeable": _come_back_unchargeable,
         "insert_ticket": _insert_ticket,
+        "wait_again": _wait_again,
         "cancel": _cancel,
         "be_patient": _be_patient,
         "try_later": _try_later,
