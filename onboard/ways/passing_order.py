@@ -453,10 +453,9 @@ class PassingOrder:
 
 def _is_at_end(leg: Leg, progress: Progress) -> bool:
     """Whether a machine stands where a leg by which it drives leads."""
-    is_there = (progress.track, progress.index) == (leg.track, leg.to_index) and abs(
-        progress.offset_mm
-    ) <= MARK_TOLERANCE_MM
-    return leg.action is LegAction.TRAVEL and is_there and not progress.speed_mm_s
+    stands_at_mark = abs(progress.offset_mm) <= MARK_TOLERANCE_MM and not progress.speed_mm_s
+    is_there = (progress.track, progress.index) == (leg.track, leg.to_index)
+    return leg.action is LegAction.TRAVEL and is_there and stands_at_mark
 
 
 def _step(leg: Leg) -> int:
