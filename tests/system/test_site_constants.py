@@ -6,7 +6,7 @@ import pytest
 
 from bus_sim.sites import find_site
 from onboard.contract.codes import Operation
-from onboard.contract.messages import CallForProposals
+from onboard.contract.messages import CallForProposals, TokenRequest
 from onboard.systems.car_park import kept_out
 from onboard.systems.car_park.site import CarPark, car_park
 from tests.sites import one_floor
@@ -48,3 +48,11 @@ def test_who_brings_the_next_car_by_a_right_that_was_given_for_another_one_is_be
     monkeypatch.setattr(kept_out, "EMPTY_DOORS", 0)
     monkeypatch.setattr(kept_out, "REFUSED_PATIENCE_US", 45_000_000)
     assert_all_served(play(with_slow_doors(), THREE_CARS, limit_s=1_500, extra_s=0))
+
+
+def test_a_carrier_as_long_as_a_slot_is_in_that_slot_alone() -> None:
+    """By its own drive it was in the next one too: before a lift it waited for a platform that nobody had called."""
+    site = one_floor(2)
+    scene = play(replace(site, carrier_length_mm=site.tracks[1].pitch_mm), stays((5, 200)), limit_s=15, extra_s=0)
+    scene.assert_sound()
+    assert scene.all(TokenRequest) == [], "each holds the one slot of its home"

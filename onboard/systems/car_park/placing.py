@@ -100,7 +100,7 @@ class Placing:
 
     def slots(self, state: DriveState, track: int) -> list[Segment]:
         """Slots that the body is in, with the gate where it is across a sill; not turned yet, those of the alley."""
-        mouth, half_mm, centre_mm = self.unturned(state, track), self.site.carrier_length_mm // 2, state.position_mm
+        mouth, half_mm, centre_mm = self.unturned(state, track), self._half_mm(track), state.position_mm
         if mouth is None:
             return self.axis(track).overlapped(centre_mm - half_mm, centre_mm + half_mm)
         if self.aside(state, track) is None:
@@ -108,6 +108,10 @@ class Placing:
         axis = self.axis(mouth.track)
         centre_mm = axis.position_mm(mouth.index) + self.told(state, track)[1]
         return axis.overlapped(centre_mm - half_mm, centre_mm + half_mm)
+
+    def _half_mm(self, track: int) -> int:
+        """Half a body: one as long as a slot that is at a mark, within its tolerance, is in that slot alone."""
+        return min(self.site.carrier_length_mm // 2, self.axis(track).pitch_mm // 2 - MARK_TOLERANCE_MM - 1)
 
     def leaves(self, slot: Segment, state: DriveState | None, track: int, to_index: int) -> bool:
         """Whether a carrier goes out of a slot that it is in: to an index of its axis, or back into the mouth."""
