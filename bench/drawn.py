@@ -20,11 +20,10 @@ from bench import _drawn_lines, _drawn_plants
 from bench._drawn_car_park import DrawnCarPark
 from bench._drawn_constants import with_constants
 from bench._drawn_tables import Tables, site_text
-from bus_sim.campaign.command import read_seeds
 from bus_sim.campaign.profiles import PROFILES
 from bus_sim.campaign.report import FAILURES
 from bus_sim.campaign.runner import CampaignSettings, TrialResult, run_seed
-from bus_sim.demand import DemandError
+from bus_sim.demand import DemandError, read_seeds
 from bus_sim.sites import find_site
 from bus_sim.systems.registry import simulated_of
 from onboard.config.problems import ConfigError

@@ -9,8 +9,7 @@ import argparse
 from collections.abc import Sequence
 
 from bench.drawn import drawn_site
-from bus_sim.campaign.command import read_seeds
-from bus_sim.demand import DemandError
+from bus_sim.demand import DemandError, read_seeds
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.design.days import DayPlan
 from bus_sim.systems.car_park.design.measure import Outcome, Trial, modelled, played

@@ -3,9 +3,34 @@
 import random
 from typing import NamedTuple
 
+#: Longest run, and longest mean time between two who come, s: eleven days.
+LONGEST_S = 1_000_000
+#: Most cars of a run: a month of the largest car park here.
+MOST_CARS = 100_000
+#: Most orders of a run: their numbers have 16 bits on the wire, of which some systems use a part.
+MOST_ORDERS = 10_000
+#: Most seeds of one command.
+MOST_SEEDS = 1_000_000
+
 
 class DemandError(ValueError):
     """A person's mistake in a demand, as one clear line: file, line, value and remedy."""
+
+
+def check_count(option: str, count: int, most: int) -> None:
+    """Raise ``DemandError`` for a number of those who come that is below 0, or above ``most``."""
+    if not 0 <= count <= most:
+        raise DemandError(f"{option} {count}: must be from 0 to {most}")
+
+
+def read_seeds(text: str) -> range:
+    """``A`` or ``A-B``. Raises ``DemandError`` for anything else."""
+    first, dash, last = text.partition("-")
+    if not first.isdecimal() or (dash and not last.isdecimal()) or int(last or first) < int(first):
+        raise DemandError(f"--seeds {text}: must be a seed, or the first and the last of several, such as 1-16")
+    if int(last or first) - int(first) >= MOST_SEEDS:
+        raise DemandError(f"--seeds {text}: more than {MOST_SEEDS}; play them in parts")
+    return range(int(first), int(last or first) + 1)
 
 
 class Law(NamedTuple):
@@ -22,8 +47,8 @@ class Law(NamedTuple):
                 return interval_us
 
     def check(self, what: str) -> None:
-        """Raise ``DemandError`` unless the mean is above 0 and the deviation 0 or more."""
-        if not self.mean_s > 0:
-            raise DemandError(f"{what}: mean {self.mean_s} s: must be above 0")
-        if not self.sigma_s >= 0:
-            raise DemandError(f"{what}: standard deviation {self.sigma_s} s: must be 0 or more")
+        """Raise ``DemandError`` unless the mean is above 0, the deviation 0 or more, and both at most ``LONGEST_S``."""
+        if not 0 < self.mean_s <= LONGEST_S:
+            raise DemandError(f"{what}: mean {self.mean_s:g} s: must be above 0, and at most {LONGEST_S}")
+        if not 0 <= self.sigma_s <= LONGEST_S:
+            raise DemandError(f"{what}: standard deviation {self.sigma_s:g} s: must be from 0 to {LONGEST_S}")

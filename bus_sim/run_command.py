@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bus_sim.commands import HELP, OptionError
+from bus_sim.demand import LONGEST_S
 from bus_sim.demand_options import TABLE_OPTIONS, add_table_options
 from bus_sim.faults.injection import AnyFault, parse_injection
 from bus_sim.options import RunOptions
@@ -206,8 +207,8 @@ def _add_when(when: argparse._ArgumentGroup) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run it. Raises what ``bus_sim.cli`` tells in one line."""
-    if args.limit_s is not None and not 0 < args.limit_s < float("inf"):
-        raise OptionError(f"--for {args.limit_s:g}: must be seconds above 0")
+    if args.limit_s is not None and not 0 < args.limit_s <= LONGEST_S:
+        raise OptionError(f"--for {args.limit_s:g}: must be seconds above 0, and at most {LONGEST_S}")
     if args.scenario is not None:
         return _run_scenario(args)
     site, text = _site(args)

@@ -34,6 +34,19 @@ def read_bounded(path: Path, most_bytes: int = MOST_TEXT) -> bytes:
         os.close(file)
 
 
+def is_there(path: Path) -> bool:
+    """Whether something has this name; no where that cannot be said: too long a name, a folder that is another's."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
+
+
+def is_folder(path: Path) -> bool:
+    """Whether it is a folder, likewise."""
+    return is_there(path) and path.is_dir()
+
+
 def _whole(file: int, most_bytes: int) -> bytes:
     until_s, pieces, length = time.monotonic() + PATIENCE_S, [b""], 0
     while length <= most_bytes:

@@ -47,7 +47,8 @@ if TYPE_CHECKING:
     from onboard.gateway.gateway import Gateway
 
 #: Of the journal's folder; everything else, such as a full disk, may pass.
-_MISTAKES = frozenset({errno.EACCES, errno.EPERM, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST})
+_OF_THE_NAME = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG}
+_MISTAKES = frozenset({errno.EACCES, errno.EPERM, *_OF_THE_NAME})
 
 #: Makes a machine's own gateway on the running loop, from its fleet bus and the contract.
 GatewayMaker = Callable[[OpenBus, Codec], "Gateway"]

@@ -38,6 +38,7 @@ SLOW = (
     "tests/can/test_arbitration.py::test_what_is_pending_together_goes_by_priority",
     "tests/can/test_node.py::test_a_sender_of_very_many_identifiers_is_counted_right",
     "tests/can/test_repetition.py::test_what_can_be_seen_is_the_same_whether_each_attempt_is_played_or_not",
+    "tests/config/test_any_value.py",
     "tests/config/test_garbage.py",
     "tests/config/test_names.py::test_every_command_takes_the_name_of_a_shipped_site",
     "tests/config/test_shipped_sites.py",

@@ -12,9 +12,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from bus_sim.attacks import table
 from bus_sim.attacks.catalogue import ATTACKS
 from bus_sim.attacks.trials import MISSES, STRANGER, AttackResult, AttackVerdict, TrialSettings, run_attacks
-from bus_sim.campaign.command import read_seeds
 from bus_sim.campaign.ledger import Ledger, site_as_played
-from bus_sim.demand import DemandError
+from bus_sim.demand import LONGEST_S, MOST_CARS, MOST_ORDERS, DemandError, check_count, read_seeds
 from bus_sim.sites import find_site
 from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.system import Occasion
@@ -136,9 +135,11 @@ def _plan(args: argparse.Namespace, site: Site) -> TrialSettings:
     if args.insider and args.node is not None and not is_of_site and args.node <= MAX_NODE_ID:
         remedy = f"give one of those, a tool's from {MAX_NODE_ID + 1} to 255, or none"
         raise DemandError(f"--node {args.node}: no machine of {site.name}; {remedy}")
-    for option, value in (("cars", args.cars), ("limit", args.limit)):
-        if value is not None and value <= 0:
-            raise DemandError(f"--{option} {value:g}: must be above 0")
+    for option, value, most in (("cars", args.cars, MOST_CARS), ("limit", args.limit, LONGEST_S)):
+        if value is not None and not 0 < value <= most:
+            raise DemandError(f"--{option} {value:g}: must be above 0, and at most {most}")
+    if args.orders is not None:
+        check_count("--orders", args.orders, MOST_ORDERS)
     if args.jobs < 0:
         raise DemandError(f"--jobs {args.jobs}: must be 1 or more; leave it out for one a core")
     system = simulated_of(site)

@@ -20,7 +20,7 @@ from bus_sim.campaign.report import FAILURES, RunVerdict
 from bus_sim.campaign.runner import CampaignSettings, FaultPoint, TrialResult, run_point, run_points, run_seed
 from bus_sim.campaign.strangers import StrangerPlan, play_pairs
 from bus_sim.campaign.trial import play
-from bus_sim.demand import DemandError
+from bus_sim.demand import LONGEST_S, MOST_CARS, MOST_ORDERS, DemandError, check_count, read_seeds
 from bus_sim.engine import add_where_options, engine_of, shown
 from bus_sim.faults.scenario import load_scenario
 from bus_sim.sites import find_site
@@ -29,10 +29,6 @@ from bus_sim.systems.stranger import Stranger
 from bus_sim.systems.system import Occasion
 from onboard.core.site import Site
 
-#: Longest run, and longest mean time between two cars, s: eleven days.
-LONGEST_S = 1_000_000
-#: Most orders of a run: their numbers have 16 bits on the wire, of which some systems use a part.
-MOST_ORDERS = 10_000
 #: One fault a second: more is no fleet under faults, but a fleet that is off.
 MOST_AN_HOUR = 3_600
 
@@ -292,10 +288,10 @@ def _check(args: argparse.Namespace) -> None:
     """Raise ``DemandError`` for the first value that no site takes."""
     if args.faults not in PROFILES:
         raise DemandError(f"--faults {args.faults}: no such profile; profiles are {', '.join(PROFILES)}")
-    if args.cars is not None and args.cars < 1:
-        raise DemandError(f"--cars {args.cars}: must be 1 or more")
-    if args.orders is not None and not 0 <= args.orders <= MOST_ORDERS:
-        raise DemandError(f"--orders {args.orders}: must be from 0 to {MOST_ORDERS}")
+    if args.cars is not None and not 1 <= args.cars <= MOST_CARS:
+        raise DemandError(f"--cars {args.cars}: must be from 1 to {MOST_CARS}")
+    if args.orders is not None:
+        check_count("--orders", args.orders, MOST_ORDERS)
     _check_seconds("apart", args.apart)
     _check_seconds("limit", args.limit)
     if args.faults_an_hour is not None and not 0 < args.faults_an_hour <= MOST_AN_HOUR:
@@ -312,14 +308,6 @@ def _check(args: argparse.Namespace) -> None:
 def _check_seconds(option: str, value: float | None) -> None:
     if value is not None and not 0 < value <= LONGEST_S:
         raise DemandError(f"--{option} {value:g}: must be above 0, and at most {LONGEST_S} seconds")
-
-
-def read_seeds(text: str) -> range:
-    """``A`` or ``A-B``. Raises ``DemandError`` for anything else."""
-    first, dash, last = text.partition("-")
-    if not first.isdecimal() or (dash and not last.isdecimal()) or int(last or first) < int(first):
-        raise DemandError(f"--seeds {text}: must be a seed, or the first and the last of several, such as 1-16")
-    return range(int(first), int(last or first) + 1)
 
 
 def run_scenario(path: Path, trace: Path | None, json_file: Path | None, *, devices: bool = False) -> int:

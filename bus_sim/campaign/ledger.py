@@ -18,7 +18,7 @@ import bus_sim
 import onboard
 from bus_sim.demand import DemandError
 from bus_sim.sites import layout_names, site_names, site_text
-from onboard.bounded_file import MOST_EXPORT, read_bounded
+from onboard.bounded_file import MOST_EXPORT, is_there, read_bounded
 
 #: Files that a run depends on, beside the interpreter.
 SOURCES = (".py", ".toml", ".dbc", ".csv")
@@ -78,7 +78,7 @@ class Ledger(Generic[VerdictT]):
         """A file that is not there yet is empty. Raises ``DemandError`` for one that is no ledger."""
         ledger = cls(path, campaign, verdicts, failures)
         try:
-            text = read_bounded(path, MOST_EXPORT).decode() if path.exists() else ""
+            text = read_bounded(path, MOST_EXPORT).decode() if is_there(path) else ""
             for line in text.splitlines():
                 ledger._take(json.loads(line))
         except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:

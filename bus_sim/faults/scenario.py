@@ -28,7 +28,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bus_sim.demand import DemandError
+from bus_sim.demand import LONGEST_S, DemandError
 from bus_sim.faults.arm import check_faults
 from bus_sim.faults.injection import AnyFault, parse_injection
 from bus_sim.sites import SiteNotFoundError, find_site
@@ -80,7 +80,7 @@ def _is_number(text: str) -> bool:
 
 
 _HEAD: Mapping[str, type] = {"site": str, "seed": int, "limit_s": float}
-_WORDS = {str: "a text in quotes", int: "a whole number from 0", float: "a number above 0"}
+_WORDS = {str: "a text in quotes", int: "a whole number from 0", float: f"a number above 0, and at most {LONGEST_S}"}
 
 
 def load_scenario(path: Path) -> tuple[FaultScenario, Site]:
@@ -204,4 +204,4 @@ def _fits(value: object, wanted: type) -> bool:
         return isinstance(value, str)
     if wanted is int:
         return isinstance(value, int) and value >= 0
-    return isinstance(value, int | float) and value > 0
+    return isinstance(value, int | float) and 0 < value <= LONGEST_S

@@ -4,6 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from onboard.bounded_file import is_there
 from onboard.config.files import read_text
 from onboard.config.site import load_site, parse_site
 from onboard.core.site import Site
@@ -47,7 +48,7 @@ def find_site(name: str) -> Site:
     """
     if name in (*site_names(), *layout_names()):
         return parse_site(site_text(name), f"{name}.toml")
-    if not Path(name).exists():
+    if not is_there(Path(name)):
         shipped = ", ".join([*site_names(), *layout_names()])
         raise SiteNotFoundError(f'site "{name}": no such file, and no such shipped site; shipped: {shipped}')
     return load_site(Path(name))

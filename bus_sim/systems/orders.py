@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, ClassVar, NamedTuple, Protocol
 
-from bus_sim.demand import DemandError, Law
+from bus_sim.demand import MOST_ORDERS, DemandError, Law, check_count
 from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import LoopTimers, Timers
 from bus_sim.faults.bus import frame_faults
@@ -112,7 +112,11 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
 
     def with_orders(self, site: SiteT, orders: OrderArrivals | None, seed: int) -> SiteT:
         """The site with what a seed brings. Raises ``DemandError`` for orders that it cannot bring."""
-        return site if orders is None or not orders.count else self.draw(site, orders, seed)
+        if orders is None or not orders.count:
+            return site
+        check_count("orders", orders.count, MOST_ORDERS)
+        Law(orders.apart_s, orders.apart_s / 2).check("apart")
+        return self.draw(site, orders, seed)
 
     def read(self, given: Mapping[str, object]) -> OrderArrivals:
         """Orders by chance, as the section ``[orders]`` says it; 1 s apart unless told."""

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from onboard.bounded_file import is_there
 from onboard.config.files import read_text, root_table
 from onboard.config.problems import ConfigError, Problem, Problems, quoted
 from onboard.config.reader import TomlTable, type_name
@@ -65,7 +66,7 @@ def _load_site(head: TomlTable, path: Path) -> tuple[Site | None, list[Problem]]
     try:
         return load_site(site_path), []
     except ConfigError as error:
-        if not site_path.is_file():
+        if not (is_there(site_path) and site_path.is_file()):
             head.bad("site", name, f"no file {quoted(str(site_path))}", "write its path as seen from the machine file")
             return None, []
         return None, error.problems

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 _LONGEST_SHOWN = 60
+#: Of more mistakes than this in one file only so many are told, as they fit a screen: many have one cause.
+MOST_NAMED = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,15 +60,21 @@ def quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=not text.isprintable())
 
 
+def at_most(lines: Sequence[str]) -> list[str]:
+    """The first ``MOST_NAMED``, and how many more there are."""
+    more = len(lines) - MOST_NAMED
+    return [*lines[:MOST_NAMED], *([f"and {more} more"] if more > 0 else [])]
+
+
 class ConfigError(Exception):
-    """All mistakes of one or several files; ``str`` gives one line each."""
+    """All mistakes of one or several files; ``str`` gives one line each, for the first ``MOST_NAMED``."""
 
     def __init__(self, problems: list[Problem]) -> None:
         super().__init__(problems)
         self.problems = problems
 
     def __str__(self) -> str:
-        return "\n".join(str(problem) for problem in self.problems)
+        return "\n".join(at_most([str(problem) for problem in self.problems]))
 
 
 def closest(name: str, known: Sequence[str], alike: float = 0.6) -> str | None:

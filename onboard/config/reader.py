@@ -1,5 +1,6 @@
 """Typed look-ups in a TOML document that note every mistake and go on with a stand-in value."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
@@ -77,7 +78,7 @@ class TomlTable:
         """A number in ``[low, high]``, whole or with decimals; ``default`` None makes the key required."""
         words = f"a number from {low:g} to {high:g}"
         if type(self.values.get(name)) is int:
-            self.values[name] = float(self.values[name])
+            self.values[name] = _as_float(self.values[name])
         value = self._get(name, float, words, required=default is None)
         stand_in = low if default is None else default
         if value is None:
@@ -199,3 +200,11 @@ class TomlTable:
         table = TomlTable(self.document, self.problems, path, values)
         self.below.append(table)
         return table
+
+
+def _as_float(value: int) -> float:
+    """The same number; infinite, which is in no range, where it is too long for a float."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf

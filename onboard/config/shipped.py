@@ -7,6 +7,7 @@ carry offers none.
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from onboard.bounded_file import is_there
 from onboard.config.files import read_text
 from onboard.config.problems import ConfigError, Problem, nearest
 
@@ -35,12 +36,12 @@ def site_source(path: Path) -> tuple[str, str]:
 
     Raises ``ConfigError`` with one problem where there is neither.
     """
-    if path.suffix or path.name != str(path) or path.is_file():
+    if path.suffix or path.name != str(path) or (is_there(path) and path.is_file()):
         return read_text(path, "site"), str(path)
     shipped = shipped_sites()
     if path.name in shipped:
         return shipped[path.name].read_text(encoding="utf-8"), f"{path.name}{_SUFFIX}"
-    if path.exists() or not shipped:
+    if is_there(path) or not shipped:
         return read_text(path, "site"), str(path)
     remedy = f"name a site file, or a shipped site; {nearest(path.name, list(shipped))}"
     raise ConfigError([Problem(str(path), 0, "", None, "no such file, and no such shipped site", remedy)])

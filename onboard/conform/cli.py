@@ -149,7 +149,8 @@ def _look_before(args: argparse.Namespace) -> None:
             raise ConformError(f"{option} {program}: no program that can be run; name one that takes {words}")
     for path in (args.junit, args.protocol):
         if path is not None:
-            path.touch()
+            # A folder can be touched.
+            path.open("ab").close()
 
 
 @dataclass

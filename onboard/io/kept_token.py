@@ -4,6 +4,7 @@ import re
 import secrets
 from pathlib import Path
 
+from onboard.bounded_file import is_there
 from onboard.io.owned_file import OwnedFileError, make_owned, read_owned
 
 #: Bytes of chance in a word that is made here: 128 bits, which nobody guesses over a network.
@@ -24,7 +25,7 @@ def kept_token(path: Path) -> str:
 
 def read_token(path: Path) -> str:
     """The word in a file that a server has made. Raises ``OwnedFileError``."""
-    if not path.exists():
+    if not is_there(path):
         raise OwnedFileError(f"{path}: does not exist; name the file that the server was given")
     return _read(path)
 

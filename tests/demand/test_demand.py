@@ -163,5 +163,5 @@ def test_p52_one_car_by_hand() -> None:
     stay = Demand.one_car(stay_s=90).stays[0]
     assert (stay.arrival_us, stay.departure_us) == (0, 90_000_000)
     assert Demand.one_car().stays[0].departure_us is None
-    with pytest.raises(DemandError, match="must be 0 or more"):
+    with pytest.raises(DemandError, match="must be from 0 to"):
         Demand.one_car(stay_s=-1)

@@ -15,11 +15,10 @@ import pytest
 from bus_sim.cli import build_parser, main
 from bus_sim.demand import DemandError
 from bus_sim.sites import find_site
-from bus_sim.systems.car_park.csv_rows import MOST_NAMED
 from bus_sim.systems.car_park.day import asked_day, brought_in, choose_demand
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.window import EVE_US, MINUTE_US, busiest_hour, with_eve
-from onboard.config.problems import ConfigError
+from onboard.config.problems import MOST_NAMED, ConfigError
 from onboard.systems.car_park.site import car_park
 
 SHAPES = {

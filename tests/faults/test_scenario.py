@@ -55,6 +55,12 @@ def test_all_mistakes_are_told_with_their_lines(tmp_path: Path) -> None:
         ("[scenario", "not TOML: "),
         ("seed = 1\n", "scenario.site: is missing"),
         ('[scenario]\nsite = "small"\n[[fault]]\nkind = "pause"\ntarget = "MR7"\nat_s = 1\n', "no such machine"),
+        (
+            '[scenario]\nsite = "small"\nlimit_s = inf\n',
+            "limit_s = inf: has the wrong value; must be a number above 0, and",
+        ),
+        ('[scenario]\nsite = "graph"\n[orders]\ncount = 99999999\n', "orders 99999999: must be from 0 to 10000"),
+        ('[scenario]\nsite = "small"\n[demand]\ncars = 99999999\n', "cars 99999999: must be from 0 to 100000"),
         ('[scenario]\nsite = "small"\n[fault]\nkind = "pause"\n', "write [[fault]] for each"),
     ],
 )

@@ -13,6 +13,7 @@ from bus_sim.session import play
 from bus_sim.systems.mapd.published import token_passing
 from bus_sim.systems.mapd.steps import SteppedDay
 from onboard.cli import main as onboard
+from onboard.config.site import parse_site
 from onboard.contract.mapd import PathHead, StepRound, StepState, StepTurn, TurnRequest
 from onboard.contract.messages import Award, Bid, CallForProposals, Reference
 from onboard.systems.mapd.site import Mapd
@@ -34,6 +35,17 @@ def test_p59_the_bus_brings_the_same_day_as_the_robots_decisions_alone(robots: i
     assert run.is_good
     assert plant.served == day.served
     assert plant.history[: len(day.history)] == day.history
+
+
+@pytest.mark.parametrize(("step_ms", "guard_ms"), [(100, 20), (500, 100), (100, 0)])
+def test_a_round_has_room_for_bids_however_short_it_is(step_ms: int, guard_ms: int) -> None:
+    """The guard before and behind a deadline took the whole of a round: nobody bid, and nobody was ever served."""
+    text = site_text(4, drawn(8, 2), step_ms) + f"[timing]\ndeadline_guard_ms = {guard_ms}\n"
+    site = parse_site(text, "made.toml")
+    assert isinstance(site, Mapd)
+    run, plant = played(site, limit_s=60.0)
+    assert run.is_good
+    assert plant.served == without_bus(site).served
 
 
 def test_p59_bids_and_awards_are_frames_and_better_bids_speak_sooner() -> None:

@@ -10,6 +10,8 @@ from bus_sim.cli import main as bus_sim
 from deploy.cli import main as deploy
 from onboard.cli import main as onboard
 
+#: Longer than any file system takes a name.
+LONG = "a" * 300
 #: Program, what was typed, and what the line says.
 MISTAKES = [
     (bus_sim, "foo", r"argument COMMAND: invalid choice: 'foo' .*see bus-sim --help"),
@@ -47,6 +49,25 @@ MISTAKES = [
     (onboard, "operate status --site small", r"name a bus: -i INTERFACE -c CHANNEL; see onboard operate --help"),
     (onboard, "gateway --site small -i virtual -c x", r"arguments are required: --mqtt; see onboard gateway --help"),
     (onboard, "web --site small", r"name a log, or a bus: -i INTERFACE -c CHANNEL; see onboard web --help"),
+    (bus_sim, f"run {LONG}", r"no such file, and no such shipped site"),
+    (bus_sim, f"run small --trace {LONG}", r"--trace a+: File name too long; name another file"),
+    (bus_sim, f"campaign small --out {LONG}", r"--out a+: File name too long"),
+    (onboard, f"trace check file --site {LONG}", r"no such file, and no such shipped site"),
+    (onboard, f"--machine {LONG}", r"cannot be read \(File name too long\); name an existing machine file"),
+    (onboard, "trace replay file --site small --machine MR1 --raise-costs -1", r"--raise-costs -1: must be from 0 to"),
+    (bus_sim, "run small --random inf 5", r"--random: mean inf s: must be above 0, and at most 1000000"),
+    (bus_sim, "run small --random 20 5 --cars 99999999", r"--cars 99999999: must be from 0 to 100000"),
+    (bus_sim, "run small --one-car 1e18", r"--one-car 1e\+18: must be seconds from 0 to 1000000"),
+    (bus_sim, "run small --one-car 60 --for 1e308", r"--for 1e\+308: must be seconds above 0, and at most 1000000"),
+    (bus_sim, "campaign small --seeds 1-99999999", r"--seeds 1-99999999: more than 1000000; play them in parts"),
+    (bus_sim, "campaign small --cars 99999999", r"--cars 99999999: must be from 1 to 100000"),
+    (bus_sim, "attack graph --orders 99999999", r"--orders 99999999: must be from 0 to 10000"),
+    (bus_sim, "compare small --seeds 2-1", r"--seeds 2-1: must be a seed, or the first and the last of several"),
+    (bus_sim, "compare small --cars -1", r"cars -1: must be from 0 to 100000"),
+    (
+        *(onboard, "conform --site level1 --node 11 --kind robot -i virtual -c x --junit folder"),
+        r"folder: Is a directory; name another file",
+    ),
     (deploy, "foo", r"argument COMMAND: invalid choice: 'foo' .*see python -m deploy --help"),
     (deploy, "update --secret gone", r"argument --secret: gone: no such file; see python -m deploy update --help"),
 ]

@@ -51,7 +51,7 @@ def test_p53_cars_come_and_are_fetched_each_at_its_own_frequency() -> None:
     ("words", "line"),
     [
         (["--random-out", "60", "20"], "--random-out: departures alone; say with --random how cars arrive"),
-        (["--random", "60", "20", "--random-out", "0", "1"], "--random-out 0 1: the mean must be above 0 s"),
+        (["--random", "60", "20", "--random-out", "0", "1"], "--random-out: mean 0 s: must be above 0"),
     ],
 )
 def test_p53_a_mistake_in_the_frequencies_is_one_line(

@@ -209,9 +209,9 @@ def test_what_is_played_where_little_is_said(
         (["--day", "2019-07-24..soon"], "not a day; write it as 2019-07-24, several as"),
         (["--serve", "here"], "--serve here: must be HOST:PORT"),
         (["level1", "--web", "99999"], "--web 99999: must be PORT or HOST:PORT"),
-        (["level1", "--random", "0", "1"], "--random 0 1: the mean must be above 0 s"),
-        (["level1", "--random", "9", "1", "--cars", "-1"], "--cars -1: must be 0 or more"),
-        (["level1", "--one-car", "-5"], "--one-car -5: must be seconds, 0 or more"),
+        (["level1", "--random", "0", "1"], "--random: mean 0 s: must be above 0"),
+        (["level1", "--random", "9", "1", "--cars", "-1"], "--cars -1: must be from 0 to 100000"),
+        (["level1", "--one-car", "-5"], "--one-car -5: must be seconds from 0 to 1000000"),
         (["--serve", "127.0.0.1:0", "--without", "MR1", "--hour", "07:00"], "--without MR1: a window's warm-up"),
     ],
 )  # fmt: skip

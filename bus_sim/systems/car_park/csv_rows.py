@@ -13,9 +13,8 @@ from typing import NamedTuple, Protocol
 from bus_sim.demand import DemandError
 from bus_sim.systems.car_park.moments import CellError, MomentForm
 from onboard.bounded_file import MOST_EXPORT, read_bounded
+from onboard.config.problems import at_most
 
-#: Bad rows that are named one by one; the others are counted.
-MOST_NAMED = 20
 #: Cells so filled are empty: what spreadsheets and data bases write for nothing.
 _NOTHING = frozenset({"", "-", "null", "none", "nan", "nat", "n/a", "na"})
 #: How files begin whose encoding is told by their byte-order mark.
@@ -178,12 +177,6 @@ class CsvTable:
 def _whole(text: str, low: int, high: int) -> str:
     """What to write in the stead of a text: a comma divides neither thousands nor parts."""
     return f"a whole number from {low} to {high}" + (", without a comma" if "," in text else "")
-
-
-def at_most(lines: Sequence[str]) -> list[str]:
-    """The first ``MOST_NAMED``, and how many more there are."""
-    more = len(lines) - MOST_NAMED
-    return [*lines[:MOST_NAMED], *([f"and {more} more"] if more > 0 else [])]
 
 
 def _known(cells: Sequence[str], at: Mapping[str, Sequence[int]]) -> dict[str, str]:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
 
-from bus_sim.demand import DemandError
-from bus_sim.systems.car_park.csv_rows import CsvForm, at_most
+from bus_sim.demand import LONGEST_S, MOST_CARS, DemandError, Law, check_count
+from bus_sim.systems.car_park.csv_rows import CsvForm
 from bus_sim.systems.car_park.demand import (
     LEVEL1_DAY,
     MINUTE_S,
@@ -20,6 +20,7 @@ from bus_sim.systems.car_park.demand import (
 from bus_sim.systems.car_park.mapping import table_form
 from bus_sim.systems.car_park.sizes import broken_limits, misfits
 from bus_sim.systems.car_park.window import with_eve
+from onboard.config.problems import at_most
 from onboard.core.site import Site
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.site import BayUse, way_site
@@ -208,14 +209,12 @@ def check_together(args: Namespace, others: Sequence[str] = ()) -> None:
 
 def _check_numbers(args: Namespace) -> None:
     """Refuse what no demand can be made of, by the option's name."""
-    if args.one_car is not None and not args.one_car >= 0:
-        raise DemandError(f"--one-car {args.one_car:g}: must be seconds, 0 or more")
-    if args.cars < 0:
-        raise DemandError(f"--cars {args.cars}: must be 0 or more")
+    if args.one_car is not None and not 0 <= args.one_car <= LONGEST_S:
+        raise DemandError(f"--one-car {args.one_car:g}: must be seconds from 0 to {LONGEST_S}")
+    check_count("--cars", args.cars, MOST_CARS)
     for option, law in (("--random", args.random), ("--random-out", args.random_out)):
-        if law is not None and not (law[0] > 0 and law[1] >= 0):
-            mean, sigma = law
-            raise DemandError(f"{option} {mean:g} {sigma:g}: the mean must be above 0 s, the deviation 0 s or more")
+        if law is not None:
+            Law(*law).check(option)
     if args.random_out is not None and args.random is None:
         raise DemandError("--random-out: departures alone; say with --random how cars arrive")
 

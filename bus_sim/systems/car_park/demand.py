@@ -11,7 +11,7 @@ from datetime import date, datetime, time
 from importlib.resources import files
 from pathlib import Path
 
-from bus_sim.demand import DemandError, Law
+from bus_sim.demand import LONGEST_S, MOST_CARS, DemandError, Law, check_count
 from bus_sim.systems.car_park.counts import chosen_counts, day_zero, drawn_stays, no_counts, read_counts
 from bus_sim.systems.car_park.csv_rows import CsvForm, CsvTable, Readable
 from bus_sim.systems.car_park.plant.bodies import CarBody, random_car
@@ -147,13 +147,15 @@ class Demand:
         output fetches one of the cars that came at least ``min_stay_s`` before, by chance, or none where none did.
         With ``inside`` so many cars are there when it begins, may be fetched at once, and as many go as come.
         The law is cut off at 0 by drawing again: with a deviation above about a third of the mean the true mean is
-        larger than ``mean_s``. Raises ``DemandError`` for a mean not above 0, a negative deviation or count.
+        larger than ``mean_s``. Raises ``DemandError`` for what is below 0, a mean that is 0, and what
+        no run is long enough for (``bus_sim.demand``).
         """
         arriving, leaving = Law(mean_s, sigma_s), Law(*(out or (mean_s, sigma_s)))
         arriving.check("input interval")
         leaving.check("output interval")
-        if count < 0:
-            raise DemandError(f"count {count}: must be 0 or more")
+        check_count("cars", count, MOST_CARS)
+        if not 0 <= min_stay_s <= LONGEST_S:
+            raise DemandError(f"least stay {min_stay_s:g} s: must be from 0 to {LONGEST_S}")
         times = list(_running(arriving, random.Random(f"input:{seed}"), count))
         chance = random.Random(f"output:{seed}")
         departures = _departures(times, leaving, round(min_stay_s * 1e6), chance, inside)
@@ -168,10 +170,10 @@ class Demand:
     def one_car(cls, car: CarBody | None = None, *, stay_s: float | None = None, seed: int = 0) -> "Demand":
         """Manual piloting (row P52): one car at time zero, fetched after ``stay_s`` or when somebody asks for it.
 
-        Raises ``DemandError`` for a stay below 0.
+        Raises ``DemandError`` for a stay below 0, or above ``LONGEST_S``.
         """
-        if stay_s is not None and stay_s < 0:
-            raise DemandError(f"stay {stay_s} s: must be 0 or more")
+        if stay_s is not None and not 0 <= stay_s <= LONGEST_S:
+            raise DemandError(f"stay {stay_s:g} s: must be from 0 to {LONGEST_S}")
         departure_us = None if stay_s is None else round(stay_s * 1e6)
         return cls((Stay(0, departure_us, car or random_car("car 1", seed)),))
 

@@ -20,11 +20,16 @@ from onboard.work.plain import NoEstimator
 HALF_US = 3_000_000
 #: Share of a round's length that the longest delay may take, per cent: the rest is for those who are beaten late.
 DELAY_PERCENT = 60
+#: Share that the guard before the deadline may take, per cent, and once more behind it: one that the site file has for
+#: calls may be longer than a round.
+GUARD_PERCENT = 10
 
 
 def bid_timing(timing: Timing, window_us: int) -> Timing:
     """The delay rule's constants for rounds of ``window_us``."""
-    return replace(timing, bid_delay_us=window_us * DELAY_PERCENT // 100, bid_half_us=HALF_US)
+    guard_us = min(timing.deadline_guard_us, window_us * GUARD_PERCENT // 100)
+    delay_us = window_us * DELAY_PERCENT // 100
+    return replace(timing, bid_delay_us=delay_us, bid_half_us=HALF_US, deadline_guard_us=guard_us)
 
 
 @dataclass

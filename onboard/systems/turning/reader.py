@@ -101,7 +101,7 @@ def _read_chuck(table: TomlTable) -> Chuck:
 def _read_tool(table: TomlTable) -> Tool:
     works = []
     for number, word in enumerate(table.items("works", 'a list such as ["facing", "roughing"]') or []):
-        if word in _WORKS:
+        if isinstance(word, str) and word in _WORKS:
             works.append(_WORKS[word])
         else:
             table.bad("works", word, "unknown word", 'known here: "facing", "roughing", "finishing"', item=number)

@@ -15,6 +15,9 @@ from onboard.trace.commands.common import Commands, TraceError, add_command, add
 from onboard.trace.replay.driver import JOURNAL_US, RaisedCosts, Recording, ReplayDriver, compare, in_words, record
 from onboard.wire.codec import Codecs
 
+#: Most that a replay may raise a machine's bids by: far above any bid, and far below the most that a frame takes.
+MOST_RAISED = 1_000_000
+
 HELP = """\
 The log must begin with the machine's power-up, with an empty journal, and hold the fleet bus and, under the machine's
 name, its device bus (bus-sim run --devices): what its sensors said decides what it does.
@@ -56,6 +59,8 @@ def register(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run one controller against the log; exit status 1 at the first frame that differs."""
     site = load_site(args.site)
+    if not 0 <= args.raise_costs <= MOST_RAISED:
+        raise TraceError(f"--raise-costs {args.raise_costs}: must be from 0 to {MOST_RAISED}")
     machine = _machine(site, args.machine)
     codecs = codecs_for(site)
     with open_log(args) as log:

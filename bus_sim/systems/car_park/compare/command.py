@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bus_sim.demand import DemandError
+from bus_sim.demand import DemandError, read_seeds
 from bus_sim.demand_options import add_table_options
 from bus_sim.engine import Engine, add_where_options, engine_of, shown
 from bus_sim.sites import find_site
@@ -88,7 +88,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Make the tables; the exit status. Raises ``DemandError`` for a person's mistake."""
-    seeds, parts, engine = _seeds(args.seeds), _parts(args.parts), engine_of(args, chunk=1)
+    seeds, parts, engine = read_seeds(args.seeds), _parts(args.parts), engine_of(args, chunk=1)
     places = _places(args.place)
     site = find_site(args.site)
     if not isinstance(site, CarPark):
@@ -200,13 +200,6 @@ def _told(one: Play) -> Play:
     told = f"seed {one.seed}, {named(one.policy, one.place)}: waiting {mean_s:.1f} s, {one.left} not served"
     print(told, file=sys.stderr, flush=True)
     return one
-
-
-def _seeds(text: str) -> range:
-    first, dash, last = text.partition("-")
-    if not first.isdecimal() or (dash and not last.isdecimal()) or (dash and int(last) < int(first)):
-        raise DemandError(f"--seeds {text}: must be one number, or first and last such as 1-5")
-    return range(int(first), int(last or first) + 1)
 
 
 def _places(text: str) -> list[str]:

@@ -36,8 +36,11 @@ class Value:
         return self.of if isinstance(self.of, list) else []
 
     def number(self) -> float | None:
-        """A number; None where it is none."""
-        return float(self.of) if isinstance(self.of, int | float) and not isinstance(self.of, bool) else None
+        """A number; None where it is none, or one that no float holds."""
+        try:
+            return float(self.of) if isinstance(self.of, int | float) and not isinstance(self.of, bool) else None
+        except OverflowError:
+            return None
 
 
 def parse_yaml(text: str, problems: Problems) -> Value:
