@@ -3,6 +3,8 @@
 import random
 from typing import NamedTuple
 
+from onboard.config.arguments import whole
+
 #: Longest run, and longest mean time between two who come, s: eleven days.
 LONGEST_S = 1_000_000
 #: Most cars of a run: a month of the largest car park here.
@@ -26,11 +28,12 @@ def check_count(option: str, count: int, most: int) -> None:
 def read_seeds(text: str) -> range:
     """``A`` or ``A-B``. Raises ``DemandError`` for anything else."""
     first, dash, last = text.partition("-")
-    if not first.isdecimal() or (dash and not last.isdecimal()) or int(last or first) < int(first):
+    low, high = whole(first), whole(last if dash else first)
+    if low is None or high is None or high < low:
         raise DemandError(f"--seeds {text}: must be a seed, or the first and the last of several, such as 1-16")
-    if int(last or first) - int(first) >= MOST_SEEDS:
+    if high - low >= MOST_SEEDS:
         raise DemandError(f"--seeds {text}: more than {MOST_SEEDS}; play them in parts")
-    return range(int(first), int(last or first) + 1)
+    return range(low, high + 1)
 
 
 class Law(NamedTuple):

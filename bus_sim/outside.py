@@ -10,6 +10,7 @@ from bus_sim.options import RunOptions
 from bus_sim.run import FLEET, BusRun
 from bus_sim.serve.bridge import Bridge, open_bridge, parse_bus_specs
 from bus_sim.serve.socketcand import ServeError, SocketcandServer
+from onboard.config.arguments import whole
 from onboard.io.kept_token import kept_token
 from onboard.io.owned_file import OwnedFileError
 
@@ -20,7 +21,8 @@ MOST_PORT = 65_535
 def is_address(text: str) -> bool:
     """Whether a text is HOST:PORT; port 0 is any."""
     host, _, port = text.rpartition(":")
-    return bool(host) and port.isascii() and port.isdecimal() and int(port) <= MOST_PORT
+    number = whole(port)
+    return bool(host) and number is not None and number <= MOST_PORT
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +81,8 @@ class Outside:
 
     async def _serve(self, address: str) -> None:
         host, _, port = address.rpartition(":")
-        if not port.isdigit():
+        number = whole(port)
+        if number is None:
             raise ServeError(f"--serve {address}: must be HOST:PORT, such as 127.0.0.1:29536")
         epoch_us = self._simulation.options.epoch_us
         try:
@@ -87,7 +90,7 @@ class Outside:
         except OwnedFileError as error:
             raise ServeError(f"--serve-token {error}") from error
         server = SocketcandServer(
-            self._simulation.join, lambda time_us: epoch_us + time_us, host or "127.0.0.1", int(port), token
+            self._simulation.join, lambda time_us: epoch_us + time_us, host or "127.0.0.1", number, token
         )
         bound = await server.start()
         self._server = server

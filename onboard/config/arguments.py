@@ -7,6 +7,16 @@ from typing import Any, NoReturn
 
 #: Width of a help text where nobody knows the terminal's, and what argparse leaves free at its right, in characters.
 _COLUMNS, _FREE = 80, 2
+#: Digits of the longest whole number that is taken: each such number has 64 bits.
+_DIGITS = 18
+
+
+def whole(text: str) -> int | None:
+    """A whole number that a person typed in digits; None for anything else.
+
+    ``int`` raises for some of what ``isdigit`` takes, such as a raised 2, and for thousands of digits.
+    """
+    return int(text) if len(text) <= _DIGITS and text.isascii() and text.isdecimal() else None
 
 
 class Parser(argparse.ArgumentParser):

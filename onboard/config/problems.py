@@ -60,10 +60,10 @@ def quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=not text.isprintable())
 
 
-def at_most(lines: Sequence[str]) -> list[str]:
-    """The first ``MOST_NAMED``, and how many more there are."""
-    more = len(lines) - MOST_NAMED
-    return [*lines[:MOST_NAMED], *([f"and {more} more"] if more > 0 else [])]
+def at_most(most: int, lines: Sequence[str]) -> list[str]:
+    """The first ``most``, and how many more there are."""
+    more = len(lines) - most
+    return [*lines[:most], *([f"and {more} more"] if more > 0 else [])]
 
 
 class ConfigError(Exception):
@@ -74,7 +74,7 @@ class ConfigError(Exception):
         self.problems = problems
 
     def __str__(self) -> str:
-        return "\n".join(at_most([str(problem) for problem in self.problems]))
+        return "\n".join(at_most(MOST_NAMED, [str(problem) for problem in self.problems]))
 
 
 def closest(name: str, known: Sequence[str], alike: float = 0.6) -> str | None:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from onboard.config.arguments import Parser
+from onboard.config.arguments import Parser, whole
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.contract.constants import MAX_NODE_ID
@@ -100,6 +100,7 @@ def _write_tickets(place: Path, site: Site) -> int:
 def _tools(text: str, site: Site) -> list[int]:
     words = text.split(",") if text else []
     for word in words:
-        if not word.isdecimal() or not MAX_NODE_ID < int(word) <= _LAST_NODE_ID:
+        number = whole(word)
+        if number is None or not MAX_NODE_ID < number <= _LAST_NODE_ID:
             raise KeysError(f"--tools {word}: is no node-ID of a tool of {site.name}; write 251 to 255")
     return sorted({int(word) for word in words})

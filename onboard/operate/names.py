@@ -61,7 +61,7 @@ def slot_of(site: Site, text: str) -> Segment:
 
 def node_of(site: Site, text: str) -> int:
     """A node by its machine's name or by its number, 1 to 255. Raises ``OperateError``."""
-    if text.isdecimal() and NOBODY < int(text) <= LAST_TOOL:
+    if text.isdecimal() and len(text) <= len(str(LAST_TOOL)) and NOBODY < int(text) <= LAST_TOOL:
         return int(text)
     try:
         return machine_of(site, text).node_id

@@ -4,6 +4,8 @@ import ipaddress
 from importlib.util import find_spec
 
 DEFAULT_PORT = 8080
+#: Digits of a port.
+_LONGEST_PORT = 5
 
 
 class WebError(Exception):
@@ -18,7 +20,7 @@ def is_installed() -> bool:
 def parse_address(where: str) -> tuple[str, int]:
     """Host and port of ``PORT`` or ``HOST:PORT``. Raises ``WebError``."""
     host, _, port = where.rpartition(":")
-    if not port.isdigit() or not 0 <= int(port) < 1 << 16:
+    if not (port.isascii() and port.isdecimal() and len(port) <= _LONGEST_PORT and int(port) < 1 << 16):
         raise WebError(f"{where}: must be PORT or HOST:PORT, such as 127.0.0.1:{DEFAULT_PORT}")
     return host.strip("[]") or "127.0.0.1", int(port)
 

@@ -15,10 +15,11 @@ import pytest
 from bus_sim.cli import build_parser, main
 from bus_sim.demand import DemandError
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.csv_rows import MOST_ROWS
 from bus_sim.systems.car_park.day import asked_day, brought_in, choose_demand
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.window import EVE_US, MINUTE_US, busiest_hour, with_eve
-from onboard.config.problems import MOST_NAMED, ConfigError
+from onboard.config.problems import ConfigError
 from onboard.systems.car_park.site import car_park
 
 SHAPES = {
@@ -208,9 +209,9 @@ def test_every_bad_row_is_named_and_none_is_passed_over_unasked(tmp_path: Path) 
 
 
 def test_bad_rows_beyond_a_bound_are_counted(tmp_path: Path) -> None:
-    lines = refused(tmp_path, "arrival,departure\n" + "x,y\n" * (MOST_NAMED + 5))
-    assert len(lines) == MOST_NAMED + 2
-    assert lines[-2:] == ["and 5 more", f"table.csv: {MOST_NAMED + 5} bad rows; --skip-bad passes them over"]
+    lines = refused(tmp_path, "arrival,departure\n" + "x,y\n" * (MOST_ROWS + 5))
+    assert len(lines) == MOST_ROWS + 2
+    assert lines[-2:] == ["and 5 more", f"table.csv: {MOST_ROWS + 5} bad rows; --skip-bad passes them over"]
 
 
 def test_bad_rows_end_a_command_with_status_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

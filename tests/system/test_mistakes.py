@@ -60,6 +60,12 @@ MISTAKES = [
     (bus_sim, "run small --one-car 1e18", r"--one-car 1e\+18: must be seconds from 0 to 1000000"),
     (bus_sim, "run small --one-car 60 --for 1e308", r"--for 1e\+308: must be seconds above 0, and at most 1000000"),
     (bus_sim, "campaign small --seeds 1-99999999", r"--seeds 1-99999999: more than 1000000; play them in parts"),
+    (bus_sim, f"campaign small --seeds {'1' * 5_000}", r"--seeds 1+: must be a seed, or the first and the last of"),
+    (bus_sim, f"run small --random 20 5 --inside {'1' * 5_000}", r"--inside 1+: must be a number of cars from 0 to"),
+    (bus_sim, "run small --web ²", r"--web ²: must be PORT or HOST:PORT"),
+    (bus_sim, "run small --serve 127.0.0.1:²", r"--serve 127.0.0.1:²: must be HOST:PORT"),
+    (onboard, "trace why file IOC1/² --site small", r"task 'IOC1/²': write CALLER/NUMBER"),
+    (onboard, "keys make small --tools ²", r"--tools ²: is no node-ID of a tool"),
     (bus_sim, "campaign small --cars 99999999", r"--cars 99999999: must be from 1 to 100000"),
     (bus_sim, "attack graph --orders 99999999", r"--orders 99999999: must be from 0 to 10000"),
     (bus_sim, "compare small --seeds 2-1", r"--seeds 2-1: must be a seed, or the first and the last of several"),
@@ -73,7 +79,9 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(("program", "words", "told"), MISTAKES, ids=lambda value: value if type(value) is str else "")
+@pytest.mark.parametrize(
+    ("program", "words", "told"), MISTAKES, ids=lambda value: value[:60] if type(value) is str else ""
+)
 def test_a_mistake_is_one_line_and_status_2(
     program: Callable[[list[str]], int],
     words: str,

@@ -15,6 +15,8 @@ from bus_sim.systems.car_park.moments import CellError, MomentForm
 from onboard.bounded_file import MOST_EXPORT, read_bounded
 from onboard.config.problems import at_most
 
+#: Bad rows that are named one by one; the others are counted.
+MOST_ROWS = 20
 #: Cells so filled are empty: what spreadsheets and data bases write for nothing.
 _NOTHING = frozenset({"", "-", "null", "none", "nan", "nat", "n/a", "na"})
 #: How files begin whose encoding is told by their byte-order mark.
@@ -127,7 +129,7 @@ class CsvTable:
         """What is told of bad rows that are passed over; none where there are none. ``DemandError`` unless asked so."""
         if not self.bad:
             return []
-        told = at_most(self.bad)
+        told = at_most(MOST_ROWS, self.bad)
         if self.form.skip_bad:
             return [f"{self.name}: {len(self.bad)} of {self.count} rows are bad and passed over", *told]
         if len(self.bad) == 1:

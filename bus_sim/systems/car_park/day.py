@@ -7,7 +7,7 @@ from datetime import date
 from pathlib import Path
 
 from bus_sim.demand import LONGEST_S, MOST_CARS, DemandError, Law, check_count
-from bus_sim.systems.car_park.csv_rows import CsvForm
+from bus_sim.systems.car_park.csv_rows import MOST_ROWS, CsvForm
 from bus_sim.systems.car_park.demand import (
     LEVEL1_DAY,
     MINUTE_S,
@@ -20,6 +20,7 @@ from bus_sim.systems.car_park.demand import (
 from bus_sim.systems.car_park.mapping import table_form
 from bus_sim.systems.car_park.sizes import broken_limits, misfits
 from bus_sim.systems.car_park.window import with_eve
+from onboard.config.arguments import whole
 from onboard.config.problems import at_most
 from onboard.core.site import Site
 from onboard.systems.car_park.site import CarPark
@@ -101,7 +102,7 @@ def brought_in(demand: Demand, site: CarPark) -> Demand:
     _check_room(demand, site)
     refused = misfits([stay.car for stay in (*demand.inside, *demand.stays)], site)
     played = with_eve(demand, len(site.fronts(BayUse.ENTRY, BayUse.BOTH)))
-    return replace(played, remarks=(*played.remarks, *at_most(refused)))
+    return replace(played, remarks=(*played.remarks, *at_most(MOST_ROWS, refused)))
 
 
 def standing_in(demand: Demand, site: CarPark) -> tuple[Stay, ...]:
@@ -192,9 +193,10 @@ def asked_inside(args: Namespace) -> tuple[int, bool]:
         if args.day is None or args.counts is not None:
             raise DemandError(f"--inside {text}: who came before the day; add --day D and --sessions FILE")
         return 0, True
-    if not text.isdecimal() or int(text) > MOST_INSIDE:
+    cars = whole(text)
+    if cars is None or cars > MOST_INSIDE:
         raise DemandError(f"--inside {text}: must be a number of cars from 0 to {MOST_INSIDE}, or {RECORDED}")
-    return int(text), False
+    return cars, False
 
 
 def check_together(args: Namespace, others: Sequence[str] = ()) -> None:

@@ -3,6 +3,7 @@
 import argparse
 import sys
 
+from onboard.config.arguments import whole
 from onboard.contract.messages import Reference
 from onboard.core.site import Site
 from onboard.history.history import History
@@ -120,8 +121,7 @@ def task_of(text: str | None, site: Site | None) -> Reference | None:
         return None
     caller, _, number = text.partition("/")
     node = next((one.node_id for one in site.machines.values() if one.name == caller), 0) if site is not None else 0
-    if not node and caller.isdigit():
-        node = int(caller)
-    if not node or not number.isdigit():
+    node, place = node or whole(caller) or 0, whole(number)
+    if not node or place is None:
         raise TraceError(f"task {text!r}: write CALLER/NUMBER as `onboard trace calls` names tasks, such as IOC1/2")
-    return Reference(node, int(number))
+    return Reference(node, place)

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 from bus_sim.demand import DemandError
 from bus_sim.systems.car_park.design.toml_text import toml_text
+from onboard.config.arguments import whole
 from onboard.config.problems import ConfigError
 from onboard.config.site import parse_site
 from onboard.contract.codes import KindCode, Side
@@ -273,7 +274,7 @@ def _words(site: CarPark, at: Segment) -> str:
 def parse_range(option: str, text: str, least: int, most: int) -> range:
     """``A-B`` or one number. Raises ``DemandError``."""
     first, dash, last = text.partition("-")
-    is_whole = first.isdecimal() and (last.isdecimal() if dash else True)
-    if not is_whole or not least <= int(first) <= int(last or first) <= most:
+    low, high = whole(first), whole(last if dash else first)
+    if low is None or high is None or not least <= low <= high <= most:
         raise DemandError(f"{option} {text}: must be a number from {least} to {most}, or first and last such as 2-6")
-    return range(int(first), int(last or first) + 1)
+    return range(low, high + 1)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bus_sim.systems.mapd.importers.draft import Draft, Loss, TaskLine, draw_tasks
+from onboard.config.arguments import whole
 from onboard.config.problems import Problems
 from onboard.systems.mapd.floor import FREE, Floor, grid_floor
 from onboard.systems.mapd.reader import BLOCKED, MAX_RELEASE, usual_width
@@ -60,7 +61,7 @@ def _header(lines: list[str], problems: Problems) -> int:
                 return number
         problems.add(1, "type", lines[0], "a header without the line map", "write map before the first row")
         return len(lines)
-    return next((at for at, line in enumerate(lines) if not line.replace(",", "").strip().isdigit()), len(lines))
+    return next((at for at, line in enumerate(lines) if whole(line.replace(",", "").strip()) is None), len(lines))
 
 
 def _compare(lines: list[str], first: int, problems: Problems) -> None:
@@ -75,14 +76,14 @@ def read_tasks(text: str, endpoints: list[str], problems: Problems) -> list[Task
     """The tasks of a task file; a first line with their number alone is passed over."""
     found = []
     for number, line in enumerate(text.splitlines(), start=1):
-        words = line.split()
-        if not words or (number == 1 and len(words) == 1 and words[0].isdigit()):
+        words = [whole(word) for word in line.split()]
+        if not words or (number == 1 and len(words) == 1 and words[0] is not None):
             continue
-        if len(words) not in (3, _COLUMNS) or not all(word.isdigit() for word in words):
+        if len(words) not in (3, _COLUMNS) or None in words:
             form = "write release, pick-up, delivery, 0, 0 as whole numbers of 0 or more"
             problems.add(number, "task", line.strip(), "not a task", form)
             continue
-        release, *ends = (int(word) for word in words[:3])
+        release, *ends = (word for word in words[:3] if word is not None)
         far = [end for end in ends if end >= len(endpoints)]
         if far:
             what = f"the map has {len(endpoints)} endpoints"
