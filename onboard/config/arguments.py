@@ -9,6 +9,19 @@ from typing import Any, NoReturn
 _COLUMNS, _FREE = 80, 2
 #: Digits of the longest whole number that is taken: each such number has 64 bits.
 _DIGITS = 18
+#: Three years: longer than any log.
+_LONGEST_S = 100_000_000
+
+
+def seconds(text: str) -> float:
+    """Seconds that an option says, from 0 to ``_LONGEST_S``. Raises what argparse tells as the option's mistake."""
+    try:
+        found = float(text)
+    except ValueError:
+        found = -1.0
+    if not 0 <= found <= _LONGEST_S:  # not a number is in no range
+        raise argparse.ArgumentTypeError(f"{text}: must be seconds from 0 to {_LONGEST_S}")
+    return found
 
 
 def whole(text: str) -> int | None:

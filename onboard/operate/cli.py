@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from onboard.config.arguments import Parser
+from onboard.config.arguments import Parser, seconds
 from onboard.config.keys import tool_keys
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
@@ -69,10 +69,10 @@ def build_parser() -> argparse.ArgumentParser:
         return commands.add_parser(name, parents=[common], help=help_text, description=help_text)
 
     status = command("status", "who lives, who stands and why; only listens")
-    status.add_argument("--for", type=float, dest="for_s", metavar="SECONDS", help="listen for so long")
+    status.add_argument("--for", type=seconds, dest="for_s", metavar="SECONDS", help="listen for so long")
     stop = command("stop", "all machines stand, as long as this runs and 30 s more")
     stop.add_argument(
-        "--for", type=float, dest="for_s", metavar="SECONDS", help="end by itself then; 0: once all have answered"
+        "--for", type=seconds, dest="for_s", metavar="SECONDS", help="end by itself then; 0: once all have answered"
     )
     command("go", "lift the emergency stop").add_argument(
         "--of", metavar="NODE", help="only the stop said by this machine or node-ID (default: all stops)"
@@ -129,7 +129,7 @@ def main(argv: Sequence[str]) -> int:
 
 def request_of(args: argparse.Namespace) -> CommandRequest:
     """What a command line asks for."""
-    seconds = getattr(args, "for_s", None)
+    for_s = getattr(args, "for_s", None)
     return CommandRequest(
         args.command,
         machine=getattr(args, "machine", ""),
@@ -139,7 +139,7 @@ def request_of(args: argparse.Namespace) -> CommandRequest:
         absent=getattr(args, "absent", ""),
         body=tuple(getattr(args, "body", ())),
         absent_body=tuple(getattr(args, "absent_body", ())),
-        for_us=None if seconds is None else round(seconds * 1e6),
+        for_us=None if for_s is None else round(for_s * 1e6),
     )
 
 

@@ -65,6 +65,12 @@ MISTAKES = [
     (bus_sim, "run small --web ²", r"--web ²: must be PORT or HOST:PORT"),
     (bus_sim, "run small --serve 127.0.0.1:²", r"--serve 127.0.0.1:²: must be HOST:PORT"),
     (onboard, "trace why file IOC1/² --site small", r"task 'IOC1/²': write CALLER/NUMBER"),
+    (
+        onboard,
+        "trace diagram file --site small --out d.svg --from nan",
+        r"argument --from: nan: must be seconds from 0",
+    ),
+    (onboard, "operate stop --site small --for inf", r"argument --for: inf: must be seconds from 0 to 100000000"),
     (onboard, "keys make small --tools ²", r"--tools ²: is no node-ID of a tool"),
     (bus_sim, "campaign small --cars 99999999", r"--cars 99999999: must be from 1 to 100000"),
     (bus_sim, "attack graph --orders 99999999", r"--orders 99999999: must be from 0 to 10000"),

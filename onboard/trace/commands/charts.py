@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from onboard.config.arguments import seconds
 from onboard.core.site import Site
 from onboard.systems.contract import codecs_for
 from onboard.systems.registry import part
@@ -61,8 +62,8 @@ def register_diagram(commands: Commands) -> None:
     parser = add_command(commands, "diagram", "what moves or lasts over time, SVG or PNG", DIAGRAM_HELP, run_diagram)
     add_log(parser)
     add_site(parser, required=True)
-    parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="seconds since the log's first frame")
-    parser.add_argument("--until", dest="until_s", type=float, metavar="S", help="likewise")
+    parser.add_argument("--from", dest="from_s", type=seconds, metavar="S", help="seconds since the log's first frame")
+    parser.add_argument("--until", dest="until_s", type=seconds, metavar="S", help="likewise")
     parser.add_argument("--out", type=Path, metavar="FILE", required=True, help="file to write: .svg or .png")
 
 
