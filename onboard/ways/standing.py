@@ -144,7 +144,7 @@ class Standing:
     def _leads_away(self, before: Leg | None, leg: Leg, here: Segment) -> bool:
         """Whether a run begins or passes here, or goes on from here on another track: its end may be the mouth."""
         if before is not None and leg.action is LegAction.TRAVEL and leg.track != before.track:
-            return (before.track, before.to_index) == (here.track, here.index)
+            return Segment(before.track, before.to_index) in (here, turned_in(self.site, here))
         return _goes(leg) and self._begins_or_passes(leg, here)
 
     def _begins_or_passes(self, leg: Leg, here: Segment) -> bool:

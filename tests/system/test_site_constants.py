@@ -5,11 +5,12 @@ from dataclasses import replace
 import pytest
 
 from bus_sim.sites import find_site
+from onboard.config.site import parse_site
 from onboard.contract.codes import Operation
 from onboard.contract.messages import CallForProposals, TokenRequest
 from onboard.systems.car_park import kept_out
 from onboard.systems.car_park.site import CarPark, car_park
-from tests.sites import one_floor
+from tests.sites import ONE_FLOOR, one_floor
 from tests.system.scene import Scene, play, stays
 
 #: Longer than a drive with orders may stand, and than a robot waited before a bay.
@@ -27,6 +28,15 @@ def test_who_turns_for_long_is_not_stuck() -> None:
     """By the word of any drive that had not moved for 8 s it was, in each turn, and gave back all that it had won."""
     site = one_floor(2, extra='[[spurs]]\nat = "p(1,7)"\n[[spurs]]\nat = "p(1,9)"\n')
     assert_all_served(play(replace(site, carrier_turn_us=TURN_US), THREE_CARS, limit_s=1_500, extra_s=0))
+
+
+def test_who_goes_slowly_from_mark_to_mark_is_not_stuck() -> None:
+    """A drive says where it is at the middles and borders of segments: these were farther apart than 8 s."""
+    text = ONE_FLOOR.format(positions=9).replace("count = 1", "count = 1\npitch_mm = 8_000")
+    homes = ('[[spurs]]\nat = "p(1,7)"\n', '[[robots]]\nname = "MR1"\nnode = 11\nhome = "p(192,1)"\n')
+    slow = "[carrier]\nspeed_mm_s = 300\nturn_ms = 30_000\n"
+    scene = play(car_park(parse_site(text + "".join(homes) + slow, "slow.toml")), THREE_CARS, limit_s=6_000, extra_s=0)
+    assert_all_served(scene)
 
 
 def with_slow_doors() -> CarPark:

@@ -130,6 +130,21 @@ def test_who_works_where_it_came_by_before_stands_there_until_its_plan_turns_out
     assert standing.stands(ROBOT, 9 * RUN_MS * 1000 + STANDS_AFTER_US)
 
 
+def test_who_turns_in_a_mouth_for_long_is_on_its_way_as_long_as_its_plan_leads_it_through() -> None:
+    """It is told as the position beyond the end of the track inside, where no leg of its plan ends or begins."""
+    site = parse_site(BRANCH, "branch.toml")
+    legs = (
+        Leg(LegAction.TRAVEL, 1, 7, 3, Side.NEAR, RUN_MS),
+        Leg(LegAction.TRAVEL, BRANCH_TRACK, 1, 1, Side.NEAR, 9 * RUN_MS),
+    )
+    mirror = Mirror(site, ME)
+    mirror.on_itinerary(Itinerary(ROBOT, 1, Grade.FIRM, Stamp(0, ME, 1), legs), 0)
+    standing = Standing(way_site(site), mirror.itineraries, lambda node: False)
+    standing.hear(Progress(ROBOT, 1, 1, BRANCH_TRACK, 0, 0, 0), RUN_MS * 1000)
+    assert not standing.stands(ROBOT, 9 * RUN_MS * 1000 + STANDS_AFTER_US - 1)
+    assert standing.stands(ROBOT, 9 * RUN_MS * 1000 + STANDS_AFTER_US)
+
+
 def test_a_machine_at_the_end_of_its_plan_may_stand_there_for_ever() -> None:
     assert not seen(place=7).stands(ROBOT, 10 * WAITS_AFTER_US)
 

@@ -30,7 +30,7 @@ from onboard.systems.car_park.bay_memory import BayMemory
 from onboard.systems.car_park.lift_generation import LiftGeneration
 from onboard.systems.car_park.lift_steps import LIFT_TABLE, LiftDeed, LiftFinding, LiftPhase
 from onboard.systems.car_park.records import RideOverRecord, RideRecord
-from onboard.systems.car_park.stall import MOVES, PlaceWords, Stall
+from onboard.systems.car_park.stall import MOVES, PlaceWords, Stall, lift_silence_us
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.ways.lifts import MARK_TOLERANCE_MM, gate, nearest_stop, platform, stop_mm, under_gate
 from onboard.ways.mirror import WayFleet
@@ -62,7 +62,7 @@ class Lift:
     drive: DriveState | None = None
     platform: PlatformState | None = None
     stewardship: Stewardship = field(init=False)
-    stall: Stall = field(default_factory=Stall)
+    stall: Stall = field(init=False)
     _is_stuck: bool = False
     #: The drive's orders: a position in the shaft, mm.
     link: DeviceLink[int] = field(init=False)
@@ -80,6 +80,7 @@ class Lift:
             lambda sequence, position_mm: DriveOrder(me, sequence, position_mm, speed_mm_s),
             site.timing.drive_refresh_us,
         )
+        self.stall = Stall(silence_us=lift_silence_us(site, self.track))
         self.stewardship = Stewardship(self.fleet)
         self.stewardship.replay(BayMemory(self.fleet.node_id).read(self.fleet.entries))
 

@@ -4,10 +4,14 @@ One that does not makes its machine an obstacle until it moves (issue 4, point 3
 """
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Generic, TypeVar
 
 from onboard.contract.codes import DriveMode
 from onboard.core.behaviour import NEVER_US
+from onboard.ways.kinematics import run_duration_us
+from onboard.ways.lifts import stop_mm
+from onboard.ways.site import TrackKind, WaySite
 
 #: A drive that has orders and has not moved for so long is stuck, us: brakes and locks take less.
 STALL_US = 8_000_000
@@ -22,14 +26,32 @@ MOVES = (DriveMode.MOVING, DriveMode.BRAKING)
 Place = TypeVar("Place")
 
 
+def carrier_silence_us(site: WaySite) -> int:
+    """How long a carrier's drive on its way may say nothing, us: twice a run over half a segment.
+
+    It says where it is at the middle and at the border of each (dbc/device.dbc).
+    """
+    pitch_mm = max(one.pitch_mm for one in site.tracks.values() if one.kind is not TrackKind.LIFT)
+    return 2 * run_duration_us(pitch_mm // 2, site.carrier)
+
+
+def lift_silence_us(site: WaySite, track: int) -> int:
+    """The same of a lift's drive, which says where it is half way between two stops, and at each."""
+    stops_mm = [stop_mm(site, track, index) for index in range(1, site.tracks[track].length + 1)]
+    apart_mm = max((abs(one - other) for one, other in pairwise(stops_mm)), default=0)
+    return 2 * run_duration_us(apart_mm // 2, site.lift)
+
+
 @dataclass
 class Stall:
     """Watches one drive; all times in us of one clock.
 
     ``repeats``: its orders are repeated, and who ceased to (a stop holds the machine) has not ordered anything.
+    ``silence_us``: it may say nothing for so long where that is longer than ``STALL_US``.
     """
 
     repeats: bool = True
+    silence_us: int = 0
     _ordered_us: int = 0
     _since_us: int | None = None
     _position_mm: int | None = None
@@ -57,7 +79,7 @@ class Stall:
     @property
     def stuck_from_us(self) -> int:
         """From when on the drive has not moved for too long though it was told to."""
-        return NEVER_US if self._since_us is None else self._since_us + STALL_US + self._pause_us
+        return NEVER_US if self._since_us is None else self._since_us + max(STALL_US, self.silence_us) + self._pause_us
 
     def is_stuck(self, now_us: int) -> bool:
         """Whether it has not by now."""

@@ -22,7 +22,7 @@ from onboard.core.site import Segment
 from onboard.systems.car_park.axis import TrackAxis
 from onboard.systems.car_park.placing import Placing
 from onboard.systems.car_park.sill import SillProof
-from onboard.systems.car_park.stall import MOVES, PlaceWords, Stall
+from onboard.systems.car_park.stall import MOVES, PlaceWords, Stall, carrier_silence_us
 from onboard.systems.car_park.way import line_to_refuge
 from onboard.ways.all_or_none import AllOrNone
 from onboard.ways.kinematics import run_duration_us
@@ -73,12 +73,12 @@ class Carriage:
     #: Whether the goal is another than when what was left was given back last.
     _turned: bool = False
     sill: SillProof = field(init=False)
-    stall: Stall = field(default_factory=Stall)
+    stall: Stall = field(init=False)
     placing: Placing = field(init=False)
 
     def __post_init__(self) -> None:
-        self.placing = Placing(self.fleet.site)
-        self.whole = AllOrNone(self.fleet.tokens)
+        self.placing, self.whole = Placing(self.fleet.site), AllOrNone(self.fleet.tokens)
+        self.stall = Stall(silence_us=carrier_silence_us(self.fleet.site))
         self.left = LeftBehind(self.fleet)
         self.sill = SillProof(self.fleet)
 
