@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 
 #: Width of a help text where nobody knows the terminal's, and what argparse leaves free at its right, in characters.
 _COLUMNS, _FREE = 80, 2
-#: Digits of the longest whole number that is taken: each such number has 64 bits.
+#: Digits of the longest whole number that is taken: it fits 64 bits.
 _DIGITS = 18
 #: Three years: longer than any log.
 _LONGEST_S = 100_000_000
