@@ -8,6 +8,8 @@ from onboard.work.timing import DeviceTiming
 WORST_FRAME_BITS = 160
 #: Shortest default of the bidding delay W, ms.
 _SHORTEST_DELAY_MS = 300
+#: Longest call window, ms: a last attempt has three times that, and no plan's stamp counts that is a minute ahead.
+MOST_WINDOW_MS = 15_000
 
 
 def read_timing(table: TomlTable, robots: int, machines: int, bitrate: int) -> DeviceTiming:
@@ -19,10 +21,10 @@ def read_timing(table: TomlTable, robots: int, machines: int, bitrate: int) -> D
     is sent after the second.
     """
     least_ms = -(-3 * robots * 2 * WORST_FRAME_BITS * 1000 // bitrate)
-    window_ms = table.integer("call_window_ms", 50, 60_000, 1_000)
-    delay_ms = table.integer("bid_delay_ms", 1, 60_000, max(_SHORTEST_DELAY_MS, least_ms))
+    window_ms = table.integer("call_window_ms", 50, MOST_WINDOW_MS, 1_000)
+    delay_ms = table.integer("bid_delay_ms", 1, MOST_WINDOW_MS, max(_SHORTEST_DELAY_MS, least_ms))
     half_ms = table.integer("bid_half_ms", 1, 3_600_000, 10_000)
-    guard_ms = table.integer("deadline_guard_ms", 0, 10_000, 20)
+    guard_ms = table.integer("deadline_guard_ms", 0, MOST_WINDOW_MS // 3, 20)
     if delay_ms < least_ms:
         what = f"shorter than 3 N times two frames at {bitrate} bit/s, N = {robots} robots"
         table.bad("bid_delay_ms", delay_ms, what, f"write at least {least_ms}")

@@ -121,6 +121,11 @@ ONE_MISTAKE = {
         "s.toml:5: timing.bid_delay_ms = 90: shorter than 3 N times two frames at 10000 bit/s, N = 1 robots; "
         "write at least 96",
     ),
+    "a window that is longer than a plan's stamp counts ahead": (
+        'name = "two"',
+        'name = "two"\n[timing]\ncall_window_ms = 15_001',
+        "s.toml:4: timing.call_window_ms = 15001: out of range; write a whole number from 50 to 15000",
+    ),
     "no room for the slots between the delay and the deadline": (
         'name = "two"',
         'name = "two"\n[timing]\ncall_window_ms = 346',
