@@ -47,8 +47,8 @@ def test_choices_of_places_are_compared(tmp_path: Path, monkeypatch: pytest.Monk
 @pytest.mark.parametrize(
     ("options", "remedy"),
     [
-        (["--seeds", "5-1"], "first and last such as 1-5"),
-        (["--seeds", "one"], "first and last such as 1-5"),
+        (["--seeds", "5-1"], "the first and the last of several"),
+        (["--seeds", "one"], "the first and the last of several"),
         (["--place", "far"], "some of nearest, cost, stay, balanced, random"),
         (["--parts", "nights"], "some of random, day, small, stored"),
         (["--parts", "random", "--random", "0", "1"], "must be above 0"),

@@ -162,7 +162,7 @@ def test_without_a_baseline_each_seed_is_played_once(monkeypatch: pytest.MonkeyP
         ("--faults", "bos", "--faults bos: no such profile"),
         ("--seeds", "9-1", "--seeds 9-1: must be a seed"),
         ("--jobs", "-1", "--jobs -1: must be 1 or more"),
-        ("--cars", "0", "--cars 0: must be 1 or more"),
+        ("--cars", "0", "--cars 0: must be from 1 to 100000"),
         ("--limit", "0", "--limit 0: must be above 0"),
         ("--apart", "0", "--apart 0: must be above 0"),
         ("--apart", "nan", "--apart nan: must be above 0"),
