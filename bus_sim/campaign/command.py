@@ -190,8 +190,8 @@ def _strangers(args: argparse.Namespace, plan: CampaignSettings, site: Site) -> 
         print(pair.line())
     bad = [pair for pair in pairs if not pair.is_good]
     worst = max(pair.longer_s for pair in pairs)
-    told = f"{len(pairs)} seeds with a machine that {strange.how.value}"
-    print(f"{told}: {len(bad)} failed; mean wait at most {worst:+.1f} s longer than without it")
+    told = f"{len(pairs)} {'seed' if len(pairs) == 1 else 'seeds'} with a machine that {strange.how.does}"
+    print(f"{told}: {len(bad)} failed; mean wait at most {worst:.1f} s longer than without it")
     return 1 if bad else 0
 
 

@@ -72,7 +72,7 @@ class Pair:
     def line(self) -> str:
         """Served, told and waiting with the stranger, and the change of the mean wait in s, as one line."""
         one, other = self.strange, self.without
-        told = f"served {one.served} of {other.served}, told {one.told}, waiting {one.waiting}"
+        told = f"served {one.served} ({other.served} without it), told why {one.told}, waiting {one.waiting}"
         head = f"{'' if self.is_good else 'FAILED '}seed {self.seed}: {told}, mean wait"
         head = head.replace("mean wait", "a person is asked for, mean wait") if one.is_person_asked else head
         return f"{head} {self.longer_s:+.1f} s; {'; '.join(one.broken)}".rstrip("; ")

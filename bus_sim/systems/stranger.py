@@ -26,6 +26,11 @@ class Stranger(Enum):
     SILENT = "silent"
     LIAR = "liar"
 
+    @property
+    def does(self) -> str:
+        """What such a machine does, behind ``a machine that``."""
+        return {"stands": "stands", "silent": "is silent", "liar": "lies"}[self.value]
+
 
 @dataclass
 class _LeastBid:

@@ -1,5 +1,7 @@
 """A machine that bids and does nothing starves nobody, on any system that calls: served, or told why."""
 
+import re
+
 import pytest
 
 from bus_sim.campaign.strangers import StrangerPlan, play_pair
@@ -74,3 +76,11 @@ def test_a_site_on_which_nobody_else_could_do_the_work_says_so(capsys: pytest.Ca
     told = capsys.readouterr().err
     assert "crescent has one robot" in told
     assert "take a site with two" in told
+
+
+def test_the_table_of_a_campaign_with_a_stranger_is_in_words(capsys: pytest.CaptureFixture[str]) -> None:
+    """It said "served 12 of 9", where nine were served without the machine, and "with a machine that liar"."""
+    assert main(["campaign", "graph", "--stranger", "liar", "--seeds", "1-1", "--jobs", "1"]) == 0
+    of_the_seed, of_all = capsys.readouterr().out.splitlines()
+    assert re.match(r"seed 1: served \d+ \(\d+ without it\), told why 0, waiting 0, mean wait ", of_the_seed)
+    assert of_all.startswith("1 seed with a machine that lies: 0 failed; ")

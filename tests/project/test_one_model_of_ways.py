@@ -17,7 +17,7 @@ ELSEWHERE = {
     "car_park/reader/joints.py": "which way alleys lie, from those they go off; nobody moves",
     "cell/geometry.py": "motions of an arm in the plane, around corners of what stands there",
     "terminal/routes.py": "several ways each without a circle, through entities with gates (row M25)",
-    "terminal/traffic.py": "dates of steps from constraints between them",
+    "terminal/dates.py": "dates of steps from constraints between them",
 }
 
 

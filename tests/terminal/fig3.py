@@ -6,9 +6,10 @@ from onboard.contract.codes import KindCode
 from onboard.contract.messages import NO_REFERENCE
 from onboard.contract.terminal import Action
 from onboard.core.site import Machine, Segment, Timing
+from onboard.systems.terminal.dates import StepDate
 from onboard.systems.terminal.plan import ActionPlan, EntityStay, Load, drive_steps, handling_steps
 from onboard.systems.terminal.site import Box, Entity, EntityKind, StationKind, Terminal
-from onboard.systems.terminal.traffic import StepDate, Traffic
+from onboard.systems.terminal.traffic import Traffic
 
 A1, L3, C1, L2, A4, L11, A2, S2, S1 = 1, 2, 3, 4, 5, 6, 7, 8, 9
 TIMING = Timing(0, 0, 1, 0, 1, 0, 0, 0, 0, 0)

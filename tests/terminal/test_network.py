@@ -7,9 +7,10 @@ import pytest
 
 from onboard.contract.messages import NO_REFERENCE
 from onboard.contract.terminal import Action
+from onboard.systems.terminal.dates import DateConstraint, StepDate
 from onboard.systems.terminal.plan import ActionPlan, ActionStep, EntityStay, Load
 from onboard.systems.terminal.site import Entity, EntityKind
-from onboard.systems.terminal.traffic import Traffic
+from onboard.systems.terminal.traffic import Traffic, is_for_good
 from tests.terminal.fig3 import A4, C1, L3, PRINTED, S1, S2, fig3, intervals, plan_of
 
 
@@ -159,3 +160,41 @@ def test_m03_m32_a_blocked_lane_holds_up_whoever_goes_there() -> None:
     assert intervals(traffic, 11, 30)[1] == (40, 60)
     assert intervals(traffic, 11, 70)[1] == (70, 80)
     assert traffic.through(L3) == [11]
+
+
+def by_the_dates(traffic: Traffic, now: int) -> tuple[frozenset[int], frozenset[int]]:
+    """Who leaves where it is, and who ends its plan, only by help: worked out from the dates of this very moment."""
+    dates = traffic.dates(now).at
+    late = {node for node, date in dates.items() if is_for_good(date, now)}
+    plans = traffic.plans.items()
+    here = frozenset(owner for owner, owned in plans if StepDate(owner, owned.current + 1) in late)
+    return here, frozenset(owner for owner, owned in plans if StepDate(owner, len(owned.plan.steps)) in late)
+
+
+def test_who_waits_for_one_that_is_out_is_known_at_any_later_moment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was worked out from all dates at each event of each vehicle: a third of what a disturbed yard cost."""
+    traffic = three(capacity=1)
+    networks: list[int] = []
+    patience, network = traffic.site.patience_us, Traffic._network
+
+    def counted(self: Traffic, now: int) -> tuple[dict[StepDate, int], list[DateConstraint]]:
+        networks.append(now)
+        return network(self, now)
+
+    first, second, third = traffic.plans
+    traffic.out[second], traffic.changes = 40, traffic.changes + 1
+    seen = []
+    for now in (40, 39 + patience, 40 + patience, 41 + patience, 10**9 + patience):
+        seen.append(by_the_dates(traffic, now))
+        with monkeypatch.context() as patched:
+            patched.setattr(Traffic, "_network", counted)
+            at_the_end = frozenset(owner for owner in traffic.plans if traffic.waits_for_good(owner, now))
+            assert (traffic.stuck(now), at_the_end) == seen[-1], now
+    assert not any(seen[0] + seen[1]) and seen[2] == seen[4] == (frozenset({second, third}), frozenset({second, third}))
+    traffic.out, traffic.changes = {first: 40}, traffic.changes + 1
+    assert traffic.stuck(50 + patience) == by_the_dates(traffic, 50 + patience)[0] == set(traffic.plans)
+    networks.clear()
+    with monkeypatch.context() as patched:
+        patched.setattr(Traffic, "_network", counted)
+        assert all(traffic.waits_for_good(owner, now + patience) for owner in traffic.plans for now in range(60, 99))
+    assert not networks

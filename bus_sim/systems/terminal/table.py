@@ -1,10 +1,11 @@
 """The plan table as in Fig. 3 of Le Page and Barras, and the picture of a terminal: both from the bus alone."""
 
 from onboard.contract.terminal import Action
+from onboard.systems.terminal.dates import StepDate
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.plan import NO_STEP, Load
 from onboard.systems.terminal.site import Entity, EntityKind, Terminal
-from onboard.systems.terminal.traffic import StepDate, Traffic
+from onboard.systems.terminal.traffic import Traffic
 
 _WORDS = {Action.GOTO: "GOTO", Action.DOCK: "DOCK", Action.UNDOCK: "UNDOCK"}
 _LOADS = {Action.PICK_UP: "PICK UP", Action.PUT_DOWN: "PUTDOWN"}

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from onboard.contract.messages import Reference
 from onboard.contract.terminal import Action
+from onboard.systems.terminal.dates import StepDate
 from onboard.systems.terminal.plan import (
     MAX_STEPS,
     NO_STEP,
@@ -22,7 +23,7 @@ from onboard.systems.terminal.plan import (
 )
 from onboard.systems.terminal.routes import routes
 from onboard.systems.terminal.site import EntityKind, StationKind, Terminal
-from onboard.systems.terminal.traffic import EntityVisit, StepDate, Traffic, copy_of
+from onboard.systems.terminal.traffic import EntityVisit, Traffic, copy_of
 
 _EVER = 1 << 62
 

@@ -5,13 +5,13 @@ of the next (M12). Only lower bounds count: the earliest date of each is the lon
 on an entity in the order of its list; a new plan says after whom it comes, so all mirrors keep the same lists.
 """
 
-from collections import deque
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from itertools import pairwise
 from typing import NamedTuple
 
 from onboard.contract.messages import Reference
+from onboard.systems.terminal.dates import DateConstraint, Dates, StepDate, earliest
 from onboard.systems.terminal.plan import ActionPlan, EntityStay, Load
 from onboard.systems.terminal.site import EntityKind, StationKind, Terminal
 
@@ -31,21 +31,6 @@ class EntityVisit(NamedTuple):
     def key(self) -> EntityStay:
         """Its name on the bus."""
         return EntityStay(self.owner, self.first)
-
-
-class StepDate(NamedTuple):
-    """One date: that at which step ``step`` of a machine's plan begins; for the number of steps, at which it ends."""
-
-    owner: int
-    step: int
-
-
-class DateConstraint(NamedTuple):
-    """``to`` is at least ``weight`` after ``origin``."""
-
-    origin: StepDate
-    to: StepDate
-    weight: int
 
 
 @dataclass
@@ -70,11 +55,11 @@ class PlannedPick(NamedTuple):
     station: int
 
 
-class Dates(NamedTuple):
-    """Earliest dates of all nodes, and the machines whose plans contradict each other, so that there are none."""
+class InNeedOfHelp(NamedTuple):
+    """Machines that leave where they are, and that end their plans, only once somebody has helped one that is out."""
 
-    at: dict[StepDate, int]
-    circle: frozenset[int]
+    here: frozenset[int]
+    at_the_end: frozenset[int]
 
 
 class AnewFor(Enum):
@@ -112,6 +97,7 @@ class Traffic:
     below: dict[int, tuple[int, ...]] = field(default_factory=dict)
     changes: int = 0
     _known: tuple[int, int, Dates] | None = None
+    _in_need: tuple[int, tuple[int, ...], InNeedOfHelp] | None = None
 
     # --- plans and reports -------------------------------------------------------------------------------------
 
@@ -362,19 +348,29 @@ class Traffic:
 
     def waits_for_good(self, owner: int, now: int) -> bool:
         """Whether a machine's plan comes to its end only if somebody helps one that does not go on."""
-        return bool(self.out) and is_for_good(self.end_of(owner, now), now)
+        return self.is_waited_for(now) and owner in self._in_need_of_help(now).at_the_end
+
+    def _waited_for(self, now: int) -> tuple[int, ...]:
+        return tuple(owner for owner, since in self.out.items() if now >= since + self.site.patience_us)
 
     def is_waited_for(self, now: int) -> bool:
         """Whether anybody does not go on for longer than one waits for a lane."""
-        return any(now >= since + self.site.patience_us for since in self.out.values())
+        return bool(self._waited_for(now))
 
     def stuck(self, now: int) -> frozenset[int]:
         """Machines that do not leave where they are before somebody has helped: who is out, and who is behind it."""
-        if not self.is_waited_for(now):
-            return frozenset()
-        dates = self.dates(now).at
-        ends = {owner: dates[StepDate(owner, owned.current + 1)] for owner, owned in self.plans.items()}
-        return frozenset(owner for owner, end in ends.items() if is_for_good(end, now))
+        return self._in_need_of_help(now).here if self.is_waited_for(now) else frozenset()
+
+    def _in_need_of_help(self, now: int) -> InNeedOfHelp:
+        """Remembered: what waits for who is out is put off as time goes on, and nothing else comes to be."""
+        of = (self.changes, self._waited_for(now))
+        if self._in_need is None or self._in_need[:2] != of:
+            at = self.dates(now).at
+            late = [node for node, date in at.items() if is_for_good(date, now)]
+            here = frozenset(node.owner for node in late if node.step == self.plans[node.owner].current + 1)
+            ends = frozenset(node.owner for node in late if node.step == len(self.plans[node.owner].plan.steps))
+            self._in_need = (*of, InNeedOfHelp(here, ends))
+        return self._in_need[2]
 
     def is_nobody_left(self, now: int) -> bool:
         """Whether no vehicle goes on, out for longer than one waits for a lane or behind such a one."""
@@ -442,48 +438,3 @@ def copy_of(traffic: Traffic) -> Traffic:
 def is_for_good(end: int, now: int) -> bool:
     """Whether a date is one that only comes if somebody helps a machine that does not go on."""
     return end - now >= AWAY_US
-
-
-def earliest(floors: dict[StepDate, int], edges: list[DateConstraint]) -> Dates:
-    """Earliest dates: the longest way to each node from its floor, each edge looked at once (Kahn's order).
-
-    Nodes that are on a circle, or behind one, keep their floors; their machines are named.
-    """
-    out: dict[StepDate, list[DateConstraint]] = {node: [] for node in floors}
-    waiting = dict.fromkeys(floors, 0)
-    for edge in edges:
-        if edge.origin in out and edge.to in waiting:
-            out[edge.origin].append(edge)
-            waiting[edge.to] += 1
-    at = dict(floors)
-    ready = deque(node for node, count in waiting.items() if not count)
-    done = 0
-    while ready:
-        node = ready.popleft()
-        done += 1
-        for edge in out[node]:
-            at[edge.to] = max(at[edge.to], at[node] + edge.weight)
-            waiting[edge.to] -= 1
-            if not waiting[edge.to]:
-                ready.append(edge.to)
-    if done == len(floors):
-        return Dates(at, frozenset())
-    return Dates(at, frozenset(_on_circle(out, {node for node, count in waiting.items() if count})))
-
-
-def _on_circle(out: dict[StepDate, list[DateConstraint]], left: set[StepDate]) -> set[int]:
-    """Machines on circles: what is only behind one is taken away from its end, each edge looked at once."""
-    behind: dict[StepDate, list[StepDate]] = {node: [] for node in left}
-    ahead = dict.fromkeys(left, 0)
-    for node in left:
-        for edge in out[node]:
-            if edge.to in ahead:
-                behind[edge.to].append(node)
-                ahead[node] += 1
-    dead = [node for node, count in ahead.items() if not count]
-    while dead:
-        for node in behind[dead.pop()]:
-            ahead[node] -= 1
-            if not ahead[node]:
-                dead.append(node)
-    return {node.owner for node, count in ahead.items() if count}
