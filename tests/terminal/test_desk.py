@@ -31,6 +31,8 @@ from onboard.contract.terminal import (
     PlanHead,
     PlanStep,
     PlanTask,
+    StepReport,
+    StepResult,
     TaskTerms,
     Verb,
 )
@@ -236,6 +238,31 @@ def test_a_box_whose_right_is_with_a_silent_vehicle_is_called_for_by_nobody() ->
     again.hears(CarAt(R1, site().box(box("B4")), place("S4"), 1, 0), TokenGrant(R1, *key, 2, DESK))
     again.passes(20)
     assert again.sent(CallForProposals) == [], "it has come"
+
+
+@pytest.mark.parametrize("has_come", [False, True])
+def test_a_box_that_is_carried_for_another_desk_is_not_mine_though_its_winner_was_not_heard_to_give_it_up(
+    has_come: bool,
+) -> None:
+    """Of boxes wanted by their type one was counted twice, by both desks, and one mission got one too few."""
+    desk = Counter()
+    desk.senses(load(count=1))
+    call, theirs = won(desk), Reference(QUAY, 1)
+    takes = PlanStep(R1, 1, 0, Action.PICK_UP, call.from_station, 60_000, 0, 0)
+    leaves = PlanStep(R1, 1, 1, Action.PUT_DOWN, place("S1"), 90_000, 0, 0)
+    plan = PlanHead(R1, 1, 2, 1, 0), takes, leaves, PlanTask(R1, 1, 0, 0, 1, call.car.number, theirs)
+    taken = TaskReport(R1, call.task, TaskPhase.AWARDED, place("S1"), Reason.NONE)
+    desk.hears(taken, Itinerary(R1, 1, Grade.FIRM, Stamp(0, QUAY, 0), ()), *plan)
+    if has_come:
+        desk.passes(6)
+        done = StepReport(R1, 1, 1, StepResult.DONE, place("S1"), 30_000)
+        desk.hears(CarAt(R1, call.car, place("S1"), 1, 0), done)
+    desk.passes(20)
+    assert not any("is done" in line for line in desk.reported())
+    last = [one for one in desk.sent(Award) if one.task == call.task][-1]
+    assert last.reason is Reason.CANCELLED, "its winner is not to blame"
+    anew = next(one.car.number for one in desk.sent(CallForProposals) if one.task != call.task)
+    assert anew != call.car.number and site().boxes[anew - 1].type == site().boxes[call.car.number - 1].type
 
 
 # --- lanes -----------------------------------------------------------------------------------------------------

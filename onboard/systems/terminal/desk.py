@@ -47,6 +47,7 @@ from onboard.systems.terminal.routes import least_end_ms
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.systems.terminal.vehicle import terminal
 from onboard.systems.terminal.waiting import WaitingOrders
+from onboard.systems.terminal.won import WonBoxes
 from onboard.ways.cars import CarFleet, car_fleet, car_mirror
 from onboard.ways.tokens import car_token
 from onboard.work.manual import GIVE_BACK_US, says_held
@@ -63,8 +64,6 @@ MANUAL_AGAIN_US = 1_000_000
 #: After power-up whoever has won a task that was called for has said so after this, us: twice what it takes until it
 #: says so again (``planner.SAY_US``), and some more.
 DOUBT_US = 12_000_000
-#: A task that was won and is in no plan for so long is called anew, us: its winner gave it up or lost it.
-LOST_US = 120_000_000
 
 
 class DeskGeneration(NoEstimator):
@@ -104,7 +103,7 @@ class Desk:
     interrupted: int = 0
     _look_at_us: int | None = None
     _repeat_at_us: int | None = None
-    _won_at_us: dict[Reference, int] = field(default_factory=dict)
+    _won: WonBoxes = field(init=False)
     _lanes: dict[int, LaneState] = field(default_factory=dict)
     _is_new: bool = False
     _is_moved: bool = False
@@ -120,6 +119,7 @@ class Desk:
     def __post_init__(self) -> None:
         self.orders = MissionBook(self.site, self.fleet.node_id)
         self.orders.replay(self.fleet.entries)
+        self._won = WonBoxes(self.fleet.node_id, self.orders, self.mirror)
         self._waiting = WaitingOrders(self.orders, self.mirror)
 
     @property
@@ -148,7 +148,7 @@ class Desk:
         """Tasks that were won go on; those that were called for may have been, and are called for again if not."""
         self._doubtful = {one for one in self.orders.open if one not in self.orders.won}
         self._doubtful_until_us = now_us + DOUBT_US
-        self._won_at_us = dict.fromkeys(self.orders.won, now_us)
+        self._won.show(self.orders.won, now_us)
         self._look_at_us = now_us + LOOK_US
         self.mirror.remember(read_boxes(self.fleet.node_id, self.fleet.node_id, self.fleet.entries))
         for task, winner in self.orders.won.items():
@@ -383,7 +383,7 @@ class Desk:
         self.fleet.winners.takes(task, winner, now_us, call)
         self._waiting.refused.discard(self.orders.open[task].mission)
         self.mirror.void.discard((task, winner))
-        self._won_at_us[task] = now_us
+        self._won.show([task], now_us)
         self._look_at_us = now_us + 1
         return [Record(self.orders.record())]
 
@@ -404,16 +404,17 @@ class Desk:
             return self.fleet.winners.remind(report.task, report.sender) if is_claim else []
         if report.phase is TaskPhase.DONE and self.orders.finish(report.task):
             self.fleet.winners.over(report.task)
-            self._won_at_us.pop(report.task, None)
+            self._won.over(report.task)
             self._look_at_us = now_us
             return [Record(self.orders.record()), Report(f"task {report.task.number} is done")]
         if report.phase is TaskPhase.FORFEITED:
             self.fleet.winners.over(report.task)
+            self._won.over(report.task)
             self.orders.give_back(report.task, OrderEvent.GIVEN_BACK)
             self._look_at_us = now_us + LOOK_US
             return [Record(self.orders.record())]
         if report.phase is TaskPhase.AWARDED:
-            self._won_at_us[report.task] = now_us
+            self._won.show([report.task], now_us)
         return []
 
     def _take_back(self, task: Reference, transport: Transport, now_us: int) -> list[Effect]:
@@ -427,7 +428,7 @@ class Desk:
         if not self._station_of(transport.box) or not self._is_unbegun(transport, now_us):
             self.fleet.winners.keeps(task)
             return []
-        self._won_at_us.pop(task, None)
+        self._won.over(task)
         self.calls.pop(task, None)
         self.orders.give_back(task, OrderEvent.TAKEN_BACK)
         said = self.fleet.winners.take_back(task, reason, now_us)
@@ -462,19 +463,22 @@ class Desk:
         for task, one in list(self.orders.open.items()):
             effects += self._take_back(task, one, now_us)
         for task, winner in list(self.orders.won.items()):
-            transport = self.orders.open[task]
-            if self.mirror.station_of(transport.box) == transport.target:
+            if self._won.is_done(task):
                 self.orders.finish(task)
+                self._won.over(task)
                 self.fleet.winners.over(task)
                 effects.append(Record(self.orders.record()))
-            elif self.mirror.in_plans(transport.box) is not None:
-                self._won_at_us[task] = now_us
-            elif now_us - self._won_at_us.get(task, now_us) >= LOST_US and self._station_of(transport.box):
-                self._won_at_us.pop(task, None)
-                self.orders.give_back(task, OrderEvent.TAKEN_BACK)
-                effects += self.fleet.winners.take_back(task, Reason.FALSE_STATEMENT, now_us)
-                effects += [Report(f"node {winner} has lost task {task.number}"), Record(self.orders.record())]
+            elif self._won.is_lost(task, now_us) and self._station_of(self.orders.open[task].box):
+                effects += self._lost(task, winner, now_us)
         return effects
+
+    def _lost(self, task: Reference, winner: int, now_us: int) -> list[Effect]:
+        """Its winner is not to blame where another desk has the box: its word that it gives the task up was missed."""
+        all_won, is_anothers = self.fleet.winners, self._won.is_anothers(task)
+        said = all_won.let_go(task) if is_anothers else all_won.take_back(task, Reason.FALSE_STATEMENT, now_us)
+        self._won.over(task)
+        self.orders.give_back(task, OrderEvent.TAKEN_BACK)
+        return [*said, Report(f"node {winner} has lost task {task.number}"), Record(self.orders.record())]
 
     # --- lanes -------------------------------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from onboard.contract.messages import Award, CarAt, Heartbeat, Message, Referenc
 from onboard.contract.terminal import LaneState, PlanHead, PlanStep, PlanTask, StepReport, StepResult, TaskTerms
 from onboard.core.effects import Effect, Send
 from onboard.core.serial import from_bus_ms, is_newer
-from onboard.systems.terminal.plan import NO_STEP, ActionPlan, PlanReader
+from onboard.systems.terminal.plan import NO_STEP, ActionPlan, Load, PlanReader
 from onboard.systems.terminal.site import EntityKind, StationKind, Terminal
 from onboard.systems.terminal.traffic import Traffic
 from onboard.ways.cars import CarMirror
@@ -217,6 +217,11 @@ class TerminalMirror:
             if any(load.box == box and load.put >= owned.current for load in owned.plan.loads):
                 return owner
         return None
+
+    def load_of(self, box: int) -> Load | None:
+        """As what a plan carries a box; None where none does."""
+        coming = ((load, owned) for owned in self.traffic.plans.values() for load in owned.plan.loads)
+        return next((load for load, owned in coming if load.box == box and load.put >= owned.current), None)
 
     def entry_slot(self, entity: int, node: int) -> int:
         """The body slot by which a vehicle comes into an entity: its own bay in an area."""
