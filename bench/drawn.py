@@ -20,7 +20,7 @@ from bench import _drawn_lines, _drawn_plants
 from bench._drawn_car_park import DrawnCarPark
 from bench._drawn_constants import with_constants
 from bench._drawn_tables import Tables, site_text
-from bus_sim.campaign.profiles import PROFILES
+from bus_sim.campaign.profiles import named
 from bus_sim.campaign.report import FAILURES
 from bus_sim.campaign.runner import CampaignSettings, TrialResult, run_seed
 from bus_sim.demand import DemandError, read_seeds
@@ -93,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sites", nargs="?", default="1-8", help="a number, or the first and the last of several")
     parser.add_argument("--system", default="car-park", choices=DRAWN, help="lines: a car park with lifts in line")
-    parser.add_argument("--faults", default="all", choices=PROFILES)
+    parser.add_argument("--faults", default="all", help="a profile of bus-sim campaign, or several with commas between")
     parser.add_argument("--constants", action="store_true", help="times, speeds and lengths are drawn as well")
     parser.add_argument("--cars", type=int, default=12, help="in a car park")
     parser.add_argument("--orders", type=int, help="on any other site")
@@ -104,6 +104,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         numbers = read_seeds(options.sites)
+        named(options.faults)
     except DemandError as error:
         parser.error(str(error).removeprefix("--seeds "))
     if options.prints:

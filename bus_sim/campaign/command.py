@@ -15,7 +15,7 @@ from bus_sim.campaign import table
 from bus_sim.campaign.cold_start import cold_starts
 from bus_sim.campaign.ledger import Ledger, site_as_played
 from bus_sim.campaign.points import SceneOccasion, Single, count, points, reference
-from bus_sim.campaign.profiles import PROFILES, kinds_for
+from bus_sim.campaign.profiles import PROFILES, kinds_for, named
 from bus_sim.campaign.report import FAILURES, RunVerdict
 from bus_sim.campaign.runner import CampaignSettings, FaultPoint, TrialResult, run_point, run_points, run_seed
 from bus_sim.campaign.strangers import StrangerPlan, play_pairs
@@ -69,7 +69,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description, parser.formatter_class = HELP, argparse.RawDescriptionHelpFormatter
     parser.add_argument("site", help="name of a shipped site, or a site file")
     parser.add_argument("--seeds", default="1-16", metavar="A-B", help="from the first to the last (default: 1-16)")
-    parser.add_argument("--faults", default="all", metavar="PROFILE", help=f"{', '.join(PROFILES)} (default: all)")
+    parser.add_argument(
+        "--faults",
+        default="all",
+        metavar="PROFILE",
+        help=f"{', '.join(PROFILES)}, or several of them with commas between (default: all)",
+    )
     parser.add_argument(
         "--exhaustive", choices=[str(one) for one in Single], help="every single fault of a kind in one reference scene"
     )
@@ -286,8 +291,7 @@ def _plan(args: argparse.Namespace, site: Site) -> CampaignSettings:
 
 def _check(args: argparse.Namespace) -> None:
     """Raise ``DemandError`` for the first value that no site takes."""
-    if args.faults not in PROFILES:
-        raise DemandError(f"--faults {args.faults}: no such profile; profiles are {', '.join(PROFILES)}")
+    named(args.faults)
     if args.cars is not None and not 1 <= args.cars <= MOST_CARS:
         raise DemandError(f"--cars {args.cars}: must be from 1 to {MOST_CARS}")
     if args.orders is not None:

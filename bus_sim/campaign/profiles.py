@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from math import log10
 from typing import Final
 
+from bus_sim.demand import DemandError
 from bus_sim.faults.injection import Injection
 from bus_sim.faults.table import TEN_YEARS_MS, Value
 from bus_sim.systems.registry import simulated_of
@@ -240,15 +241,30 @@ PROFILES: Final[dict[str, dict[str, Draw]]] = {
 _WITHOUT_TIME = frozenset({"lost_ticket", "linger", "oversize"})
 
 
+def named(profiles: str) -> list[str]:
+    """The profiles that a list with commas names. Raises ``DemandError`` for one that is none of ``PROFILES``."""
+    for name in (names := profiles.split(",")):
+        if name not in PROFILES:
+            raise DemandError(f"--faults {name}: no such profile; profiles are {', '.join(PROFILES)}")
+    return names
+
+
 def kinds_for(profile: str, site: Site) -> dict[str, Draw]:
-    """The kinds of a profile that are drawn for this site's system."""
+    """The kinds of a profile that are drawn for this site's system; of several those of all."""
     system = simulated_of(site)
     without = set() if _movables(site) else {"held"}
-    return {kind: draw for kind, draw in PROFILES[profile].items() if system.draws(kind, site) and kind not in without}
+    kinds = {kind: draw for name in named(profile) for kind, draw in PROFILES[name].items()}
+    return {kind: draw for kind, draw in kinds.items() if system.draws(kind, site) and kind not in without}
 
 
 def draw_faults(profile: str, seed: int, site: Site, span_s: tuple[float, float] = SPAN_S) -> tuple[Injection, ...]:
-    """The faults of one seed, by time; always the same for the same profile, seed, site and span."""
+    """The faults of one seed, by time; always the same for the same profile, seed, site and span.
+
+    Of several profiles each brings what it brings by itself.
+    """
+    if "," in profile:
+        each = [fault for name in named(profile) for fault in draw_faults(name, seed, site, span_s)]
+        return tuple(sorted(each, key=lambda one: one.number("at_s") if "at_s" in one.given else 0.0))
     kinds = kinds_for(profile, site)
     if not kinds:
         return ()

@@ -5,6 +5,7 @@ follow. Together they take 6 to 12 bits, and the eight bits of the error delimit
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from bus_sim.can import bitstream
 from bus_sim.can.error_frames import BusError
@@ -30,12 +31,18 @@ class Failure:
         return self.detected_bits + self.flag_bits + bitstream.DELIMITER_BITS + bitstream.INTERMISSION_BITS
 
 
+@lru_cache(maxsize=1024)
+def _on_wire(frame: Frame) -> tuple[int, ...]:
+    """A frame that fails is sent again at once, in a burst some thousand times a second: its bits are kept."""
+    return tuple(bitstream.stuffed_bits(frame))
+
+
 def bit_error(frame: Frame, position: int) -> Failure:
     """The transmitter sees another bit than it sent at wire bit ``position`` and flags it from the next bit on.
 
     The receivers notice six equal bits in a row, to which the bits just before the flag may belong.
     """
-    wire = bitstream.stuffed_bits(frame)
+    wire = _on_wire(frame)
     wrong = wire[position] ^ 1
     run = 1
     if wrong == 0:

@@ -16,6 +16,32 @@ def test_drawn_sites_are_served_under_faults(system: str, tmp_path: Path, capsys
     assert list(tmp_path.iterdir()) == [], "nothing is kept of what did not fail"
 
 
+@pytest.mark.parametrize(
+    ("number", "faults"),
+    [
+        # A desk whose power failed missed that a box was another desk's, and counted it as its own.
+        (18, "bus,outages,devices"),
+        # Who was off heard of two in its lane in the wrong order, and told that for good.
+        (29, "clocks,devices,outages"),
+        # Two had one box in their plans, and the second one tried to pick it up where it was no more.
+        (43, "crash,outages,devices"),
+        # Who was off as the box above its own was given back waited for good at their stack.
+        (44, "people,devices,operators"),
+    ],
+)
+def test_yards_get_over_faults_of_several_kinds_at_once(number: int, faults: str, tmp_path: Path) -> None:
+    """Each left boxes waiting for good, and nobody was told to help."""
+    assert main([str(number), "--system", "terminal", "--faults", faults, "--out", str(tmp_path)]) == 0
+
+
+@pytest.mark.parametrize("faults", ["crash,", "people,none at all"])
+def test_profiles_that_are_not_there_are_named(faults: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["1", "--faults", faults])
+    assert ended.value.code == 2
+    assert f"--faults {faults.split(',')[1]}: no such profile; profiles are none, bus, " in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("system", DRAWN)
 def test_a_number_is_one_site(system: str) -> None:
     one, other = drawn_site(system, 3), drawn_site(system, 4)

@@ -35,6 +35,18 @@ def test_what_a_profile_draws_is_read_back_and_fits_the_site(profile: str) -> No
     assert kinds_for(profile, plain).keys() == seen - OF_BATTERIES
 
 
+def test_several_profiles_bring_what_each_brings_by_itself() -> None:
+    site = find_site("small")
+    both = draw_faults("crash,people", 5, site)
+    assert sorted(map(str, both)) == sorted(
+        str(one) for name in ("crash", "people") for one in draw_faults(name, 5, site)
+    )
+    assert {fault.kind for seed in range(20) for fault in draw_at_rate("crash,people", seed, site, 6, 36_000)} == {
+        *PROFILES["crash"],
+        *PROFILES["people"],
+    }
+
+
 def test_at_a_rate_faults_fill_the_whole_run_and_name_cars_that_are_there() -> None:
     site, arrivals_s = find_site("small"), [200.0 * number for number in range(1, 180)]
     faults = [fault for seed in range(8) for fault in draw_at_rate("all", seed, site, 6, 36_000, arrivals_s)]

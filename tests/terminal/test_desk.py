@@ -8,6 +8,7 @@ from typing import TypeVar
 import pytest
 
 from onboard.contract.codes import Grade, KindCode, ManualMode, Reason, TaskPhase, TokenKind
+from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import (
     Award,
     Bid,
@@ -263,6 +264,24 @@ def test_a_box_that_is_carried_for_another_desk_is_not_mine_though_its_winner_wa
     assert last.reason is Reason.CANCELLED, "its winner is not to blame"
     anew = next(one.car.number for one in desk.sent(CallForProposals) if one.task != call.task)
     assert anew != call.car.number and site().boxes[anew - 1].type == site().boxes[call.car.number - 1].type
+
+
+@pytest.mark.parametrize("is_from_outside", [False, True])
+def test_a_box_that_somebody_else_brought_where_it_was_to_come_is_waited_for_no_more(is_from_outside: bool) -> None:
+    """Its vehicle had given it up while another, which was not heard, had it aboard."""
+    desk = Counter()
+    desk.senses(*tranship(9, "B4")) if not is_from_outside else desk.hears(wanted(9, "B4", "S4"))
+    call = won(desk)
+    desk.hears(TaskReport(R1, call.task, TaskPhase.AWARDED, place("S4"), Reason.NONE))
+    desk.hears(CarAt(R2, call.car, ANY_STATION, 1, 0))
+    desk.hears(TaskReport(R1, call.task, TaskPhase.FORFEITED, place("S2"), Reason.NONE))
+    desk.hears(CarAt(R2, call.car, place("S4"), 1, 0))
+    desk.passes(10)
+    assert "box B4 stands where it was to come" in desk.reported()
+    assert [one.call for one in desk.sent(CallForProposals)] == [call.call], "nobody is called for it"
+    assert told(desk, 9)[-1:] == ([(TaskPhase.DONE, Reason.NONE)] if is_from_outside else [])
+    again = Counter(desk.journal, boot=2)
+    assert again.sent(CallForProposals) == []
 
 
 # --- lanes -----------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ chooses the place itself and evaluates all its solutions (row P46).
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import Criterion, Grade, Operation
+from onboard.contract.codes import Criterion, Grade, LegAction, Operation
 from onboard.contract.messages import CallForProposals, Itinerary, Stamp
 from onboard.core.negotiation import CallKey, NeededAnswers, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
@@ -123,7 +123,13 @@ class CarParkGeneration:
         program = self.program
         is_planned = program.standing is not None and not program.unplanned
         is_free = not self.is_held and len(program.remaining) + 4 <= MAX_STEPS
-        return is_planned and is_free and self.charging.bids(now_us)
+        return is_planned and is_free and not self._is_trapped() and self.charging.bids(now_us)
+
+    def _is_trapped(self) -> bool:
+        """Whether it rides with a lift that does not go on: what it won it would give back, again and again."""
+        obstacles = self.mirror.obstacles.machines
+        now = self.program.remaining[:1] if obstacles else ()
+        return any(one.action is LegAction.RIDE and self.site.stewards[one.track] in obstacles for one in now)
 
     def _is_behind_itself(self, call: CallForProposals) -> bool:
         """Whether it has to leave a car before in the very bay out of which it would take that of the call."""

@@ -19,6 +19,7 @@ from onboard.contract.codes import (
     TokenKind,
 )
 from onboard.contract.messages import (
+    NO_REFERENCE,
     CallForProposals,
     CarAt,
     Halted,
@@ -30,7 +31,7 @@ from onboard.contract.messages import (
     TaskReport,
     TokenGrant,
 )
-from onboard.contract.terminal import BoxOrder, LaneState, PlanHead, StepReport, TaskTerms
+from onboard.contract.terminal import BoxOrder, PlanHead, StepReport, TaskTerms
 from onboard.contract.terminal_device import LaneSensor, ManualKey, MissionAnswer, MissionKey
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet
@@ -39,12 +40,13 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, Closed, Estimator, NegotiationEvent, RequestedTerms
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Site
+from onboard.systems.terminal.cameras import Cameras
 from onboard.systems.terminal.memory import box_record, read_boxes
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.missions import MissionBook, Transport
 from onboard.systems.terminal.rights import verdict
 from onboard.systems.terminal.routes import least_end_ms
-from onboard.systems.terminal.site import EntityKind, Terminal
+from onboard.systems.terminal.site import Terminal
 from onboard.systems.terminal.vehicle import terminal
 from onboard.systems.terminal.waiting import WaitingOrders
 from onboard.systems.terminal.won import WonBoxes
@@ -57,8 +59,6 @@ from onboard.work.plain import NoEstimator
 #: After a refusal, and while no robot is about to be free, the desk looks again after this, us: plans change within
 #: seconds.
 LOOK_US = 5_000_000
-#: A lane that is blocked is told again so often, us (dbc/terminal.dbc).
-LANE_REPEAT_US = 5_000_000
 #: An order by hand that its vehicle has not answered is said again after this, us (dbc/terminal.dbc).
 MANUAL_AGAIN_US = 1_000_000
 #: After power-up whoever has won a task that was called for has said so after this, us: twice what it takes until it
@@ -102,9 +102,8 @@ class Desk:
     taken: dict[int, int] = field(default_factory=dict)
     interrupted: int = 0
     _look_at_us: int | None = None
-    _repeat_at_us: int | None = None
+    _cameras: Cameras = field(init=False)
     _won: WonBoxes = field(init=False)
-    _lanes: dict[int, LaneState] = field(default_factory=dict)
     _is_new: bool = False
     _is_moved: bool = False
     #: Vehicles in which a person has a hand, and orders to vehicles that were not heard to have come.
@@ -119,6 +118,7 @@ class Desk:
     def __post_init__(self) -> None:
         self.orders = MissionBook(self.site, self.fleet.node_id)
         self.orders.replay(self.fleet.entries)
+        self._cameras = Cameras(self.fleet.node_id, self.mirror)
         self._won = WonBoxes(self.fleet.node_id, self.orders, self.mirror)
         self._waiting = WaitingOrders(self.orders, self.mirror)
 
@@ -161,7 +161,7 @@ class Desk:
             case MissionKey():
                 return self._typed(message, now_us)
             case LaneSensor():
-                return self._seen(message, now_us)
+                return self._cameras.see(message, now_us)
             case ManualKey() if message.vehicle in self.site.vehicles:
                 order = ManualOrder(self.fleet.node_id, message.vehicle, message.number, message.manual_mode)
                 self._manual[message.vehicle], self._manual_at_us = order, now_us + MANUAL_AGAIN_US
@@ -214,9 +214,7 @@ class Desk:
     def advance(self, now_us: int) -> list[Effect]:
         """Open the next call where a robot is about to be free; tell blocked lanes again; look after won tasks."""
         effects = self._take_over() if self._is_moved else []
-        if self._repeat_at_us is not None and self._repeat_at_us <= now_us:
-            self._repeat_at_us = now_us + LANE_REPEAT_US
-            effects += self._lanes_told()
+        effects += self._cameras.repeat(now_us)
         if self._manual_at_us is not None and self._manual_at_us <= now_us:
             self._manual_at_us = now_us + MANUAL_AGAIN_US if self._manual else None
             effects += [Send(order) for order in self._manual.values()]
@@ -229,13 +227,14 @@ class Desk:
     def next_wake(self) -> int | None:
         """When it looks after open orders, says one again, or repeats a manual order, us."""
         return min(
-            (one for one in (self._look_at_us, self._repeat_at_us, self._manual_at_us) if one is not None), default=None
+            (one for one in (self._look_at_us, self._cameras.again_at_us, self._manual_at_us) if one is not None),
+            default=None,
         )
 
     def statements(self, now_us: int) -> list[Effect]:
         """Lanes, the boxes that are not where they were at first, and the rights that I hold."""
         boxes = [Send(one) for one in self.mirror.kept_by(self.fleet.node_id)]
-        return [*self._lanes_told(), *boxes, *self.fleet.tokens.statements()]
+        return [*self._cameras.told(), *boxes, *self.fleet.tokens.statements()]
 
     def _take_over(self) -> list[Effect]:
         """A box in my books was put down, and its right came back: from now on I vouch for where it stands.
@@ -470,7 +469,16 @@ class Desk:
                 effects.append(Record(self.orders.record()))
             elif self._won.is_lost(task, now_us) and self._station_of(self.orders.open[task].box):
                 effects += self._lost(task, winner, now_us)
-        return effects
+        return effects + self._arrived()
+
+    def _arrived(self) -> list[Effect]:
+        """Boxes that stand where they were to come are missions no more; whoever ordered one from outside is told."""
+        effects: list[Effect] = []
+        for box, task in self.orders.arrived(self.mirror):
+            done = TaskReport(self.fleet.node_id, task, TaskPhase.DONE, self.mirror.station_of(box), Reason.NONE)
+            effects += [Report(f"box {self.site.boxes[box - 1].name} stands where it was to come")]
+            effects += [Send(done)] if task != NO_REFERENCE else []
+        return [*effects, Record(self.orders.record())] if effects else []
 
     def _lost(self, task: Reference, winner: int, now_us: int) -> list[Effect]:
         """Its winner is not to blame where another desk has the box: its word that it gives the task up was missed."""
@@ -479,22 +487,3 @@ class Desk:
         self._won.over(task)
         self.orders.give_back(task, OrderEvent.TAKEN_BACK)
         return [*said, Report(f"node {winner} has lost task {task.number}"), Record(self.orders.record())]
-
-    # --- lanes -------------------------------------------------------------------------------------------------
-
-    def _seen(self, sensor: LaneSensor, now_us: int) -> list[Effect]:
-        """A change on a lane is told to all robots (row M36)."""
-        known = self._lanes.get(sensor.lane)
-        entity = self.site.entities.get(sensor.lane)
-        if entity is None or entity.kind is not EntityKind.LANE or (known is None and not sensor.blocked):
-            return []
-        if known is not None and known.blocked == sensor.blocked:
-            return []
-        state = LaneState(self.fleet.node_id, sensor.lane, sensor.blocked, to_bus_ms(now_us))
-        self._lanes[sensor.lane] = state
-        self.mirror.on_lane(state, now_us)
-        self._repeat_at_us = now_us + LANE_REPEAT_US
-        return [Send(state)]
-
-    def _lanes_told(self) -> list[Effect]:
-        return [Send(state) for state in self._lanes.values()]

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from onboard.contract.codes import TaskPhase
-from onboard.contract.messages import Reference
+from onboard.contract.messages import NO_REFERENCE, Reference
 from onboard.contract.terminal import Verb
 from onboard.contract.terminal_device import MissionKey
 from onboard.core.journal_records import Entry, records_in
@@ -203,6 +203,22 @@ class MissionBook:
             order.left += 1
         else:
             order.named.append(transport.box)
+
+    def arrived(self, mirror: TerminalMirror) -> list[tuple[int, Reference]]:
+        """Boxes ordered by name that stand where they are to come, and their tasks, or NO_REFERENCE.
+
+        Whoever brought them: nothing is left to do.
+        """
+        found = []
+        for order in list(self.missions.values()):
+            there = [box for box in order.named if mirror.station_of(box) == order.target]
+            order.named = [box for box in order.named if box not in there]
+            found += [(box, order.task or NO_REFERENCE) for box in there]
+            if not order.named and not order.left:
+                del self.missions[order.number]
+        self.done += len(found)
+        self.over.extend(task for _, task in found if task != NO_REFERENCE)
+        return found
 
     def finish(self, task: Reference) -> bool:
         """A transport is over; True where it was open."""

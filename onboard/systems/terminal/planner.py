@@ -192,7 +192,8 @@ class Planner:
         self.unbegun.note(now_us)
         if turn_us == now_us:
             effects = self._plan_next(now_us) + self._mend(now_us)
-            effects = effects or self._tell_anew(now_us) or self._give_back(self.unbegun.due(now_us), now_us)
+            effects = effects or self._give_back(self.unbegun.gone(), now_us) or self._tell_anew(now_us)
+            effects = effects or self._give_back(self.unbegun.due(now_us), now_us)
             if not effects and self.unbegun.is_to_look and (self.owned is None or self._is_settled(self.owned)):
                 effects = self._give_back(self.unbegun.buried(), now_us)
             turn_us = self._turn_us(now_us + TURN_US)

@@ -117,7 +117,7 @@ class Traffic:
             row = self.lists.setdefault(entity, [])
             if number == 0:
                 known_place = kept[1] if kept is not None and kept[0] == entity else None
-                row.insert(self._place_in_row(row, plan.steps[0].after, known_place), visit)
+                row.insert(self._place_in_row(plan.owner, row, plan.steps[0].after, known_place), visit)
             else:
                 row.insert(self._place(row, visit, plan), visit)
         self._straighten()
@@ -189,14 +189,24 @@ class Traffic:
         owned_at = [self._told_begin(other) for other in row]
         return max(inside, sum(1 for told in owned_at if told <= begin))
 
-    def _place_in_row(self, row: list[EntityVisit], after: EntityStay, known: int | None) -> int:
-        """Whoever is there already says whom it is behind: that is so on the ground. Nobody: in front."""
+    def _place_in_row(self, owner: int, row: list[EntityVisit], after: EntityStay, known: int | None) -> int:
+        """Whoever is there already says whom it is behind: that is so on the ground. Nobody: in front.
+
+        Where that one is not known, who says that it is behind this machine is: a machine that was off hears of one
+        after the other (drawn terminal 29).
+        """
         owners = [visit.owner for visit in row]
         if not after.owner:
             return 0
         if after.owner in owners:
             return owners.index(after.owner) + 1
-        return known if known is not None else sum(1 for visit in row if self.is_inside(visit))
+        if known is not None:
+            return known
+        behind = (n for n, visit in enumerate(row) if self.is_inside(visit) and self._told_after(visit).owner == owner)
+        return next(behind, sum(1 for visit in row if self.is_inside(visit)))
+
+    def _told_after(self, visit: EntityVisit) -> EntityStay:
+        return self.plans[visit.owner].plan.steps[visit.first].after
 
     def _told_begin(self, visit: EntityVisit) -> int:
         plan = self.plans[visit.owner].plan

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from onboard.contract.codes import KindCode, Reason, TaskPhase
+from onboard.contract.codes import KindCode, Reason, TaskPhase, TokenKind
 from onboard.contract.messages import Award, TaskReport
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
@@ -16,7 +16,7 @@ from onboard.work.manual import GIVE_BACK_US
 
 @dataclass
 class UnbegunLoads:
-    """Loads of one vehicle's plan that are not picked up, and to whose boxes it has no right yet."""
+    """Loads of one vehicle's plan that are not picked up; but for those that are gone, it has no right to them yet."""
 
     fleet: Fleet
     generation: VehicleGeneration
@@ -61,14 +61,26 @@ class UnbegunLoads:
 
     @property
     def is_to_look(self) -> bool:
-        """Whether somebody has given a box back since boxes under others were looked at."""
-        return self._mirror.given_up != self._given_up
+        """Whether somebody has given a box back since boxes under others were looked at, or I am refused mine.
+
+        Who was off as that was given back did not hear it (drawn terminal 44).
+        """
+        is_refused = any(key.kind is TokenKind.CAR for key in self.fleet.tokens.refused)
+        return is_refused or self._mirror.given_up != self._given_up
 
     def buried(self) -> list[Load]:
         """A box under one that its fetcher has given back, and all after it: others could not come to that stack."""
         self._given_up = self._mirror.given_up
         loads = self._all()
         return _from(loads, min((one.pick for one in loads if not self._mirror.is_free(one.box)), default=None))
+
+    def gone(self) -> list[Load]:
+        """A box that another carried away, for a task taken back from it, and all after it: it would not be found.
+
+        Both plans have it where the other vehicle was not heard as the second was made (drawn terminal 43).
+        """
+        loads = self._coming()
+        return _from(loads, min((one.pick for one in loads if self._is_gone(one)), default=None))
 
     def after(self, award: Award) -> list[Load]:
         """What a desk has given to another, or to nobody, and what comes after.
@@ -88,11 +100,17 @@ class UnbegunLoads:
         return [Send(TaskReport(node, one.task, TaskPhase.FORFEITED, 0, Reason.NONE)) for one in loads]
 
     def _all(self) -> list[Load]:
+        return [one for one in self._coming() if not self.fleet.tokens.holds(self.right_to(one))]
+
+    def _coming(self) -> list[Load]:
         owned = self._mirror.traffic.plans.get(self.fleet.node_id)
-        if owned is None:
-            return []
-        coming = [one for one in owned.plan.loads if owned.current <= one.pick < NO_STEP]
-        return [one for one in coming if not self.fleet.tokens.holds(self.right_to(one))]
+        return [] if owned is None else [one for one in owned.plan.loads if owned.current <= one.pick < NO_STEP]
+
+    def _is_gone(self, load: Load) -> bool:
+        """Whether its box is said to stand elsewhere, or to be aboard another."""
+        record = self._mirror.fleet.cars.get(self.generation.site.box(load.box))
+        at = self._mirror.traffic.plans[self.fleet.node_id].plan.steps[load.pick].entity
+        return record is not None and record.station != at and record.custodian != self.fleet.node_id
 
 
 def _from(loads: list[Load], first: int | None) -> list[Load]:
