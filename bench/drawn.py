@@ -20,7 +20,7 @@ from bench import _drawn_lines, _drawn_plants
 from bench._drawn_car_park import DrawnCarPark
 from bench._drawn_constants import with_constants
 from bench._drawn_tables import Tables, site_text
-from bus_sim.campaign.profiles import named
+from bus_sim.campaign.profiles import profile_names
 from bus_sim.campaign.report import FAILURES
 from bus_sim.campaign.runner import CampaignSettings, TrialResult, run_seed
 from bus_sim.demand import DemandError, read_seeds
@@ -104,7 +104,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         numbers = read_seeds(options.sites)
-        named(options.faults)
+        profile_names(options.faults)
     except DemandError as error:
         parser.error(str(error).removeprefix("--seeds "))
     if options.prints:

@@ -15,7 +15,7 @@ from bus_sim.campaign import table
 from bus_sim.campaign.cold_start import cold_starts
 from bus_sim.campaign.ledger import Ledger, site_as_played
 from bus_sim.campaign.points import SceneOccasion, Single, count, points, reference
-from bus_sim.campaign.profiles import PROFILES, kinds_for, named
+from bus_sim.campaign.profiles import PROFILES, kinds_for, profile_names
 from bus_sim.campaign.report import FAILURES, RunVerdict
 from bus_sim.campaign.runner import CampaignSettings, FaultPoint, TrialResult, run_point, run_points, run_seed
 from bus_sim.campaign.strangers import StrangerPlan, play_pairs
@@ -291,7 +291,7 @@ def _plan(args: argparse.Namespace, site: Site) -> CampaignSettings:
 
 def _check(args: argparse.Namespace) -> None:
     """Raise ``DemandError`` for the first value that no site takes."""
-    named(args.faults)
+    profile_names(args.faults)
     if args.cars is not None and not 1 <= args.cars <= MOST_CARS:
         raise DemandError(f"--cars {args.cars}: must be from 1 to {MOST_CARS}")
     if args.orders is not None:

@@ -241,7 +241,7 @@ PROFILES: Final[dict[str, dict[str, Draw]]] = {
 _WITHOUT_TIME = frozenset({"lost_ticket", "linger", "oversize"})
 
 
-def named(profiles: str) -> list[str]:
+def profile_names(profiles: str) -> list[str]:
     """The profiles that a list with commas names. Raises ``DemandError`` for one that is none of ``PROFILES``."""
     for name in (names := profiles.split(",")):
         if name not in PROFILES:
@@ -253,7 +253,7 @@ def kinds_for(profile: str, site: Site) -> dict[str, Draw]:
     """The kinds of a profile that are drawn for this site's system; of several those of all."""
     system = simulated_of(site)
     without = set() if _movables(site) else {"held"}
-    kinds = {kind: draw for name in named(profile) for kind, draw in PROFILES[name].items()}
+    kinds = {kind: draw for name in profile_names(profile) for kind, draw in PROFILES[name].items()}
     return {kind: draw for kind, draw in kinds.items() if system.draws(kind, site) and kind not in without}
 
 
@@ -263,7 +263,7 @@ def draw_faults(profile: str, seed: int, site: Site, span_s: tuple[float, float]
     Of several profiles each brings what it brings by itself.
     """
     if "," in profile:
-        each = [fault for name in named(profile) for fault in draw_faults(name, seed, site, span_s)]
+        each = [fault for name in profile_names(profile) for fault in draw_faults(name, seed, site, span_s)]
         return tuple(sorted(each, key=lambda one: one.number("at_s") if "at_s" in one.given else 0.0))
     kinds = kinds_for(profile, site)
     if not kinds:

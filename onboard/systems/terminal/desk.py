@@ -484,6 +484,8 @@ class Desk:
         """Its winner is not to blame where another desk has the box: its word that it gives the task up was missed."""
         all_won, is_anothers = self.fleet.winners, self._won.is_anothers(task)
         said = all_won.let_go(task) if is_anothers else all_won.take_back(task, Reason.FALSE_STATEMENT, now_us)
+        of_anothers = f"the box of task {task.number} is carried for another desk"
+        why = of_anothers if is_anothers else f"node {winner} has lost task {task.number}"
         self._won.over(task)
         self.orders.give_back(task, OrderEvent.TAKEN_BACK)
-        return [*said, Report(f"node {winner} has lost task {task.number}"), Record(self.orders.record())]
+        return [*said, Report(why), Record(self.orders.record())]
