@@ -1,6 +1,7 @@
 """Rules of the negotiation, of tasks and cars."""
 
 from dataclasses import replace
+from operator import itemgetter
 
 import pytest
 
@@ -223,6 +224,21 @@ def test_who_was_off_together_with_all_others_may_say_again_that_a_car_was_put_d
     """The log begins anew with the bus time: what was said before is not known."""
     tape = tell([(1, [call(1, 2)]), (1.5, [bid(MR1, 50_000)]), (2, [award(MR1)])])
     assert tape.say(5, report(MR1, TaskPhase.DONE, PLACE)).broken(8) == {}
+
+
+@pytest.mark.parametrize(("heard_at_s", "broken"), [(0.5, {"one-owner": 2}), (4.0, {})])
+def test_who_was_off_as_a_task_was_called_for_anew_may_have_won_it_before(
+    heard_at_s: float, broken: dict[str, int]
+) -> None:
+    """All others were off together in between, so that the log begins anew (drawn faults, inline 213)."""
+    beat = Heartbeat(MR1, 1, 1, 0, 2, KindCode.ROBOT, MachineState.IDLE)
+    tape = Tape(one_floor(3), started=False)
+    story = [(1.0, call(1, 2)), (2.0, award(0, CallResult.REFUSED)), (heard_at_s, beat)]
+    for at_s, word in sorted(story, key=itemgetter(0)):
+        tape.say(at_s, word)
+    for at_s, phase in ((5, TaskPhase.AWARDED), (6, TaskPhase.STARTED)):
+        tape.say(at_s, report(MR1, phase))
+    assert {rule: count for rule, count in tape.broken(8).items() if rule == "one-owner"} == broken
 
 
 def test_a_winner_may_give_the_task_back_before_it_was_heard() -> None:

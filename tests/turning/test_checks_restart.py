@@ -60,3 +60,12 @@ def test_who_was_cut_off_as_it_was_taken_back_has_patience_for_one_answer(
 ) -> None:
     found = {one.rule for one in judged(find_site("turning"), cut_off(30, *claims)).findings}
     assert ("one-lathe" in found) is is_found
+
+
+@pytest.mark.parametrize(("boot", "is_found"), [(2, False), (1, True)], ids=["started again", "never off"])
+def test_so_may_who_had_won_it_and_was_off_before_it_could_say_so(boot: int, is_found: bool) -> None:
+    won = Award(DESK, 1, FIRST, TASK, 1, CallResult.AWARDED, Reason.NONE)
+    said = [beat(1), won, TAKEN_BACK, has(SECOND), beat(boot), has(FIRST)]
+    story: list[tuple[int, Message]] = [(1_000_000 * number, one) for number, one in enumerate(said, start=1)]
+    found = {one.rule for one in judged(find_site("turning"), story).findings}
+    assert ("one-lathe" in found) is is_found

@@ -104,6 +104,8 @@ class OneLathe(Rule):
     def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._owner: dict[Reference, int] = {}
+        #: To whom it was awarded last, who may not have said that it has it.
+        self._winner: dict[Reference, int] = {}
         #: From whom an order was taken back, and in which life it heard so; None where it was silent.
         self._lost: dict[tuple[Reference, int], int | None] = {}
         #: Since when it says all the same that it has it, us of the log.
@@ -116,8 +118,13 @@ class OneLathe(Rule):
 
     def _on_award(self, event: LogEvent[Award]) -> None:
         word = event.message
-        if word.result is CallResult.REJECTED and word.sender == word.task.origin and word.task in self._owner:
-            owner = self._owner.pop(word.task)
+        if word.sender != word.task.origin:
+            return
+        if word.result is CallResult.AWARDED:
+            self._winner[word.task] = word.winner
+        owner = self._owner.get(word.task) or self._winner.get(word.task)
+        if word.result is CallResult.REJECTED and owner is not None:
+            self._owner.pop(word.task, None)
             life = self.picture.boots.get(owner)
             self._lost[word.task, owner] = life if self.picture.is_alive(owner, life) else None
             self._claimed_us.pop((word.task, owner), None)

@@ -33,6 +33,8 @@ class TaskSeen:
     done_in: set[int | None] = field(default_factory=set)
     winners: set[int] = field(default_factory=set)
     asked_us: int | None = None
+    #: When it was called for first, us of the log.
+    called_us: int = 0
 
 
 class OneOwner(Rule):
@@ -61,13 +63,9 @@ class OneOwner(Rule):
         if len(self._calls) > MOST_TASKS:
             self._calls.popitem(last=False)
         if whole:
-            self._task(call.task)
-
-    def _task(self, reference: Reference) -> TaskSeen:
-        task = self._tasks.setdefault(reference, TaskSeen())
+            self._tasks.setdefault(call.task, TaskSeen(called_us=event.time_us))
         if len(self._tasks) > MOST_TASKS:
             self._tasks.popitem(last=False)
-        return task
 
     def _on_award(self, event: LogEvent[Award]) -> None:
         award = event.message
@@ -89,6 +87,16 @@ class OneOwner(Rule):
             self.find(event, (award.sender, award.winner, task.owner), what)
         task.owner, task.version = award.winner, award.task_version
 
+    def _could_know(self, report: TaskReport, task: TaskSeen) -> bool:
+        """Whether its machine was heard before the task was called for, or the site's first life is in the log.
+
+        Else it may have won it before: all others were off for a while, and bus time began anew without it.
+        """
+        first_us = self.picture.first_us.get(report.sender)
+        is_known = self.picture.tokens.from_start or (first_us is not None and first_us <= task.called_us)
+        self.picture.unjudged += not is_known
+        return is_known
+
     def _on_report(self, event: LogEvent[TaskReport]) -> None:
         report = event.message
         task = self._tasks.get(report.task)
@@ -97,11 +105,12 @@ class OneOwner(Rule):
             return
         # Whoever called for it says DONE of a winner that has forgotten the task.
         is_callers = report.phase is TaskPhase.DONE and report.sender == report.task.origin
-        if report.phase in OWNERS_PHASES and report.sender != task.owner and not is_callers:
+        is_others = report.sender != task.owner and not is_callers
+        if report.phase in OWNERS_PHASES and is_others and (task.owner or self._could_know(report, task)):
             owner = f"which {task.owner} owns" if task.owner else "which nobody was awarded"
             what = f"tells {report.phase.name} of task {_name(report.task)}, {owner}"
             self.find(event, (report.sender, task.owner), what)
-        elif report.phase is TaskPhase.AWARDED and report.sender not in task.winners:
+        elif report.phase is TaskPhase.AWARDED and report.sender not in task.winners and self._could_know(report, task):
             self.find(event, (report.sender,), f"takes task {_name(report.task)} on without an award")
         if report.phase is TaskPhase.DONE and report.sender == task.owner:
             # Whoever was killed right after it says so once more after its restart: nobody may have heard it.

@@ -58,6 +58,8 @@ class BusPicture:
         #: The sign of life of each node that was taken up last: one that differs in its mirror's digest only, which
         #: nothing here reads, tells only that its sender lives.
         self.beats: dict[int, Heartbeat] = {}
+        #: Each machine's first sign of life, us of the log.
+        self.first_us: dict[int, int] = {}
         #: Machines that start, or hold for their journals: what they say that they hold is for the others to compare.
         self.announcing: set[int] = set()
         #: Things that could not be judged, because the log does not tell enough.
@@ -171,6 +173,7 @@ class BusPicture:
         if beat.state not in STILL and beat.sender in self._stopped:
             self._stopped.discard(beat.sender)
             self.excused_us = max(self.excused_us, time_us)
+        self.first_us.setdefault(beat.sender, time_us)
         self.boots[beat.sender], self.beats[beat.sender] = beat.boot, beat
         self.heard_us[beat.sender] = time_us
         if beat.state is MachineState.STARTING:
