@@ -6,17 +6,19 @@ from dataclasses import dataclass, field, replace
 from onboard.contract.codes import Grade, Reason, TaskPhase, TokenKind
 from onboard.contract.messages import Award, CallForProposals, Itinerary, Stamp, TaskReport
 from onboard.contract.terminal import Assignment, StepReport, StepResult
+from onboard.core.authority import segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.negotiation import Awarded, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import successor, to_bus_ms
+from onboard.core.site import Segment
 from onboard.systems.terminal.body import VehicleParts
 from onboard.systems.terminal.generation import VehicleGeneration, job_of
 from onboard.systems.terminal.memory import plan_record, read_plan
 from onboard.systems.terminal.mirror import TerminalMirror
-from onboard.systems.terminal.plan import ActionPlan, Load, PlanReader, to_frames
+from onboard.systems.terminal.plan import ActionPlan, EntityStay, Load, PlanReader, to_frames
 from onboard.systems.terminal.search import BoxTransport, remaining
-from onboard.systems.terminal.site import Terminal
+from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.systems.terminal.traffic import AnewFor, Owned, PlanViolation, is_for_good
 from onboard.systems.terminal.unbegun import UnbegunLoads
 
@@ -221,7 +223,23 @@ class Planner:
             return []
         self._refused = None
         left = remaining(self.mirror.traffic, self.fleet.node_id, now_us)
-        return [] if left is None else self._adopt(replace(left, version=successor(self.version, 8)), now_us)
+        if left is None:
+            return []
+        first = left.steps[0]._replace(after=self._ahead() or left.steps[0].after)
+        steps = first, *left.steps[1:]
+        return self._adopt(replace(left, version=successor(self.version, 8), steps=steps), now_us)
+
+    def _ahead(self) -> EntityStay | None:
+        """Whose stay is before mine on the lane that I am in, by who has the slot before me; None for nobody's.
+
+        That is so on the ground, whatever lists say of it (terminal, operators, clocks and bus, 214).
+        """
+        move, traffic = self.body.move, self.mirror.traffic
+        if move is None or self.site.entities[move.entity].kind is not EntityKind.LANE:
+            return None
+        holder = self.fleet.tokens.holder_of(segment_token(Segment(move.entity, move.slot + 1)))
+        row = [one for one in traffic.lists.get(move.entity, []) if one.owner == holder != self.fleet.node_id]
+        return next((one.key for one in row if traffic.is_inside(one)), None)
 
     def lost(self, award: Award, now_us: int) -> list[Effect]:
         """A task of my plan is another's, or nobody's: its desk took it back while I was silent."""
