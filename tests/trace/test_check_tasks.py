@@ -154,14 +154,15 @@ def test_a_call_that_is_never_closed_is_found() -> None:
         Halted(1, 1, Reason.EMERGENCY_STOP, 240, needs_person=False, boot=1),
         SyncRequest(1, MR2),
         Halted(1, ER1, Reason.NODE_SILENT, 0, needs_person=False, boot=1),
+        Halted(MR1, ER1, Reason.NODE_SILENT, 0, needs_person=False, boot=1),
     ],
-    ids=["held", "asks in vain", "hears no bus time"],
+    ids=["held", "asks in vain", "hears no bus time", "one that is cut off with it hears none"],
 )
 def test_a_call_whose_initiator_waits_is_closed_when_it_goes_on(waits: Message) -> None:
     """It asks in vain where its own words come to nobody (campaign terminal, outages, seed 44; cell, 60)."""
     tape = Tape(two_floors()).say(1, call(), BusTime(ER1, 1_000_000))
     for second in range(2, 33, 2):
-        tape.say(second, waits)
+        tape.say(second, power_up(), waits)
     assert tape.broken(36) == {}
     assert tape.broken(60) == {"calls-closed": 1}
 

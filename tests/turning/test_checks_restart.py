@@ -1,10 +1,12 @@
 """What a lathe says of an order that was taken back while it was off: its journal's word, until the desk answers."""
 
+from operator import itemgetter
+
 import pytest
 
 from bus_sim.sites import find_site
 from onboard.contract.codes import CallResult, KindCode, MachineState, Reason, TaskPhase
-from onboard.contract.messages import Award, Heartbeat, Message, Reference, TaskReport
+from onboard.contract.messages import Award, Halted, Heartbeat, Message, Reference, TaskReport
 from tests.faults.systems import judged
 
 DESK, FIRST, SECOND = 9, 1, 2
@@ -69,3 +71,14 @@ def test_so_may_who_had_won_it_and_was_off_before_it_could_say_so(boot: int, is_
     story: list[tuple[int, Message]] = [(1_000_000 * number, one) for number, one in enumerate(said, start=1)]
     found = {one.rule for one in judged(find_site("turning"), story).findings}
     assert ("one-lathe" in found) is is_found
+
+
+@pytest.mark.parametrize("is_silent", [True, False])
+def test_who_is_cut_off_ends_the_order_that_it_has(is_silent: bool) -> None:
+    """Neither it nor its desk can know (drawn turning cell 108): the parts are there twice."""
+    named = Halted(DESK, FIRST, Reason.NODE_SILENT, 0, needs_person=False, boot=1)
+    others = [(1_000_000 * at_s, named) for at_s in range(8, 40, 2)] if is_silent else []
+    said = (12, TaskPhase.AWARDED), (35, TaskPhase.DONE), (52, TaskPhase.AWARDED), (52, TaskPhase.DONE)
+    made: list[tuple[int, Message]] = [*cut_off(50, *said), *others]
+    found = {one.rule for one in judged(find_site("turning"), sorted(made, key=itemgetter(0))).findings}
+    assert ("one-lathe" in found) is not is_silent

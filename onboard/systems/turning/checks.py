@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from onboard.contract.codes import CallResult, TaskPhase
-from onboard.contract.messages import Award, Bid, CallForProposals, Reference, TaskReport
+from onboard.contract.codes import CallResult, Reason, TaskPhase
+from onboard.contract.messages import Award, Bid, CallForProposals, Halted, Reference, TaskReport
 from onboard.contract.turning import BillBar, BillCutting, BillWaiting, LathePhase, LatheProgress
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Finding, LogEvent
@@ -15,6 +15,8 @@ ROUNDING_CT = 3
 #: Who may not have heard that its order was taken back says for so long that it has it, us: its desk says the award of
 #: today again at once, and a word that is lost on its way is said again within a second.
 PATIENCE_US = 5_000_000
+#: Who is silent is named again by the others within this, us: two heartbeats.
+SAID_AGAIN_US = 4_000_000
 
 
 class BillsAddUp(Rule):
@@ -94,7 +96,7 @@ class OneLathe(Rule):
     """An order that a lathe has told to have is told by no other, until it is given or taken back; its batch grows.
 
     Who was silent as an order was taken back from it, or was started again since, may not have heard so: that it has it
-    is what its journal says, and the desk answers. That it has done it nobody else may say.
+    is what its journal says, and the desk answers. That it has done it nobody else says but who is cut off.
     """
 
     name = "one-lathe"
@@ -111,10 +113,23 @@ class OneLathe(Rule):
         #: Since when it says all the same that it has it, us of the log.
         self._claimed_us: dict[tuple[Reference, int], int] = {}
         self._made: dict[Reference, int] = {}
+        #: When another said last of a machine that it is silent, us of the log.
+        self._silent_us: dict[int, int] = {}
+        #: Who said while it was cut off that a task is done.
+        self._done_unheard: set[tuple[Reference, int]] = set()
 
     def handlers(self) -> Handlers:
-        """Reports, progress, and what the desk takes back."""
-        return {TaskReport: self._on_report, LatheProgress: self._on_progress, Award: self._on_award}
+        """Reports, progress, what the desk takes back, and who is silent."""
+        return {
+            TaskReport: self._on_report,
+            LatheProgress: self._on_progress,
+            Award: self._on_award,
+            Halted: self._on_halted,
+        }
+
+    def _on_halted(self, event: LogEvent[Halted]) -> None:
+        if event.message.reason is Reason.NODE_SILENT:
+            self._silent_us[event.message.machine] = event.time_us
 
     def _on_award(self, event: LogEvent[Award]) -> None:
         word = event.message
@@ -126,7 +141,8 @@ class OneLathe(Rule):
         if word.result is CallResult.REJECTED and owner is not None:
             self._owner.pop(word.task, None)
             life = self.picture.boots.get(owner)
-            self._lost[word.task, owner] = life if self.picture.is_alive(owner, life) else None
+            hears = self.picture.is_alive(owner, life) and not self._is_silent(owner)
+            self._lost[word.task, owner] = life if hears else None
             self._claimed_us.pop((word.task, owner), None)
 
     def _on_report(self, event: LogEvent[TaskReport]) -> None:
@@ -135,12 +151,26 @@ class OneLathe(Rule):
             if self._owner.get(word.task) == word.sender:
                 del self._owner[word.task]
             return
+        if self._owner.get(word.task, word.sender) != word.sender and self._is_unheard(word):
+            return
         if word.phase is TaskPhase.AWARDED and word.task in self._owner and self._may_not_have_heard(word):
             return
         owner = self._owner.setdefault(word.task, word.sender)
         if owner != word.sender:
             what = f"tells to have order {word.task.origin}.{word.task.number}, which another has"
             self.find(event, (word.sender, owner), what)
+
+    def _is_silent(self, node: int) -> bool:
+        silent_us = self._silent_us.get(node)
+        return silent_us is not None and self.picture.now_us - silent_us <= SAID_AGAIN_US
+
+    def _is_unheard(self, word: TaskReport) -> bool:
+        """Whether its sender is cut off, as the others say all the while; or was, as it said first that it is done."""
+        is_silent = self._is_silent(word.sender)
+        is_done = word.phase is TaskPhase.DONE
+        if is_silent and is_done:
+            self._done_unheard.add((word.task, word.sender))
+        return is_silent or (is_done and (word.task, word.sender) in self._done_unheard)
 
     def _may_not_have_heard(self, word: TaskReport) -> bool:
         """Whether its sender was not there as the order was taken back from it, and has not been told for long."""

@@ -132,8 +132,9 @@ class CallsClosed(_CallRule):
         super().__init__(picture, report)
         #: When a machine last said that it is held, has slept, or asked: it closes its calls once it goes on.
         self._held_us: dict[int, int] = {}
-        #: Who told the time of the bus last.
-        self._teller = NOBODY
+        #: Who told the time of the bus last, and when somebody said last that it does not hear it: one speaks for all
+        #: that are cut off together.
+        self._teller, self._untimed_us = NOBODY, 0
         #: Calls that somebody is still to close, in their order.
         self._open: dict[tuple[int, int], CallSeen] = {}
 
@@ -155,8 +156,10 @@ class CallsClosed(_CallRule):
             self._held_us[event.message.sender] = event.time_us
 
     def _on_halted(self, event: LogEvent[Halted]) -> None:
-        if event.message.machine in (event.message.sender, self._teller):
+        if event.message.machine == event.message.sender:
             self._held_us[event.message.sender] = event.time_us
+        if event.message.machine == self._teller:
+            self._untimed_us = event.time_us
 
     def _on_question(self, event: LogEvent[SyncRequest]) -> None:
         self._held_us[event.message.sender] = event.time_us
@@ -200,7 +203,7 @@ class CallsClosed(_CallRule):
         lived_us = self.picture.heard_us.get(seen.call.sender, 0)
         # A caller whose clock is behind may name a deadline that is over when the call is heard.
         held_us = self._held_us.get(seen.call.sender, 0)
-        due_us = max(seen.due_us, seen.event.time_us, self.picture.clock_settles_us, held_us)
+        due_us = max(seen.due_us, seen.event.time_us, self.picture.clock_settles_us, held_us, self._untimed_us)
         if due_us <= self.picture.spoiled_until_us:
             # It may have closed it by a word that came to nothing: its bidders end by their own clocks.
             return True
